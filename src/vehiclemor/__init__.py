@@ -1,0 +1,1 @@
+"""vehiclemor: benchmark suite for model order reduction of multibody vehicle models."""

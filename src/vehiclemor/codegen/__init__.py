@@ -1,0 +1,1 @@
+"""From symbolic programs to cached, compiled kernels."""

@@ -1,0 +1,1 @@
+"""Vehicle models, each derived symbolically in a file of its own."""

@@ -1,0 +1,40 @@
+"""What a model's derivation returns: named quantities and the program of its equations."""
+
+from dataclasses import dataclass
+
+from vehiclemor.symbolic.program import Program
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Name, SI unit and meaning of one coordinate, input or output."""
+
+    name: str
+    unit: str
+    long_name: str
+
+
+@dataclass(frozen=True)
+class AlgebraicEquations:
+    """Residual equations Phi(q; u) = 0 of a kinematic model (kind `ae`).
+
+    Attributes
+    ----------
+    coordinates, inputs, outputs
+        Quantities in the order of the model's specification.
+    equations
+        Names of the residual equations with their units.
+    joints
+        Names of the moving points and directions that the function `joints` returns.
+    program
+        Functions over the arguments `q` (n) and `u`: `residual` (n), `residual_jacobian`
+        (n x (n + 1): Jacobian, then residual), `newton_step` (n), `outputs`, and `joints`
+        (points x 3).
+    """
+
+    coordinates: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    equations: tuple[Quantity, ...]
+    joints: tuple[str, ...]
+    program: Program

@@ -1,0 +1,158 @@
+"""Parameter sets: every value with its unit, source and status, validated on loading."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import field_validator
+
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.resources import data_folder
+from vehiclemor.toml_files import FileSchema, read_toml
+
+# No road vehicle has a part farther than this from its origin (m).
+LARGEST_LENGTH = 20.0
+
+
+class Source(FileSchema):
+    """Where values come from, and under which licence they are used."""
+
+    text: str
+    licence: str
+
+
+class Parameter(FileSchema):
+    """One entry of a parameter file."""
+
+    value: float | list[float]
+    unit: str
+    source: str
+    status: Literal["published", "derived", "assumed"]
+    symbol: str
+    description: str
+
+    @field_validator("value")
+    @classmethod
+    def _finite(cls, value: float | list[float]) -> float | list[float]:
+        components = value if isinstance(value, list) else [value]
+        if not all(math.isfinite(component) for component in components):
+            raise ValueError(f"{value} is not finite")
+        return value
+
+
+class ParameterFile(FileSchema):
+    """Schema of `data/parameters/*.toml`."""
+
+    model: str
+    title: str
+    sources: dict[str, Source]
+    parameters: dict[str, Parameter]
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Validated parameters of one model, SI units.
+
+    Attributes
+    ----------
+    model
+        Name of the model.
+    entries
+        Name -> entry, in the order that the model declares.
+    """
+
+    model: str
+    entries: dict[str, Parameter]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Value of a parameter as an array, shape () or (3,)."""
+        return np.array(self.entries[name].value, dtype=float)
+
+    def values(self) -> dict[str, np.ndarray]:
+        """All values by name."""
+        return {name: self[name] for name in self.entries}
+
+    def flat(self) -> np.ndarray:
+        """All components in one array, in declared order."""
+        return np.concatenate([np.atleast_1d(self[name]) for name in self.entries])
+
+
+def load_parameters(
+    model: str,
+    expected: Mapping[str, str],
+    path: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> ParameterSet:
+    """Load and validate the parameters of a model.
+
+    Parameters
+    ----------
+    model
+        Name of the model.
+    expected
+        Parameter name -> unit that the model needs.
+    path
+        Parameter file; the model's own public data by default.
+    overrides
+        Parameter name -> value in SI units that replaces the file's.
+
+    Raises
+    ------
+    FileError
+        If the file is unreadable, for another model, incomplete, or has a wrong unit or value.
+    InputError
+        If an override names no parameter or has a wrong shape or value.
+    """
+    path = path or data_folder() / "parameters" / f"{model}.toml"
+    content = read_toml(path, ParameterFile)
+    if content.model != model:
+        raise FileError(f"{path}: parameters of model {content.model!r}, not of {model!r}")
+    missing = [name for name in expected if name not in content.parameters]
+    if missing:
+        raise FileError(f"{path}: parameters.{missing[0]} is missing")
+    unknown = [name for name in content.parameters if name not in expected]
+    if unknown:
+        raise FileError(f"{path}: parameters.{unknown[0]} is not a parameter of {model}")
+    entries = {name: content.parameters[name] for name in expected}
+    for name, unit in expected.items():
+        entry = entries[name]
+        where = f"{path}: parameters.{name}"
+        if entry.unit != unit:
+            raise FileError(f"{where}.unit: {entry.unit!r} is not the SI unit {unit!r}")
+        if entry.source not in content.sources:
+            raise FileError(f"{where}.source: {entry.source!r} is not listed under sources")
+        _check_point(entry.value, where, FileError)
+    for name, value in (overrides or {}).items():
+        if name not in entries:
+            raise InputError(f"{name!r} is not a parameter of {model}; it has {', '.join(expected)}")
+        components = _components(value, name)
+        _check_point(components, f"parameter {name}", InputError)
+        entries[name] = entries[name].model_copy(
+            update={"value": components, "status": "assumed", "source": "override"}
+        )
+    return ParameterSet(model, entries)
+
+
+def _components(value: object, name: str) -> list[float]:
+    try:
+        return [float(component) for component in np.atleast_1d(np.array(value, dtype=float))]
+    except (TypeError, ValueError):
+        raise InputError(f"parameter {name}: {value!r} is not a number or list of numbers") from None
+
+
+def _check_point(
+    value: float | list[float], where: str, error: type[FileError] | type[InputError]
+) -> None:
+    components = value if isinstance(value, list) else [value]
+    if len(components) != 3:
+        raise error(f"{where}: a point has 3 components (x, y, z), not {len(components)}")
+    for component in components:
+        if not math.isfinite(component):
+            raise error(f"{where}: {component} is not finite")
+        if abs(component) > LARGEST_LENGTH:
+            raise error(
+                f"{where}: {component} m is outside +-{LARGEST_LENGTH:g} m (is it in millimetres?)"
+            )

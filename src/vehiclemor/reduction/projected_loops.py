@@ -1,0 +1,133 @@
+"""Reduced solution of algebraic equations along time: a compiled loop, linked with the kernels.
+
+With q = mean + basis qh the reduced equations are W^T Phi(mean + basis qh; u) = 0: W is a constant
+test basis (Petrov-Galerkin), or W = Phi_q basis, fresh in each iteration (least squares by
+Gauss-Newton).  Bases are padded with zero columns to N x N, so that the compiler knows all sizes.
+"""
+
+import math
+
+import numpy as np
+
+from vehiclemor.codegen.stubs import INPUTS, WORK, N, residual_jacobian
+
+
+def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
+    """Solve the leading r x r block of a for column N by elimination with partial pivoting.
+
+    The solution replaces column N.  False if a pivot is zero or not finite.
+    """
+    for k in range(r):
+        pivot = k
+        for i in range(k + 1, r):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
+            return False
+        if pivot != k:
+            for j in range(k, r):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+            a[k, N], a[pivot, N] = a[pivot, N], a[k, N]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, r):
+            factor = a[i, k] * inverse
+            for j in range(k + 1, r):
+                a[i, j] -= factor * a[k, j]
+            a[i, N] -= factor * a[k, N]
+    for k in range(r - 1, -1, -1):
+        total = a[k, N]
+        for j in range(k + 1, r):
+            total -= a[k, j] * a[j, N]
+        a[k, N] = total / a[k, k]
+    return True
+
+
+def projected_path(
+    q_start,
+    first_samples,
+    means,
+    bases,
+    tests,
+    ranks,
+    least_squares,
+    inputs,
+    constants,
+    tolerance,
+    limit,
+    path,
+    counts,
+):  # noqa: ANN001, ANN201 - compiled
+    """Solve the reduced equations sample by sample, window by window.
+
+    Window k holds the samples from first_samples[k] up to first_samples[k + 1].  The iteration
+    starts from the previous sample, at the start of a window from its projection onto the new
+    subspace.  Returns (status, sample) as the full-order loops do; 3 is a singular reduced matrix.
+    """
+    q, u, work = q_start.copy(), np.empty(INPUTS), np.empty(WORK)
+    full = np.empty((N, N + 1))
+    product = np.empty((N, N))
+    reduced = np.empty((N, N + 1))
+    basis, test, mean, qh = np.empty((N, N)), np.empty((N, N)), np.empty(N), np.empty(N)
+    for window in range(ranks.shape[0]):
+        r = ranks[window]
+        for i in range(N):
+            mean[i] = means[window, i]
+            for j in range(N):
+                basis[i, j] = bases[window, i, j]
+                test[i, j] = tests[window, i, j]
+        for j in range(r):
+            qh[j] = 0.0
+            for i in range(N):
+                qh[j] += basis[i, j] * (q[i] - mean[i])
+        for i in range(N):
+            q[i] = mean[i]
+            for j in range(r):
+                q[i] += basis[i, j] * qh[j]
+        for sample in range(first_samples[window], first_samples[window + 1]):
+            for i in range(INPUTS):
+                u[i] = inputs[sample, i]
+            converged = False
+            for _ in range(limit):
+                residual_jacobian(q, u, constants, work, full)
+                counts[0] += 1
+                for i in range(N):
+                    for k in range(N):
+                        product[i, k] = 0.0
+                    for j in range(N):
+                        for k in range(N):
+                            product[i, k] += full[i, j] * basis[j, k]
+                if least_squares:
+                    for i in range(N):
+                        for k in range(N):
+                            test[i, k] = product[i, k]
+                for k in range(r):
+                    for j in range(N + 1):
+                        reduced[k, j] = 0.0
+                    for i in range(N):
+                        for j in range(N):
+                            reduced[k, j] += test[i, k] * product[i, j]
+                        reduced[k, N] += test[i, k] * full[i, N]
+                if not small_solve(reduced, r):
+                    return 3, sample
+                size = 0.0
+                for j in range(r):
+                    step = reduced[j, N]
+                    qh[j] -= step
+                    size = max(size, abs(step))
+                    if not math.isfinite(step):
+                        return 2, sample
+                for i in range(N):
+                    q[i] = mean[i]
+                    for j in range(r):
+                        q[i] += basis[i, j] * qh[j]
+                if size < tolerance:
+                    converged = True
+                    break
+            if not converged:
+                return 1, sample
+            for i in range(N):
+                path[sample, i] = q[i]
+    counts[1] = counts[0]
+    counts[2] = counts[0]
+    counts[3] = counts[0]
+    return 0, inputs.shape[0]

@@ -1,0 +1,25 @@
+"""Where the data files are: inside an installed package, or beside `src` in a checkout."""
+
+from pathlib import Path
+
+from vehiclemor.errors import FileError
+
+
+def data_folder() -> Path:
+    """Folder with `parameters`, `published`, `studies` and `reference`.
+
+    Raises
+    ------
+    FileError
+        If neither the installed package nor a checkout around it has the folder.
+    """
+    package = Path(__file__).resolve().parent
+    for folder in (package / "data", package.parents[1] / "data"):
+        if (folder / "parameters").is_dir():
+            return folder
+    raise FileError(f"the data files are missing: neither {package / 'data'} nor a checkout has them")
+
+
+def data_names(kind: str) -> list[str]:
+    """Names (without ending) of the data files of one kind, sorted."""
+    return sorted(path.stem for path in (data_folder() / kind).glob("*.toml"))

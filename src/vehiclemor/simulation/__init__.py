@@ -1,0 +1,1 @@
+"""Full-order simulation: compiled solvers, models ready to run, trajectories."""

@@ -1,0 +1,353 @@
+"""Kinematic models (kind `ae`) ready to run: compiled kernels with one parameter set."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.codegen.cache import kernel_hash, load_module
+from vehiclemor.codegen.emit import (
+    kernel_source,
+    operation_counts,
+    reference_source,
+    work_size,
+)
+from vehiclemor.codegen.link import linked_source
+from vehiclemor.errors import ConvergenceError, GeometryError, InputError, UnreachableError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.equations import AlgebraicEquations
+from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.registry import component
+from vehiclemor.simulation import newton_loops
+from vehiclemor.simulation.reach import reachable_range
+from vehiclemor.simulation.trajectory import COUNTS, Trajectory
+
+# Input increment (m) above which a step of the input is cut into substeps.  Beside a fold, Newton's
+# method jumps to the other branch from farther away than this.
+LARGEST_INCREMENT = 5e-3
+NEWTON_TOLERANCE = 1e-12
+CHORD_TOLERANCE = 1e-6
+ITERATION_LIMIT = 50
+STARTS = ("design",)
+# Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
+SMALLEST_SINGULAR_VALUE = 1e-8
+REASONS = {
+    newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
+    newton_loops.NOT_FINITE: "a coordinate is not finite",
+    3: "the reduced Jacobian is singular",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class AlgebraicModel:
+    """Compiled residual equations Phi(q; u) = 0 of one mechanism.
+
+    Attributes
+    ----------
+    name, summary, kind
+        Registered name, one line, and `ae`.
+    equations
+        Named quantities and symbolic program.
+    parameters
+        Validated parameter set.
+    kernels
+        Linked module of compiled kernels and loops.
+    kernel_hash
+        Hash of the kernels' source and of the compiler's versions.
+    constants
+        Hoisted constants of the parameter set.
+    design
+        Coordinates (n,) at the design position, where all inputs are zero.
+    """
+
+    name: str
+    summary: str
+    kind: str
+    equations: AlgebraicEquations
+    parameters: ParameterSet
+    kernels: ModuleType
+    kernel_hash: str
+    constants: np.ndarray
+    design: np.ndarray
+    travel_limit: float
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return tuple(quantity.name for quantity in self.equations.coordinates)
+
+    @property
+    def speeds(self) -> tuple[str, ...]:
+        """Names of the speeds: none, the equations are algebraic."""
+        return ()
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return tuple(quantity.name for quantity in self.equations.inputs)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(quantity.name for quantity in self.equations.outputs)
+
+    @property
+    def starts(self) -> tuple[str, ...]:
+        """Names of the initial conditions: where the iteration starts."""
+        return STARTS
+
+    @cached_property
+    def operation_counts(self) -> dict[str, dict[str, int]]:
+        """Operations of each generated function, by kind and in total."""
+        return operation_counts(reference_source(self.equations.program))
+
+    def start(self, name: str = "design") -> np.ndarray:
+        """Coordinates (n,) from which a simulation starts its first iteration."""
+        if name not in STARTS:
+            raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(STARTS)}")
+        return self.design.copy()
+
+    def residual(self, q: Any, u: Any) -> np.ndarray:
+        """Residual Phi(q; u), shape (n,)."""
+        q, u = self._checked(q, len(self.coordinates), "q"), self._checked(u, len(self.inputs), "u")
+        result = np.empty(len(q))
+        self.kernels.residual(q, u, self.constants, self._work(), result)
+        return result
+
+    def jacobian(self, q: Any, u: Any) -> np.ndarray:
+        """Analytic Jacobian of the residual with respect to q, shape (n, n)."""
+        q, u = self._checked(q, len(self.coordinates), "q"), self._checked(u, len(self.inputs), "u")
+        result = np.empty((len(q), len(q) + 1))
+        self.kernels.residual_jacobian(q, u, self.constants, self._work(), result)
+        return result[:, :-1].copy()
+
+    def newton_step(self, q: Any, u: Any) -> np.ndarray:
+        """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
+        q, u = self._checked(q, len(self.coordinates), "q"), self._checked(u, len(self.inputs), "u")
+        result = np.empty(len(q))
+        self.kernels.newton_step(q, u, self.constants, self._work(), result)
+        return result
+
+    def outputs_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Outputs (samples, number of outputs) along a path of coordinates and inputs."""
+        result = np.empty((len(coordinates), len(self.outputs)))
+        self.kernels.output_path(
+            np.ascontiguousarray(coordinates), np.ascontiguousarray(inputs), self.constants, result
+        )
+        return result
+
+    def joints_at(self, q: Any) -> dict[str, np.ndarray]:
+        """Positions (3,) in m of the moving joints, for drawing."""
+        result = np.empty(self.equations.program.functions["joints"].shape)
+        q, u = self._checked(q, len(self.coordinates), "q"), np.zeros(len(self.inputs))
+        self.kernels.joints(q, u, self.constants, self._work(), result)
+        return dict(zip(self.equations.joints, result, strict=True))
+
+    def solve(self, u: Any) -> np.ndarray:
+        """Coordinates (n,) at inputs u, on the branch of the design position.
+
+        Raises
+        ------
+        UnreachableError
+            If the mechanism can't reach the height; the reachable range is named.
+        """
+        inputs = self._checked(u, len(self.inputs), "u")[None, :]
+        return self.solve_path(np.zeros(1), inputs).coordinates[0]
+
+    def reach(self, rack: float = 0.0) -> tuple[float, float]:
+        """Lowest and highest reachable wheel travel (m) at a rack displacement (m)."""
+        known: dict[float, tuple[float, float]] = self.__dict__.setdefault("_reach", {})
+        if rack not in known:
+            known[rack] = reachable_range(self, rack, self.travel_limit)
+        return known[rack]
+
+    def simulate(
+        self, maneuver: Maneuver, times: np.ndarray | None = None, solver: str = "newton"
+    ) -> Trajectory:
+        """Full-order solution at the given times (the maneuver's output times by default).
+
+        Parameters
+        ----------
+        maneuver
+            Its inputs are the model's.
+        times
+            Increasing times (samples,) in s.
+        solver
+            `newton`: fresh Jacobians, converged to 1e-12 in the step.  `chord`: constant inverse of
+            the design position and cubic extrapolation, 1e-6 in the step.
+
+        Raises
+        ------
+        UnreachableError
+            If a height can't be reached.
+        ConvergenceError
+            If an iteration fails; time and reachable range are named.
+        """
+        if maneuver.inputs != self.inputs:
+            raise InputError(
+                f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
+                f"{self.name} needs {', '.join(self.inputs)}"
+            )
+        times = maneuver.times if times is None else np.asarray(times, dtype=float)
+        return self.solve_path(times, maneuver.at(times), solver)
+
+    def solve_path(self, times: np.ndarray, inputs: np.ndarray, solver: str = "newton") -> Trajectory:
+        """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
+        inputs = np.ascontiguousarray(inputs, dtype=float)
+        self.check_reach(times, inputs)
+        path = np.full((len(inputs), len(self.coordinates)), np.nan)
+        counts = np.zeros(len(COUNTS), dtype=np.int64)
+        u_start = np.zeros(len(self.inputs))
+        settings = (ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
+        if solver == "newton":
+            began = time.perf_counter()
+            status, sample = self.kernels.newton_path(
+                self.design, u_start, inputs, self.constants, NEWTON_TOLERANCE, *settings
+            )
+        else:
+            inverse_t = np.ascontiguousarray(np.linalg.inv(self.jacobian(self.design, u_start)).T)
+            counts[2] = 1
+            began = time.perf_counter()
+            status, sample = self.kernels.chord_path(
+                self.design, u_start, inputs, self.constants, inverse_t, CHORD_TOLERANCE, *settings
+            )
+        seconds = time.perf_counter() - began
+        if status != newton_loops.CONVERGED:
+            low, high = self.reach(float(inputs[sample, 1]))
+            raise ConvergenceError(
+                f"{self.name}: {REASONS[status]} at t = {times[sample]:.6g} s, height "
+                f"{inputs[sample, 0]:.4f} m ({solver}); the reachable range is {low:.4f} to {high:.4f} m"
+            )
+        return self.trajectory(times, inputs, path, counts, seconds)
+
+    def trajectory(
+        self,
+        times: np.ndarray,
+        inputs: np.ndarray,
+        path: np.ndarray,
+        counts: np.ndarray,
+        seconds: float,
+        failure: tuple[int, int] | None = None,
+    ) -> Trajectory:
+        """Trajectory of a path of coordinates; `failure` is (status, sample) of a stopped loop."""
+        status, message = "ok", ""
+        if failure is not None:
+            status = "diverged"
+            message = f"{REASONS[failure[0]]} at t = {times[failure[1]]:.6g} s"
+        return Trajectory(
+            times,
+            inputs,
+            path,
+            self.outputs_at(path, inputs),
+            {name: int(count) for name, count in zip(COUNTS, counts, strict=True)},
+            seconds,
+            status,
+            message,
+        )
+
+    def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Residuals (samples, n) along a path of coordinates and inputs."""
+        result = np.empty_like(coordinates)
+        self.kernels.residual_path(
+            np.ascontiguousarray(coordinates), np.ascontiguousarray(inputs), self.constants, result
+        )
+        return result
+
+    def check_reach(self, times: np.ndarray, inputs: np.ndarray) -> None:
+        """Raise `UnreachableError` if a height is out of reach, `InputError` if one isn't finite."""
+        bad = np.argwhere(~np.isfinite(inputs))
+        if len(bad):
+            sample, column = bad[0]
+            raise InputError(
+                f"input {self.inputs[column]} is not finite at t = {times[sample]:.6g} s"
+            )
+        racks = np.unique([inputs[:, 1].min(), inputs[:, 1].max()])
+        for rack in racks:
+            low, high = self.reach(float(rack))
+            outside = np.flatnonzero((inputs[:, 0] < low) | (inputs[:, 0] > high))
+            if len(outside):
+                sample = outside[0]
+                raise UnreachableError(
+                    f"{self.name}: height {inputs[sample, 0]:.4f} m at t = {times[sample]:.6g} s is out "
+                    f"of reach; the reachable range is {low:.4f} to {high:.4f} m (rack at {rack:g} m)"
+                )
+
+    def _work(self) -> np.ndarray:
+        return np.empty(self.kernels.WORK)
+
+    def _checked(self, value: Any, size: int, name: str) -> np.ndarray:
+        array = np.ascontiguousarray(value, dtype=float)
+        if array.shape != (size,):
+            raise InputError(f"{name} has shape {array.shape}, {self.name} needs ({size},)")
+        if not np.isfinite(array).all():
+            index = int(np.flatnonzero(~np.isfinite(array))[0])
+            raise InputError(f"{name}[{index}] is not finite")
+        return array
+
+
+@lru_cache(maxsize=8)
+def _compiled(name: str) -> tuple[AlgebraicEquations, ModuleType, str]:
+    """Equations and compiled kernels of a registered model; parameters play no part here."""
+    from vehiclemor.reduction import projected_loops
+
+    equations: AlgebraicEquations = component("model", name).derive()
+    sizes = {
+        "N": len(equations.coordinates),
+        "INPUTS": len(equations.inputs),
+        "OUTPUTS": len(equations.outputs),
+        "WORK": work_size(equations.program),
+    }
+    source = linked_source(
+        kernel_source(equations.program), [newton_loops, projected_loops], sizes, f"model {name}"
+    )
+    return equations, load_module(name, source), kernel_hash(source)
+
+
+def build(
+    name: str,
+    parameter_file: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> AlgebraicModel:
+    """Derive (or fetch), compile and parametrise a registered kinematic model.
+
+    Raises
+    ------
+    GeometryError
+        If the mechanism can't be assembled, or is locked at its design position.
+    """
+    definition = component("model", name)
+    parameters = load_parameters(name, definition.PARAMETERS, parameter_file, overrides)
+    design = definition.design_coordinates(parameters.values())
+    equations, kernels, digest = _compiled(name)
+    constants = np.empty(len(equations.program.constant_symbols))
+    kernels.constants(parameters.flat(), np.empty(kernels.WORK), constants)
+    model = AlgebraicModel(
+        name,
+        definition.SUMMARY,
+        definition.KIND,
+        equations,
+        parameters,
+        kernels,
+        digest,
+        constants,
+        design,
+        definition.TRAVEL_LIMIT,
+    )
+    nothing = np.zeros(len(model.inputs))
+    gap = float(np.abs(model.residual(design, nothing)).max())
+    if not gap < 1e-9:
+        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
+    smallest = float(np.linalg.svd(model.jacobian(design, nothing), compute_uv=False)[-1])
+    if smallest < SMALLEST_SINGULAR_VALUE:
+        raise GeometryError(
+            f"the geometry can't be assembled: the mechanism is locked at design "
+            f"(smallest singular value of the Jacobian {smallest:.1e})"
+        )
+    return model

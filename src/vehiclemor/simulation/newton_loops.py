@@ -1,0 +1,149 @@
+"""Full-order solution of Phi(q; u(t)) = 0 along time: compiled loops, linked with the kernels.
+
+Every loop returns (status, sample): 0 and the number of samples, or why and where it stopped.
+"""
+
+import math
+
+import numpy as np
+
+from vehiclemor.codegen.stubs import INPUTS, OUTPUTS, WORK, N, newton_step, outputs, residual
+
+CONVERGED = 0
+TOO_MANY_ITERATIONS = 1
+NOT_FINITE = 2
+# Columns of the counts array.
+ITERATIONS = 0
+RESIDUALS = 1
+JACOBIANS = 2
+SOLVES = 3
+
+
+def increments(u, target, largest):  # noqa: ANN001, ANN201 - compiled
+    """Number of substeps from inputs u to target, none longer than `largest`."""
+    distance = 0.0
+    for i in range(INPUTS):
+        distance = max(distance, abs(target[i] - u[i]))
+    return max(1, math.ceil(distance / largest - 1e-9))
+
+
+def newton_path(
+    q_start, u_start, inputs, constants, tolerance, limit, largest, path, counts
+):  # noqa: ANN001, ANN201 - compiled
+    """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
+
+    An input increment above `largest` is cut into substeps, so that the iteration can't jump to
+    another branch of solutions.
+    """
+    q, step, work = q_start.copy(), np.empty(N), np.empty(WORK)
+    u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
+    for sample in range(inputs.shape[0]):
+        for i in range(INPUTS):
+            target[i] = inputs[sample, i]
+        substeps = increments(previous, target, largest)
+        for substep in range(1, substeps + 1):
+            for i in range(INPUTS):
+                u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
+            converged = False
+            for _ in range(limit):
+                newton_step(q, u, constants, work, step)
+                counts[0] += 1
+                size = 0.0
+                for i in range(N):
+                    q[i] -= step[i]
+                    size = max(size, abs(step[i]))
+                    if not math.isfinite(step[i]):
+                        return 2, sample
+                if size < tolerance:
+                    converged = True
+                    break
+            if not converged:
+                return 1, sample
+        for i in range(INPUTS):
+            previous[i] = target[i]
+        for i in range(N):
+            path[sample, i] = q[i]
+    counts[1] = counts[0]
+    counts[2] = counts[0]
+    counts[3] = counts[0]
+    return 0, inputs.shape[0]
+
+
+def chord_path(
+    q_start, u_start, inputs, constants, inverse_t, tolerance, limit, largest, path, counts
+):  # noqa: ANN001, ANN201 - compiled
+    """Chord method: one constant inverse Jacobian, started from a cubic extrapolation in time.
+
+    `inverse_t` is the transposed inverse at the design position.  Only the residual is evaluated.
+    The extrapolation assumes equidistant samples; where they are not, it is just a worse start.
+    """
+    q, phi, step, work = q_start.copy(), np.empty(N), np.empty(N), np.empty(WORK)
+    u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
+    for sample in range(inputs.shape[0]):
+        for i in range(INPUTS):
+            target[i] = inputs[sample, i]
+        substeps = increments(previous, target, largest)
+        if sample >= 4:
+            substeps = 1
+            for i in range(N):
+                q[i] = (
+                    4.0 * (path[sample - 1, i] + path[sample - 3, i])
+                    - 6.0 * path[sample - 2, i]
+                    - path[sample - 4, i]
+                )
+        for substep in range(1, substeps + 1):
+            for i in range(INPUTS):
+                u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
+            converged = False
+            for _ in range(limit):
+                residual(q, u, constants, work, phi)
+                counts[1] += 1
+                for i in range(N):
+                    step[i] = 0.0
+                for j in range(N):
+                    for i in range(N):
+                        step[i] += inverse_t[j, i] * phi[j]
+                size = 0.0
+                for i in range(N):
+                    q[i] -= step[i]
+                    size = max(size, abs(step[i]))
+                if not math.isfinite(size):
+                    return 2, sample
+                if size < tolerance:
+                    converged = True
+                    break
+            if not converged:
+                return 1, sample
+        for i in range(INPUTS):
+            previous[i] = target[i]
+        for i in range(N):
+            path[sample, i] = q[i]
+    counts[0] = counts[1]
+    counts[3] = counts[1]
+    return 0, inputs.shape[0]
+
+
+def output_path(path, inputs, constants, result):  # noqa: ANN001, ANN201 - compiled
+    """Outputs at every sample of a path of coordinates into result (samples, OUTPUTS)."""
+    q, u, y, work = np.empty(N), np.empty(INPUTS), np.empty(OUTPUTS), np.empty(WORK)
+    for sample in range(path.shape[0]):
+        for i in range(N):
+            q[i] = path[sample, i]
+        for i in range(INPUTS):
+            u[i] = inputs[sample, i]
+        outputs(q, u, constants, work, y)
+        for i in range(OUTPUTS):
+            result[sample, i] = y[i]
+
+
+def residual_path(path, inputs, constants, result):  # noqa: ANN001, ANN201 - compiled
+    """Residuals at every sample of a path of coordinates into result (samples, N)."""
+    q, u, phi, work = np.empty(N), np.empty(INPUTS), np.empty(N), np.empty(WORK)
+    for sample in range(path.shape[0]):
+        for i in range(N):
+            q[i] = path[sample, i]
+        for i in range(INPUTS):
+            u[i] = inputs[sample, i]
+        residual(q, u, constants, work, phi)
+        for i in range(N):
+            result[sample, i] = phi[i]

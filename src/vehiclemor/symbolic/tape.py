@@ -1,0 +1,116 @@
+"""A tape: named intermediate results in single-assignment form over SymPy scalars.
+
+A multibody model written as one nested expression per equation grows without bound, and so do its
+derivatives.  On a tape every intermediate result along the kinematic chain gets a symbol, so that
+expressions stay short and derivatives follow by the chain rule, entry by entry.
+"""
+
+from collections.abc import Iterable, Sequence
+
+import sympy as sp
+
+
+class Tape:
+    """Ordered single-assignment list of intermediate results.
+
+    Notes
+    -----
+    Forward accumulation of derivatives: Griewank and Walther, *Evaluating Derivatives* (2nd ed.,
+    SIAM 2008), chapter 3.
+    """
+
+    def __init__(self) -> None:
+        self._definitions: dict[sp.Symbol, sp.Expr] = {}
+        self._symbols: dict[sp.Expr, sp.Symbol] = {}
+
+    @property
+    def definitions(self) -> dict[sp.Symbol, sp.Expr]:
+        """Symbol -> defining expression, in order of definition."""
+        return dict(self._definitions)
+
+    def let(self, expression: sp.Expr | float) -> sp.Expr:
+        """Name an intermediate result.
+
+        Parameters
+        ----------
+        expression
+            Any SymPy expression in earlier symbols of the tape and free symbols.
+
+        Returns
+        -------
+        sympy.Expr
+            The symbol that stands for the expression.  Numbers, symbols and negated symbols are
+            returned as they are: a name for them would only cost a line.
+        """
+        expression = sp.sympify(expression)
+        if expression.is_Atom or (-expression).is_Atom:
+            return expression
+        known = self._symbols.get(expression)
+        if known is not None:
+            return known
+        negated = self._symbols.get(-expression)
+        if negated is not None:
+            return -negated
+        symbol = sp.Symbol(f"v{len(self._definitions)}", real=True)
+        self._definitions[symbol] = expression
+        self._symbols[expression] = symbol
+        return symbol
+
+    def jacobian(
+        self, expressions: Sequence[sp.Expr], variables: Sequence[sp.Symbol]
+    ) -> list[list[sp.Expr]]:
+        """Analytic derivatives of expressions with respect to free symbols.
+
+        Parameters
+        ----------
+        expressions
+            Expressions in symbols of the tape and free symbols, m of them.
+        variables
+            Free symbols, n of them.
+
+        Returns
+        -------
+        list of list
+            m x n derivatives, their intermediate results added to the tape.
+        """
+        derivatives: dict[sp.Symbol, dict[int, sp.Expr]] = {
+            variable: {column: sp.Integer(1)} for column, variable in enumerate(variables)
+        }
+        for symbol in dependencies(expressions, self._definitions):
+            row = self._chain_rule(self._definitions[symbol], derivatives)
+            if row:
+                derivatives[symbol] = row
+        rows = [self._chain_rule(sp.sympify(e), derivatives) for e in expressions]
+        return [[row.get(column, sp.Integer(0)) for column in range(len(variables))] for row in rows]
+
+    def _chain_rule(
+        self, expression: sp.Expr, derivatives: dict[sp.Symbol, dict[int, sp.Expr]]
+    ) -> dict[int, sp.Expr]:
+        total: dict[int, sp.Expr] = {}
+        for argument in sorted(expression.free_symbols, key=str):
+            inner = derivatives.get(argument)  # type: ignore[arg-type]
+            if not inner:
+                continue
+            outer = expression.diff(argument)
+            for column, derivative in inner.items():
+                total[column] = total.get(column, sp.Integer(0)) + outer * derivative
+        return {column: self.let(value) for column, value in total.items() if value != 0}
+
+
+def dependencies(
+    expressions: Iterable[sp.Expr], definitions: dict[sp.Symbol, sp.Expr]
+) -> list[sp.Symbol]:
+    """Symbols that the expressions depend on, each after those it depends on itself."""
+    order: dict[sp.Symbol, None] = {}
+
+    def visit(symbol: sp.Symbol) -> None:
+        if symbol in order or symbol not in definitions:
+            return
+        for argument in sorted(definitions[symbol].free_symbols, key=str):
+            visit(argument)  # type: ignore[arg-type]
+        order[symbol] = None
+
+    for expression in expressions:
+        for argument in sorted(sp.sympify(expression).free_symbols, key=str):
+            visit(argument)
+    return list(order)

@@ -1,0 +1,53 @@
+"""The border to TOML files: one clear line for whatever is wrong with a file."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vehiclemor.errors import FileError
+
+Schema = TypeVar("Schema", bound="FileSchema")
+
+
+class FileSchema(BaseModel):
+    """Base of the schemas of data files: frozen, strict, no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+def read_toml(path: Path, schema: type[Schema]) -> Schema:
+    """Read and validate a TOML file.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, unreadable, no TOML, or does not fit the schema.
+    """
+    return validated(_parsed(path), schema, path)
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such file") from None
+    except OSError as error:
+        raise FileError(f"{path}: can't be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise FileError(f"{path}: not a text file in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"{path}: not a valid TOML file: {error}") from None
+
+
+def validated(content: dict[str, Any], schema: type[Schema], path: Path) -> Schema:
+    """Content as an instance of the schema; the first thing wrong becomes the error line."""
+    try:
+        return schema.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "top level"
+        more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+        message = first["msg"].removeprefix("Value error, ")
+        raise FileError(f"{path}: {where}: {message}{more}") from None
