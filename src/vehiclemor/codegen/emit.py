@@ -64,7 +64,7 @@ def reference_source(program: Program) -> str:
 def kernel_source(program: Program) -> str:
     """Source for the compiler: sine and cosine of an angle are evaluated together.
 
-    It calls `sincos(angle)` and `sincos_batch(work, count)`, which the linker provides.
+    It calls `sincos(angle)` and `sincos_batch(work, first)`, which the linker provides.
     """
     return _source(program, pairs=True)
 
@@ -75,17 +75,13 @@ def work_size(program: Program) -> int:
     return 3 * _padded(widest)
 
 
-def _padded(count: int) -> int:
-    return LANES * max(1, -(-count // LANES))
-
-
 def _source(program: Program, pairs: bool) -> str:
     hoisted = _function_source(
         "constants", {"parameters": program.parameters}, (), program.constants, [], pairs
     )
     parts = [hoisted]
     for name, function in program.functions.items():
-        angles = _leaf_angles(function, program)
+        angles = _leaf_angles(function, program) if pairs else []
         parts.append(
             _function_source(
                 name, program.arguments, program.constant_symbols, function, angles, pairs
@@ -113,8 +109,7 @@ def _function_source(
             for index, symbol in enumerate(symbols)
             if symbol in used
         ]
-    if pairs and angles:
-        lines += _batch(angles)
+    lines += _batch(angles)
     known = set(angles)
     for symbol, expression in function.assignments:
         if pairs:
@@ -150,14 +145,26 @@ def _leaf_angles(function: Function, program: Program) -> list[sp.Symbol]:
 
 
 def _batch(angles: list[sp.Symbol]) -> list[str]:
-    count = _padded(len(angles))
-    lines = [f"    work[{index}] = {angle}" for index, angle in enumerate(angles)]
-    lines += [f"    work[{index}] = 0.0" for index in range(len(angles), count)]
-    lines.append(f"    sincos_batch(work, {count})")
-    for index, angle in enumerate(angles):
-        lines.append(f"    sin_{angle} = work[{count + index}]")
-        lines.append(f"    cos_{angle} = work[{2 * count + index}]")
-    return lines
+    """Blocks of 8 angles, their 8 sines and their 8 cosines in the scratch space.
+
+    The three lie in one array at constant distances, so that the compiler knows that they don't
+    overlap and makes vector code.
+    """
+    lines, names = [], []
+    for index in range(_padded(len(angles))):
+        first, lane = 3 * LANES * (index // LANES), index % LANES
+        angle = angles[index] if index < len(angles) else "0.0"
+        lines.append(f"    work[{first + lane}] = {angle}")
+        if index < len(angles):
+            names.append(f"    sin_{angle} = work[{first + lane + LANES}]")
+            names.append(f"    cos_{angle} = work[{first + lane + 2 * LANES}]")
+    blocks = range(_padded(len(angles)) // LANES) if angles else ()
+    calls = [f"    sincos_batch(work, {3 * LANES * block})" for block in blocks]
+    return lines + calls + names if angles else []
+
+
+def _padded(count: int) -> int:
+    return LANES * max(1, -(-count // LANES))
 
 
 def _scalar_pairs(

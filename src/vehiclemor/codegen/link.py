@@ -70,7 +70,13 @@ def _decorated(text: str) -> str:
     parts: list[str] = []
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
-            inline = len(node.body) <= INLINE_LINES
-            parts.append(f"@{COMPILE}{', forceinline=True' if inline else ''})")
+            parts.append(f"@{COMPILE}{_inlining(node)})")
         parts.append(ast.unparse(node))
     return "\n".join(parts) + "\n"
+
+
+def _inlining(function: ast.FunctionDef) -> str:
+    # Inlined before optimisation, so that the loop over angles becomes vector code.
+    if function.name == "sincos":
+        return ', inline="always"'
+    return ", forceinline=True" if len(function.body) <= INLINE_LINES else ""

@@ -30,13 +30,16 @@ def sincos(angle):  # noqa: ANN001, ANN201 - compiled: types follow from the cal
     quadrant = math.floor(angle * TWO_OVER_PI + 0.5)
     y = ((angle - quadrant * HALF_PI_1) - quadrant * HALF_PI_2) - quadrant * HALF_PI_3
     z = y * y
+    zz = z * z
+    # Pairs of coefficients (Estrin's scheme) shorten the chain of dependent operations.
     s = -2.50507477628578072866e-8 + z * 1.58962301576546568060e-10
-    s = -1.98412698295895385996e-4 + z * (2.75573136213857245213e-6 + z * s)
-    s = y + y * z * (-1.66666666666666307295e-1 + z * (8.33333333332211858878e-3 + z * s))
+    s = (-1.98412698295895385996e-4 + z * 2.75573136213857245213e-6) + zz * s
+    s = (-1.66666666666666307295e-1 + z * 8.33333333332211858878e-3) + zz * s
+    s = y + (y * z) * s
     c = 2.08757008419747316778e-9 - z * 1.13585365213876817300e-11
-    c = 2.48015872888517045348e-5 + z * (-2.75573141792967388112e-7 + z * c)
-    c = 4.16666666666665929218e-2 + z * (-1.38888888888730564116e-3 + z * c)
-    c = (1.0 - 0.5 * z) + z * z * c
+    c = (2.48015872888517045348e-5 - z * 2.75573141792967388112e-7) + zz * c
+    c = (4.16666666666665929218e-2 - z * 1.38888888888730564116e-3) + zz * c
+    c = (1.0 - 0.5 * z) + zz * c
     half = quadrant * 0.5
     odd = half != math.floor(half)
     quarter = math.floor(half) * 0.5
@@ -48,7 +51,8 @@ def sincos(angle):  # noqa: ANN001, ANN201 - compiled: types follow from the cal
     return (-sine if minus_sine else sine), (-cosine if minus_cosine else cosine)
 
 
-def sincos_batch(work, count):  # noqa: ANN001, ANN201 - compiled: types follow from the call
-    """Sines of work[:count] into work[count:2 count], cosines into work[2 count:3 count]."""
-    for i in range(count):
-        work[count + i], work[2 * count + i] = sincos(work[i])
+def sincos_batch(work, first):  # noqa: ANN001, ANN201 - compiled: types follow from the call
+    """Sines of work[first:first + 8] into the next 8 places, cosines into the 8 after them."""
+    for lane in range(8):
+        i = first + lane
+        work[i + 8], work[i + 16] = sincos(work[i])

@@ -212,7 +212,7 @@ class AlgebraicModel:
                 self.design, u_start, inputs, self.constants, NEWTON_TOLERANCE, *settings
             )
         else:
-            inverse_t = np.ascontiguousarray(np.linalg.inv(self.jacobian(self.design, u_start)).T)
+            inverse_t = np.linalg.inv(self.jacobian(self.design, u_start)).T.copy()
             counts[2] = 1
             began = time.perf_counter()
             status, sample = self.kernels.chord_path(
