@@ -123,6 +123,40 @@ def _function_source(
     return "\n".join(lines)
 
 
+def tangent_source(program: Program) -> str:
+    """Source of `residual_tangent(q, u, constants, work, basis, r, result)`.
+
+    Made from `residual_jacobian`: result[:, :r] is the Jacobian times basis[:, :r] and result[:, n]
+    the residual.  Structural zeros of the Jacobian cost nothing.
+    """
+    function = program.functions["residual_jacobian"]
+    rows, columns = function.shape
+    angles = _leaf_angles(function, program)
+    text = _function_source(
+        "residual_tangent", program.arguments, program.constant_symbols, function, angles, True
+    )
+    lines = text.splitlines()
+    lines[0] = lines[0].replace("result):", "basis, r, result):")
+    body = lines[: len(lines) - rows * columns]
+    printer = _Printer(pairs=True)
+    products: list[str] = []
+    for i in range(rows):
+        terms = []
+        for j in range(columns - 1):
+            entry = function.results[i * columns + j]
+            if entry == 0:
+                continue
+            if entry in (1, -1):
+                terms.append(f"{'' if entry == 1 else '-'}basis[{j}, k]")
+                continue
+            body.append(f"    j_{i}_{j} = {printer.doprint(entry)}")
+            terms.append(f"j_{i}_{j}*basis[{j}, k]")
+        products.append(f"        result[{i}, k] = {' + '.join(terms) or '0.0'}")
+        residual = printer.doprint(function.results[i * columns + columns - 1])
+        body.append(f"    result[{i}, {columns - 1}] = {residual}")
+    return "\n".join([*body, "    for k in range(r):", *products]) + "\n"
+
+
 def _expressions(function: Function) -> list[sp.Expr]:
     return [e for _, e in function.assignments] + list(function.results)
 

@@ -32,3 +32,10 @@ def newton_step(q: Array, u: Array, constants: Array, work: Array, result: Array
 def outputs(q: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
     """Outputs y(q, u) into result (OUTPUTS,)."""
     raise NotImplementedError("runs only in a linked module")
+
+
+def residual_tangent(
+    q: Array, u: Array, constants: Array, work: Array, basis: Array, r: int, result: Array
+) -> None:
+    """Jacobian times basis[:, :r] into result[:, :r], residual into result[:, N]."""
+    raise NotImplementedError("runs only in a linked module")

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from vehiclemor.codegen.stubs import INPUTS, WORK, N, residual_jacobian
+from vehiclemor.codegen.stubs import INPUTS, WORK, N, residual_tangent
 
 
 def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
@@ -42,6 +42,23 @@ def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
     return True
 
 
+def weighted(test, k, product, j):  # noqa: ANN001, ANN201 - compiled
+    """Column k of the test basis times column j of the product."""
+    total = 0.0
+    for i in range(N):
+        total += test[i, k] * product[i, j]
+    return total
+
+
+def lift(mean, basis, qh, r, q):  # noqa: ANN001, ANN201 - compiled
+    """Full coordinates mean + basis qh into q."""
+    for i in range(N):
+        total = mean[i]
+        for j in range(r):
+            total += basis[i, j] * qh[j]
+        q[i] = total
+
+
 def projected_path(
     q_start,
     first_samples,
@@ -64,62 +81,45 @@ def projected_path(
     subspace.  Returns (status, sample) as the full-order loops do; 3 is a singular reduced matrix.
     """
     q, u, work = q_start.copy(), np.empty(INPUTS), np.empty(WORK)
-    full = np.empty((N, N + 1))
-    product = np.empty((N, N))
+    iterations = 0
+    product = np.empty((N, N + 1))
     reduced = np.empty((N, N + 1))
-    basis, test, mean, qh = np.empty((N, N)), np.empty((N, N)), np.empty(N), np.empty(N)
+    basis, mean, qh = np.empty((N, N)), np.empty(N), np.empty(N)
+    test = product if least_squares else np.empty((N, N + 1))
     for window in range(ranks.shape[0]):
         r = ranks[window]
         for i in range(N):
             mean[i] = means[window, i]
             for j in range(N):
                 basis[i, j] = bases[window, i, j]
-                test[i, j] = tests[window, i, j]
+                if not least_squares:
+                    test[i, j] = tests[window, i, j]
         for j in range(r):
             qh[j] = 0.0
             for i in range(N):
                 qh[j] += basis[i, j] * (q[i] - mean[i])
-        for i in range(N):
-            q[i] = mean[i]
-            for j in range(r):
-                q[i] += basis[i, j] * qh[j]
+        lift(mean, basis, qh, r, q)
         for sample in range(first_samples[window], first_samples[window + 1]):
             for i in range(INPUTS):
                 u[i] = inputs[sample, i]
             converged = False
             for _ in range(limit):
-                residual_jacobian(q, u, constants, work, full)
-                counts[0] += 1
-                for i in range(N):
-                    for k in range(N):
-                        product[i, k] = 0.0
-                    for j in range(N):
-                        for k in range(N):
-                            product[i, k] += full[i, j] * basis[j, k]
-                if least_squares:
-                    for i in range(N):
-                        for k in range(N):
-                            test[i, k] = product[i, k]
+                residual_tangent(q, u, constants, work, basis, r, product)
+                iterations += 1
                 for k in range(r):
-                    for j in range(N + 1):
-                        reduced[k, j] = 0.0
-                    for i in range(N):
-                        for j in range(N):
-                            reduced[k, j] += test[i, k] * product[i, j]
-                        reduced[k, N] += test[i, k] * full[i, N]
+                    for j in range(r):
+                        reduced[k, j] = weighted(test, k, product, j)
+                    reduced[k, N] = weighted(test, k, product, N)
                 if not small_solve(reduced, r):
                     return 3, sample
                 size = 0.0
                 for j in range(r):
-                    step = reduced[j, N]
-                    qh[j] -= step
-                    size = max(size, abs(step))
-                    if not math.isfinite(step):
-                        return 2, sample
-                for i in range(N):
-                    q[i] = mean[i]
-                    for j in range(r):
-                        q[i] += basis[i, j] * qh[j]
+                    qh[j] -= reduced[j, N]
+                    if not abs(reduced[j, N]) <= size:
+                        size = abs(reduced[j, N])
+                if not math.isfinite(size):
+                    return 2, sample
+                lift(mean, basis, qh, r, q)
                 if size < tolerance:
                     converged = True
                     break
@@ -127,7 +127,6 @@ def projected_path(
                 return 1, sample
             for i in range(N):
                 path[sample, i] = q[i]
-    counts[1] = counts[0]
-    counts[2] = counts[0]
-    counts[3] = counts[0]
+    for kind in range(4):
+        counts[kind] = iterations
     return 0, inputs.shape[0]

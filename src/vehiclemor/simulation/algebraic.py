@@ -17,6 +17,7 @@ from vehiclemor.codegen.emit import (
     kernel_source,
     operation_counts,
     reference_source,
+    tangent_source,
     work_size,
 )
 from vehiclemor.codegen.link import linked_source
@@ -304,8 +305,9 @@ def _compiled(name: str) -> tuple[AlgebraicEquations, ModuleType, str]:
         "OUTPUTS": len(equations.outputs),
         "WORK": work_size(equations.program),
     }
+    kernels = kernel_source(equations.program) + "\n\n" + tangent_source(equations.program)
     source = linked_source(
-        kernel_source(equations.program), [newton_loops, projected_loops], sizes, f"model {name}"
+        kernels, [newton_loops, projected_loops], sizes, f"model {name}"
     )
     return equations, load_module(name, source), kernel_hash(source)
 

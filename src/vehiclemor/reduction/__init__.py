@@ -1,0 +1,1 @@
+"""Reduction methods, one in each file, behind the interface of `interface.py`."""

@@ -1,0 +1,58 @@
+"""POD in control periods: the paper's method.
+
+R. Masoudi, T. Uchida, J. McPhee, Reduction of Multibody Dynamic Models in Automotive Systems Using
+the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (2015), section 3.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from vehiclemor.reduction.projected import (
+    SUBSPACE_SETTINGS,
+    ProjectedModel,
+    check_subspace,
+    fit_windows,
+)
+from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.windows import window_edges
+from vehiclemor.simulation.algebraic import AlgebraicModel
+
+SUMMARY = "POD with its own mean and basis in each control period (the paper's method)"
+REFERENCE = "10.1115/1.4029390"
+SETTINGS = {
+    **SUBSPACE_SETTINGS,
+    "control_period": Setting(
+        "number", 5.0, "length of a control period in s", minimum=0.0, above=True
+    ),
+}
+# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on the
+# order and signs in which the equations are written (galerkin does, by orders of magnitude), and the
+# rank cut keeps directions out that rounding chooses.
+PRESETS: dict[str, dict[str, Value]] = {
+    "recommended": {},
+    "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},
+}
+
+
+def presets(model: str) -> dict[str, dict[str, Value]]:
+    """Presets; the same for every kinematic model."""
+    del model
+    return PRESETS
+
+
+def accepts(model: AlgebraicModel) -> tuple[bool, str]:
+    """Whether the model is of a kind that this method can reduce."""
+    return model.kind == "ae", f"pod reduces models of kind ae, {model.name} is {model.kind}"
+
+
+def check(model: AlgebraicModel, settings: Mapping[str, Value]) -> None:
+    """Raise `InputError` if the settings don't fit the model."""
+    check_subspace(model, dict(settings))
+
+
+def fit(
+    model: AlgebraicModel, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+) -> ProjectedModel:
+    """One POD subspace for each control period of the training runs."""
+    edges = window_edges(training[0].maneuver.duration, float(settings["control_period"]))
+    return fit_windows(model, training, edges, dict(settings))

@@ -1,0 +1,60 @@
+"""Training runs: full-order simulations that a method may learn from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.registry import unknown
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.trajectory import Trajectory
+
+POLICIES = {
+    "matched": "trained on the very run that it is tested on (paper, section 3)",
+    "nominal": "trained on the unperturbed run (paper, section 4)",
+    "set": "trained on a listed set of frequency and amplitude factors",
+}
+
+
+@dataclass(frozen=True)
+class TrainingRun:
+    """One maneuver of the full-order model, solved wherever a method asks."""
+
+    model: AlgebraicModel
+    maneuver: Maneuver
+    start: str
+
+    def at(self, times: np.ndarray) -> Trajectory:
+        """Full-order trajectory, solved exactly at the given increasing times (samples,) in s."""
+        return self.model.simulate(self.maneuver, times)
+
+
+def training_runs(
+    model: AlgebraicModel,
+    maneuver: Maneuver,
+    start: str,
+    policy: str,
+    factors: Sequence[tuple[float, float]] = (),
+) -> tuple[TrainingRun, ...]:
+    """Training runs of a policy for a test maneuver.
+
+    Parameters
+    ----------
+    model, maneuver, start
+        What the reduced model will be tested on.
+    policy
+        One of `POLICIES`.
+    factors
+        (frequency, amplitude) factors of the policy `set`.
+    """
+    if policy == "matched":
+        return (TrainingRun(model, maneuver, start),)
+    if policy == "nominal":
+        return (TrainingRun(model, maneuver.perturbed(), start),)
+    if policy == "set":
+        if not factors:
+            raise InputError("the training policy 'set' needs training_set: pairs of factors")
+        return tuple(TrainingRun(model, maneuver.perturbed(f, a), start) for f, a in factors)
+    raise unknown("training policy", policy, POLICIES)
