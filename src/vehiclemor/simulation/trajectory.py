@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from vehiclemor.simulation.algebraic import AlgebraicModel
 
+STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
 COUNTS = {
     "iterations": "solver iterations",
     "residual_evaluations": "evaluations of the residual equations",
@@ -35,7 +36,7 @@ class Trajectory:
     seconds
         Time spent in the compiled loop; 0 where nothing was computed.
     status
-        `ok` or `diverged`; from the failure on, a diverged trajectory is not a number.
+        One of `STATUSES`; from the failure on, a diverged trajectory is not a number.
     message
         Why it diverged, empty if it did not.
     """
@@ -50,15 +51,17 @@ class Trajectory:
     message: str = ""
 
 
-def trajectory_dataset(model: AlgebraicModel, trajectory: Trajectory) -> xr.Dataset:
-    """Labelled dataset of a trajectory: histories, counts and seconds, with units."""
+def trajectory_dataset(
+    model: AlgebraicModel, trajectory: Trajectory, further: dict[str, tuple] | None = None
+) -> xr.Dataset:
+    """Labelled dataset of a trajectory: histories, counts, seconds and status, with units.
+
+    Parameters
+    ----------
+    further
+        Name -> (dimensions, values, attributes) of variables to add.
+    """
     import xarray as xr
-
-    def labels(quantities: tuple) -> list[str]:
-        return [quantity.name for quantity in quantities]
-
-    def units(quantities: tuple) -> str:
-        return ", ".join(f"{quantity.name}: {quantity.unit}" for quantity in quantities)
 
     equations = model.equations
     histories = {
@@ -66,29 +69,34 @@ def trajectory_dataset(model: AlgebraicModel, trajectory: Trajectory) -> xr.Data
         "outputs": ("output", trajectory.outputs, equations.outputs),
         "inputs": ("input", trajectory.inputs, equations.inputs),
     }
-    dataset = xr.Dataset(
-        {
-            name: (("time", label), values, {"long_name": f"{name}", "units": units(quantities)})
-            for name, (label, values, quantities) in histories.items()
-        },
-        coords={
-            "time": ("time", trajectory.time, {"units": "s", "long_name": "time"}),
-            **{label: (label, labels(quantities)) for label, _, quantities in histories.values()},
-        },
-    )
-    for name, long_name in COUNTS.items():
-        dataset[name] = ((), trajectory.counts.get(name, 0), {"units": "1", "long_name": long_name})
-    dataset["seconds"] = (
-        (),
-        trajectory.seconds,
-        {"units": "s", "long_name": "time spent in the compiled loop"},
-    )
-    for label, _, quantities in histories.values():
-        dataset[label].attrs["long_name"] = f"name of the {label}"
-        dataset.coords[f"{label}_unit"] = (
+    variables: dict[str, tuple] = {}
+    coordinates: dict[str, tuple] = {
+        "time": ("time", trajectory.time, {"units": "s", "long_name": "time"})
+    }
+    for name, (label, values, quantities) in histories.items():
+        variables[name] = (
+            ("time", label),
+            values,
+            {"long_name": name, "units": f"see {label}_unit"},
+        )
+        coordinates[label] = (
+            label,
+            [quantity.name for quantity in quantities],
+            {"long_name": f"name of the {label}"},
+        )
+        coordinates[f"{label}_unit"] = (
             label,
             [quantity.unit for quantity in quantities],
             {"long_name": f"SI unit of the {label}"},
         )
-    dataset.attrs |= {"status": trajectory.status, "message": trajectory.message}
-    return dataset
+    for name, long_name in COUNTS.items():
+        attributes = {"units": "1", "long_name": long_name}
+        variables[name] = ((), trajectory.counts.get(name, 0), attributes)
+    variables["seconds"] = (
+        (),
+        trajectory.seconds,
+        {"units": "s", "long_name": "time spent in the compiled loop"},
+    )
+    variables["status"] = ((), trajectory.status, {"long_name": f"one of {', '.join(STATUSES)}"})
+    variables["message"] = ((), trajectory.message, {"long_name": "why the status is not ok"})
+    return xr.Dataset(variables | (further or {}), coordinates)

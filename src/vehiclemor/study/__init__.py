@@ -1,0 +1,1 @@
+"""Studies: grids of cells declared as data, executed, stored and combined."""

@@ -1,0 +1,194 @@
+"""Cells: every combination of a study's grid, complete in itself and keyed by its content."""
+
+import hashlib
+import itertools
+import json
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any
+
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.training import POLICIES
+from vehiclemor.registry import component, unknown
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.study.definition import FACTORS, StudyFile, values
+from vehiclemor.study.provenance import code_digest
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One simulation with one method, and all that determines its result.
+
+    Attributes
+    ----------
+    kernel, code
+        Hash of the compiled kernels, and of the source of everything that computes results.
+    parameters
+        Name -> value of the model's parameters, SI units.
+    training_set
+        (frequency, amplitude) factors of the policy `set`.
+    keep
+        `trajectories` or `metrics`.
+    """
+
+    model: str
+    kernel: str
+    code: str
+    parameters: dict[str, Any]
+    maneuver: str
+    frequency_factor: float
+    amplitude_factor: float
+    start: str
+    training: str
+    training_set: tuple[tuple[float, float], ...]
+    method: str
+    settings: dict[str, Value] = field(default_factory=dict)
+    keep: str = "trajectories"
+
+    @cached_property
+    def configuration(self) -> str:
+        """Canonical JSON text of the cell."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of the configuration: the name of the cell's file."""
+        return hashlib.sha256(self.configuration.encode()).hexdigest()[:20]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells of a study on its dimensions.
+
+    Attributes
+    ----------
+    dimensions
+        Name -> values of every grid dimension, the labels of `method` last.
+    cells
+        Place in the grid (one index per dimension) -> cell.  A dimension that does not concern a
+        method has the same cell at all of its places.
+    """
+
+    name: str
+    definition: StudyFile
+    dimensions: dict[str, list[Any]]
+    cells: dict[tuple[int, ...], Cell]
+
+    @property
+    def unique(self) -> dict[str, Cell]:
+        """Key -> cell, each once, in grid order."""
+        return {cell.key: cell for cell in self.cells.values()}
+
+
+def make_cell(
+    model: AlgebraicModel,
+    maneuver: Maneuver,
+    start: str,
+    method_name: str,
+    settings: dict[str, object],
+    preset: str = "recommended",
+    training: str = "matched",
+    training_set: tuple[tuple[float, float], ...] = (),
+    keep: str = "trajectories",
+) -> Cell:
+    """A validated cell.
+
+    Raises
+    ------
+    InputError
+        If a name, setting or factor is wrong, or does not fit the model.
+    """
+    method: Method = component("method", method_name)
+    presets = method.presets(model.name)
+    if preset not in presets:
+        raise unknown(f"preset of {method_name}", preset, presets)
+    complete = validated(method_name, method.SETTINGS, settings, presets[preset])
+    model.start(start)
+    if training not in POLICIES:
+        raise unknown("training policy", training, POLICIES)
+    accepted, _ = method.accepts(model)
+    if accepted:
+        method.check(model, complete)
+    for pair in training_set:
+        maneuver.perturbed(*pair)
+    if training == "set" and not training_set:
+        raise InputError("the training policy 'set' needs training_set: pairs of factors")
+    return Cell(
+        model.name,
+        model.kernel_hash,
+        code_digest(model.name, method_name, maneuver.name),
+        {name: entry.value for name, entry in model.parameters.entries.items()},
+        maneuver.name,
+        maneuver.frequency_factor,
+        maneuver.amplitude_factor,
+        start,
+        training,
+        training_set,
+        method_name,
+        complete,
+        keep,
+    )
+
+
+def expand(name: str, study: StudyFile) -> Grid:
+    """All cells of a study.
+
+    Raises
+    ------
+    InputError, FileError
+        If the study names something unknown or a setting does not fit.
+    """
+    try:
+        return _expand(name, study)
+    except InputError as error:
+        raise FileError(f"study {name}: {error}") from None
+
+
+def _expand(name: str, study: StudyFile) -> Grid:
+    model = build(study.model)
+    definition = component("model", study.model)
+    maneuver: Maneuver = component("maneuver", study.maneuver or definition.MANEUVER)
+    methods = {entry.label or entry.method: entry for entry in study.methods}
+    dimensions: dict[str, list[Any]] = {factor: [1.0] for factor in FACTORS}
+    dimensions |= {key: values(entry) for key, entry in study.grid.items()}
+    for factor in FACTORS:
+        for value in dimensions[factor]:
+            frequency = value if factor == "frequency_factor" else 1.0
+            amplitude = value if factor == "amplitude_factor" else 1.0
+            maneuver.perturbed(frequency, amplitude)
+    dimensions["start"] = list(study.start or [model.starts[0]])
+    known_settings = {
+        setting
+        for entry in methods.values()
+        for setting in component("method", entry.method).SETTINGS
+    }
+    for dimension in study.grid:
+        if dimension not in known_settings and dimension not in FACTORS:
+            raise unknown("grid dimension", dimension, known_settings | set(FACTORS))
+    dimensions["method"] = list(methods)
+    cells: dict[tuple[int, ...], Cell] = {}
+    made: dict[tuple[Any, ...], Cell] = {}
+    for place in itertools.product(*(range(len(v)) for v in dimensions.values())):
+        point = {d: dimensions[d][i] for d, i in zip(dimensions, place, strict=True)}
+        entry = methods[point["method"]]
+        settings: dict[str, object] = dict(entry.settings)
+        declared = component("method", entry.method).SETTINGS
+        settings |= {d: point[d] for d in study.grid if d in declared}
+        identity = (point["method"], point["start"], *(point[f] for f in FACTORS), *settings.values())
+        if identity not in made:
+            made[identity] = make_cell(
+                model,
+                maneuver.perturbed(*(point[f] for f in FACTORS)),
+                point["start"],
+                entry.method,
+                settings,
+                entry.preset,
+                study.training,
+                tuple((pair[0], pair[1]) for pair in study.training_set),
+                study.keep,
+            )
+        cells[place] = made[identity]
+    return Grid(name, study, dimensions, cells)

@@ -1,0 +1,88 @@
+"""Combined dataset of a study: every cell at its place on named dimensions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.study.cells import Grid
+from vehiclemor.study.provenance import machine, versions
+from vehiclemor.study.store import cell_path, read_arrays, read_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LONG_NAMES = {
+    "frequency_factor": "factor on the frequency of the input",
+    "amplitude_factor": "factor on the amplitude of the input",
+    "method": "label of the method in the study",
+    "rank": "requested number of reduced coordinates",
+    "start": "initial condition",
+    "control_period": "length of a control period",
+    "equation_seed": "seed of the order and signs of the equations; 0 is the natural order",
+    "rounding_seed": "seed of rounding noise on the snapshots; 0 is none",
+}
+
+
+def combined(grid: Grid, folder: Path) -> xr.Dataset:
+    """Read all cells of a grid and put them together.
+
+    Raises
+    ------
+    FileError
+        If a cell is missing, corrupt or foreign.
+    """
+    import xarray as xr
+
+    first_places: dict[str, list[tuple[int, ...]]] = {}
+    for place, cell in grid.cells.items():
+        first_places.setdefault(cell.key, []).append(place)
+    sizes = tuple(len(values) for values in grid.dimensions.values())
+    arrays: dict[str, np.ndarray] = {}
+    template: xr.Dataset | None = None
+    for key, places in first_places.items():
+        path = cell_path(folder, key)
+        if template is None:
+            template = read_dataset(path, "cell", key)
+            for name, variable in template.data_vars.items():
+                arrays[str(name)] = _empty(sizes + variable.shape, variable.dtype)
+        found = read_arrays(path, "cell", key)
+        for name, array in arrays.items():
+            for place in places:
+                array[place] = found[name]
+    assert template is not None
+    names = tuple(grid.dimensions)
+    coordinates: dict[str, Any] = {
+        name: (name, values, {"long_name": LONG_NAMES.get(name, name.replace("_", " "))})
+        for name, values in grid.dimensions.items()
+    }
+    coordinates |= {str(name): variable for name, variable in template.coords.items()}
+    variables = {
+        str(name): (names + variable.dims, arrays[str(name)], variable.attrs)
+        for name, variable in template.data_vars.items()
+    }
+    dataset = xr.Dataset(variables, coordinates)
+    cell = next(iter(grid.cells.values()))
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "title": grid.definition.title,
+        "source": "vehiclemor",
+        "references": "doi:10.1115/1.4029390",
+        "study": grid.name,
+        "model": cell.model,
+        "training": cell.training,
+        "configuration": json.dumps(grid.definition.model_dump(), sort_keys=True),
+        "kernel_hash": cell.kernel,
+        "versions": versions(),
+        "machine": machine(),
+    }
+    return dataset
+
+
+def _empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    if dtype.kind in "OUT":
+        return np.full(shape, "", dtype=object)
+    return np.zeros(shape, dtype=dtype)

@@ -1,0 +1,128 @@
+"""Study files: the grid of a study declared in TOML, validated on loading."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from vehiclemor.errors import FileError
+from vehiclemor.registry import unknown
+from vehiclemor.resources import data_folder, data_names
+from vehiclemor.toml_files import FileSchema, read_toml
+
+FACTORS = ("frequency_factor", "amplitude_factor")
+# A grid of more cells than this is a mistake in a file, not a study.
+MOST_CELLS = 1_000_000
+
+
+class Span(FileSchema):
+    """Equidistant values, both ends included."""
+
+    first: float
+    last: float
+    count: int = Field(ge=1, le=10_000)
+
+
+class MethodEntry(FileSchema):
+    """One method of a study: settings that differ from a preset, under a label of its own."""
+
+    method: str
+    label: str = ""
+    preset: str = "recommended"
+    settings: dict[str, int | float | str] = {}
+
+
+class StudyFile(FileSchema):
+    """Schema of `data/studies/*.toml`.
+
+    Either a grid of one model, or a collection that names other studies.
+    """
+
+    title: str
+    studies: list[str] = []
+    model: str = ""
+    maneuver: str = ""
+    start: list[str] = []
+    training: str = "matched"
+    training_set: list[list[float]] = []
+    keep: Literal["trajectories", "metrics"] = "trajectories"
+    grid: dict[str, list[int | float | str] | Span] = {}
+    methods: list[MethodEntry] = []
+
+    @field_validator("training_set")
+    @classmethod
+    def _pairs(cls, value: list[list[float]]) -> list[list[float]]:
+        if any(len(pair) != 2 for pair in value):
+            raise ValueError("each entry is a pair [frequency factor, amplitude factor]")
+        return value
+
+    @field_validator("grid")
+    @classmethod
+    def _not_empty(
+        cls, value: dict[str, list[int | float | str] | Span]
+    ) -> dict[str, list[int | float | str] | Span]:
+        for name, entry in value.items():
+            if isinstance(entry, list) and not entry:
+                raise ValueError(f"{name} has no values")
+            if isinstance(entry, list) and len(set(entry)) != len(entry):
+                raise ValueError(f"{name} has the same value twice")
+        return value
+
+    @model_validator(mode="after")
+    def _complete(self) -> "StudyFile":
+        if self.studies:
+            if self.model or self.grid or self.methods:
+                raise ValueError("a collection names studies and nothing else")
+            return self
+        for name in ("model", "methods"):
+            if not getattr(self, name):
+                raise ValueError(f"{name} is missing")
+        labels = [entry.label or entry.method for entry in self.methods]
+        doubles = {label for label in labels if labels.count(label) > 1}
+        if doubles:
+            raise ValueError(f"label {sorted(doubles)[0]!r} is used twice")
+        size = len(self.methods)
+        for entry in self.grid.values():
+            size *= len(values(entry))
+        if size > MOST_CELLS:
+            raise ValueError(f"the grid has {size} cells, more than {MOST_CELLS}")
+        return self
+
+
+def values(entry: list[int | float | str] | Span) -> list[int | float | str]:
+    """Values of one grid entry."""
+    if isinstance(entry, Span):
+        # Rounded, so that 1.1 is 1.1 and a grid holds the nominal point exactly.
+        return [round(float(v), 12) for v in np.linspace(entry.first, entry.last, entry.count)]
+    return list(entry)
+
+
+def study_path(study: str) -> Path:
+    """Path of a study: a name from the package's data, or a TOML file.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if study.endswith(".toml"):
+        return Path(study)
+    if study not in data_names("studies"):
+        raise unknown("study", study, data_names("studies"))
+    return data_folder() / "studies" / f"{study}.toml"
+
+
+def load_studies(study: str) -> dict[str, StudyFile]:
+    """Study name -> definition; a collection gives all of its members."""
+    path = study_path(study)
+    definition = read_toml(path, StudyFile)
+    if not definition.studies:
+        return {path.stem: definition}
+    members: dict[str, StudyFile] = {}
+    for member in definition.studies:
+        content = read_toml(study_path(member), StudyFile)
+        if content.studies:
+            raise FileError(f"{path}: studies.{member} is a collection itself")
+        members[study_path(member).stem] = content
+    return members

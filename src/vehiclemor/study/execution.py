@@ -1,0 +1,146 @@
+"""Computing one cell: reference, fit, reduced simulation, errors.  Failures are results too."""
+
+from __future__ import annotations
+
+import json
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.errors import ConvergenceError, UnreachableError, VehiclemorError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.metrics import largest, rms, signal_range
+from vehiclemor.reduction.interface import Method, Offline
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset
+from vehiclemor.study.cells import Cell
+from vehiclemor.study.provenance import machine, versions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def compute_cell(cell: Cell) -> xr.Dataset:
+    """Labelled result of a cell, whatever becomes of it.
+
+    Returns
+    -------
+    xarray.Dataset
+        Errors by output and coordinate, floors, counts, seconds and status; histories too if the
+        cell keeps trajectories.  Where nothing could be computed the values are missing and
+        `status` and `message` tell why.
+    """
+    model = _model(cell.model, json.dumps(cell.parameters, sort_keys=True))
+    base: Maneuver = component("maneuver", cell.maneuver)
+    maneuver = base.perturbed(cell.frequency_factor, cell.amplitude_factor)
+    method: Method = component("method", cell.method)
+    accepted, reason = method.accepts(model)
+    if not accepted:
+        return _failed(model, maneuver, cell, "rejected", reason)
+    try:
+        reference = model.simulate(maneuver)
+        runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
+        reduced = method.fit(model, runs, cell.settings)
+        trajectory = reduced.simulate(maneuver, cell.start)
+        approximation = reduced.best_approximation(reference.coordinates)
+    except UnreachableError as error:
+        return _failed(model, maneuver, cell, "unreachable", str(error))
+    except ConvergenceError as error:
+        return _failed(model, maneuver, cell, "diverged", str(error))
+    except VehiclemorError:
+        raise
+    except Exception as error:
+        # A plug-in's bug spoils its own cell, not the study.
+        return _failed(model, maneuver, cell, "error", f"{type(error).__name__}: {error}")
+    return _result(
+        model, cell, trajectory, reference, approximation, reduced.offline, reduced.effective_rank
+    )
+
+
+@lru_cache(maxsize=16)
+def _model(name: str, parameters: str) -> AlgebraicModel:
+    """Model with the parameters of a cell; kept, since all cells of a study share it."""
+    return build(name, overrides=json.loads(parameters))
+
+
+def _failed(
+    model: AlgebraicModel, maneuver: Maneuver, cell: Cell, status: str, message: str
+) -> xr.Dataset:
+    times = maneuver.times
+    missing = Trajectory(
+        times,
+        maneuver.at(times),
+        np.full((len(times), len(model.coordinates)), np.nan),
+        np.full((len(times), len(model.outputs)), np.nan),
+        {},
+        np.nan,
+        status,
+        message,
+    )
+    return _result(model, cell, missing, missing, None, Offline(np.nan, 0), 0)
+
+
+def _result(
+    model: AlgebraicModel,
+    cell: Cell,
+    trajectory: Trajectory,
+    reference: Trajectory,
+    approximation: np.ndarray | None,
+    offline: Offline,
+    effective_rank: int,
+) -> xr.Dataset:
+    error = trajectory.outputs - reference.outputs
+    floor = np.full(len(model.outputs), np.nan)
+    if approximation is not None:
+        floor = rms(model.outputs_at(approximation, reference.inputs) - reference.outputs)
+    residual = model.residual_at(trajectory.coordinates, trajectory.inputs)
+    by_output = {
+        "rms_error": (rms(error), "RMS error of the output against the full-order solution"),
+        "max_error": (largest(error), "largest absolute error of the output"),
+        "floor_rms_error": (floor, "RMS error of the best approximation in the same subspaces"),
+        "signal_range": (signal_range(reference.outputs), "range of the full-order output"),
+    }
+    further: dict[str, tuple] = {
+        name: ("output", numbers, {"units": "see output_unit", "long_name": text})
+        for name, (numbers, text) in by_output.items()
+    }
+    further["rms_coordinate_error"] = (
+        "coordinate",
+        rms(trajectory.coordinates - reference.coordinates),
+        {"units": "see coordinate_unit", "long_name": "RMS error of the coordinate"},
+    )
+    scalars = {
+        "largest_residual": (float(np.abs(residual).max()), "m", "largest residual of an equation"),
+        "effective_rank": (effective_rank, "1", "largest number of reduced coordinates in a window"),
+        "offline_seconds": (offline.seconds, "s", "training simulations and fit"),
+        "offline_residual_evaluations": (
+            offline.residual_evaluations,
+            "1",
+            "full residual evaluations in training",
+        ),
+    }
+    for name, (value, units, text) in scalars.items():
+        further[name] = ((), value, {"units": units, "long_name": text})
+    further["reference_outputs"] = (
+        ("time", "output"),
+        reference.outputs,
+        {"units": "see output_unit", "long_name": "full-order outputs for the same input"},
+    )
+    dataset = trajectory_dataset(model, trajectory, further)
+    if cell.keep == "metrics":
+        dataset = dataset.drop_dims(["time", "input"])
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "title": f"{cell.method} on {cell.model}",
+        "source": "vehiclemor",
+        "references": "doi:10.1115/1.4029390",
+        "cell": cell.key,
+        "configuration": cell.configuration,
+        "kernel_hash": cell.kernel,
+        "versions": versions(),
+        "machine": machine(),
+    }
+    return dataset
