@@ -1,1 +1,49 @@
-"""vehiclemor: benchmark suite for model order reduction of multibody vehicle models."""
+"""vehiclemor: benchmark suite for model order reduction of multibody vehicle models.
+
+The names below are all that a user needs; each is imported when it is first used, so that
+`import vehiclemor` costs next to nothing.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vehiclemor.api import compare as compare
+    from vehiclemor.api import figures as figures
+    from vehiclemor.api import maneuvers as maneuvers
+    from vehiclemor.api import methods as methods
+    from vehiclemor.api import model as model
+    from vehiclemor.api import models as models
+    from vehiclemor.api import run_study as run_study
+    from vehiclemor.api import simulate as simulate
+    from vehiclemor.api import studies as studies
+    from vehiclemor.errors import VehiclemorError as VehiclemorError
+
+__version__ = "0.1.0"
+__all__ = [
+    "VehiclemorError",
+    "compare",
+    "figures",
+    "maneuvers",
+    "methods",
+    "model",
+    "models",
+    "run_study",
+    "simulate",
+    "studies",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "VehiclemorError":
+        from vehiclemor.errors import VehiclemorError
+
+        return VehiclemorError
+    if name in __all__:
+        from vehiclemor import api
+
+        return getattr(api, name)
+    raise AttributeError(f"module 'vehiclemor' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -20,12 +20,18 @@ SETTINGS = {
     "solver": Setting(
         "text",
         "newton",
-        "newton: fresh Jacobians, 1e-12 in the step; chord: constant inverse and predictor, 1e-6",
+        "newton: fresh Jacobians; chord: constant inverse and predictor",
         choices=("newton", "chord"),
+    ),
+    "tolerance": Setting(
+        "number", 1e-12, "largest step of the last iteration", minimum=0.0, above=True
     ),
 }
 # The paper's kind of baseline is Newton's method; the strongest solver found stands beside it.
-PRESETS: dict[str, dict[str, Value]] = {"recommended": {}, "strongest": {"solver": "chord"}}
+PRESETS: dict[str, dict[str, Value]] = {
+    "recommended": {},
+    "strongest": {"solver": "chord", "tolerance": 1e-6},
+}
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,7 @@ class FullOrderModel:
 
     model: AlgebraicModel
     solver: str
+    tolerance: float
     offline: Offline = Offline()
 
     @property
@@ -44,7 +51,7 @@ class FullOrderModel:
     def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
         """Full-order trajectory at the maneuver's output times."""
         self.model.start(start)
-        return self.model.simulate(maneuver, solver=self.solver)
+        return self.model.simulate(maneuver, solver=self.solver, tolerance=self.tolerance)
 
     def best_approximation(self, coordinates: np.ndarray) -> np.ndarray:
         """The coordinates themselves: the full space holds them."""
@@ -73,4 +80,4 @@ def fit(
 ) -> FullOrderModel:
     """Nothing is fitted, and no training run is looked at."""
     del training
-    return FullOrderModel(model, str(settings["solver"]))
+    return FullOrderModel(model, str(settings["solver"]), float(settings["tolerance"]))

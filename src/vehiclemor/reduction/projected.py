@@ -18,7 +18,6 @@ from vehiclemor.reduction.windows import first_samples
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import COUNTS, Trajectory
 
-TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 
 # Settings that every method on POD subspaces of algebraic equations shares.
@@ -43,6 +42,9 @@ SUBSPACE_SETTINGS = {
     "reversed_coordinates": Setting(
         "text", "", "galerkin: coordinates counted the other way round, separated by commas"
     ),
+    "tolerance": Setting(
+        "number", 1e-12, "largest step of the last iteration", minimum=0.0, above=True
+    ),
     "rounding_seed": Setting(
         "integer", 0, "seed of a relative noise of 2^-52 on the snapshots; 0: none", minimum=0
     ),
@@ -61,6 +63,8 @@ class ProjectedModel:
         One subspace for each window.
     tests
         Test bases (n, r) of the windows; None for least squares.
+    tolerance
+        Largest step of the last iteration (reduced coordinates).
     """
 
     model: AlgebraicModel
@@ -68,6 +72,7 @@ class ProjectedModel:
     bases: tuple[Basis, ...]
     tests: tuple[np.ndarray, ...] | None
     offline: Offline
+    tolerance: float
 
     @property
     def effective_rank(self) -> int:
@@ -98,7 +103,7 @@ class ProjectedModel:
             self.tests is None,
             inputs,
             model.constants,
-            TOLERANCE,
+            self.tolerance,
             ITERATION_LIMIT,
             path,
             counts,
@@ -152,7 +157,7 @@ def fit_windows(
         tests = tuple(pairing @ basis.vectors for basis in bases)
     evaluations = sum(history.counts["residual_evaluations"] for history in histories)
     offline = Offline(time.perf_counter() - began, evaluations)
-    return ProjectedModel(model, edges, tuple(bases), tests, offline)
+    return ProjectedModel(model, edges, tuple(bases), tests, offline, float(settings["tolerance"]))
 
 
 def check_subspace(model: AlgebraicModel, settings: dict[str, Value]) -> None:

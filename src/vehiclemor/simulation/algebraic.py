@@ -34,9 +34,10 @@ from vehiclemor.simulation.trajectory import COUNTS, Trajectory
 # method jumps to the other branch from farther away than this.
 LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
-CHORD_TOLERANCE = 1e-6
 ITERATION_LIMIT = 50
-STARTS = ("design",)
+# A mechanism without forces has no equilibrium to find: the name stands for its design position, so that
+# studies can name the same start for every kind of model.
+STARTS = ("equilibrium",)
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
 SMALLEST_SINGULAR_VALUE = 1e-8
 REASONS = {
@@ -109,7 +110,7 @@ class AlgebraicModel:
         """Operations of each generated function, by kind and in total."""
         return operation_counts(reference_source(self.equations.program))
 
-    def start(self, name: str = "design") -> np.ndarray:
+    def start(self, name: str = "equilibrium") -> np.ndarray:
         """Coordinates (n,) from which a simulation starts its first iteration."""
         if name not in STARTS:
             raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(STARTS)}")
@@ -170,7 +171,11 @@ class AlgebraicModel:
         return known[rack]
 
     def simulate(
-        self, maneuver: Maneuver, times: np.ndarray | None = None, solver: str = "newton"
+        self,
+        maneuver: Maneuver,
+        times: np.ndarray | None = None,
+        solver: str = "newton",
+        tolerance: float = NEWTON_TOLERANCE,
     ) -> Trajectory:
         """Full-order solution at the given times (the maneuver's output times by default).
 
@@ -181,8 +186,10 @@ class AlgebraicModel:
         times
             Increasing times (samples,) in s.
         solver
-            `newton`: fresh Jacobians, converged to 1e-12 in the step.  `chord`: constant inverse of
-            the design position and cubic extrapolation, 1e-6 in the step.
+            `newton`: fresh Jacobians, started at the previous sample.  `chord`: constant inverse of
+            the design position, started at a quadratic extrapolation.
+        tolerance
+            Largest component of the last step of an iteration (rad or m).
 
         Raises
         ------
@@ -197,27 +204,33 @@ class AlgebraicModel:
                 f"{self.name} needs {', '.join(self.inputs)}"
             )
         times = maneuver.times if times is None else np.asarray(times, dtype=float)
-        return self.solve_path(times, maneuver.at(times), solver)
+        return self.solve_path(times, maneuver.at(times), solver, tolerance)
 
-    def solve_path(self, times: np.ndarray, inputs: np.ndarray, solver: str = "newton") -> Trajectory:
+    def solve_path(
+        self,
+        times: np.ndarray,
+        inputs: np.ndarray,
+        solver: str = "newton",
+        tolerance: float = NEWTON_TOLERANCE,
+    ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
         inputs = np.ascontiguousarray(inputs, dtype=float)
         self.check_reach(times, inputs)
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         counts = np.zeros(len(COUNTS), dtype=np.int64)
         u_start = np.zeros(len(self.inputs))
-        settings = (ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
+        settings = (tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
         if solver == "newton":
             began = time.perf_counter()
             status, sample = self.kernels.newton_path(
-                self.design, u_start, inputs, self.constants, NEWTON_TOLERANCE, *settings
+                self.design, u_start, inputs, self.constants, *settings
             )
         else:
             inverse_t = np.linalg.inv(self.jacobian(self.design, u_start)).T.copy()
             counts[2] = 1
             began = time.perf_counter()
             status, sample = self.kernels.chord_path(
-                self.design, u_start, inputs, self.constants, inverse_t, CHORD_TOLERANCE, *settings
+                self.design, u_start, inputs, self.constants, inverse_t, *settings
             )
         seconds = time.perf_counter() - began
         if status != newton_loops.CONVERGED:

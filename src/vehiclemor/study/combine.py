@@ -86,3 +86,33 @@ def _empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
     if dtype.kind in "OUT":
         return np.full(shape, "", dtype=object)
     return np.zeros(shape, dtype=dtype)
+
+
+def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
+    """Combined datasets of several studies as rows of one, on the dimension `cell`.
+
+    Histories are left out; grid dimensions become coordinates of the rows, missing where a study
+    does not have them.
+    """
+    import xarray as xr
+
+    parts = []
+    for name, dataset in results.items():
+        rows = dataset.drop_dims([d for d in ("time", "input") if d in dataset.dims])
+        kept = ("output", "coordinate")
+        rows = rows.stack(cell=[d for d in rows.dims if d not in kept]).reset_index("cell")
+        parts.append(rows.assign_coords(study=("cell", [name] * rows.sizes["cell"])))
+    labels = sorted({str(c) for part in parts for c in part.coords if part[c].dims == ("cell",)})
+    complete = [
+        part.assign_coords(
+            {
+                label: ("cell", np.full(part.sizes["cell"], np.nan))
+                for label in labels
+                if label not in part.coords
+            }
+        )
+        for part in parts
+    ]
+    dataset = xr.concat(complete, dim="cell", coords="minimal", compat="override")
+    dataset.attrs = {"source": "vehiclemor", "studies": ", ".join(results), "versions": versions()}
+    return dataset

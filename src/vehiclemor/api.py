@@ -1,0 +1,224 @@
+"""The Python interface: models, methods, simulations, studies, comparison, figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vehiclemor import registry
+from vehiclemor.errors import InputError, UnreachableError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.simulation.algebraic import AlgebraicModel
+
+RESULTS = Path("results")
+
+
+def models() -> dict[str, str]:
+    """Registered models: name -> one line."""
+    return {name: registry.component("model", name).SUMMARY for name in registry.names("model")}
+
+
+def methods() -> dict[str, str]:
+    """Registered reduction methods: name -> one line."""
+    return {name: registry.component("method", name).SUMMARY for name in registry.names("method")}
+
+
+def maneuvers() -> dict[str, str]:
+    """Registered maneuvers: name -> one line."""
+    return {name: registry.component("maneuver", name).summary for name in registry.names("maneuver")}
+
+
+def studies() -> dict[str, str]:
+    """Studies that come with the package: name -> one line."""
+    from vehiclemor.resources import data_names
+    from vehiclemor.study.definition import StudyFile, study_path
+    from vehiclemor.toml_files import read_toml
+
+    return {name: read_toml(study_path(name), StudyFile).title for name in data_names("studies")}
+
+
+def model(
+    name: str,
+    parameters: Mapping[str, object] | None = None,
+    parameter_file: str | Path | None = None,
+) -> AlgebraicModel:
+    """A model ready to run: derived, compiled (or fetched from the kernel cache), parametrised.
+
+    Parameters
+    ----------
+    name
+        Registered name, see `models()`.
+    parameters
+        Parameter name -> value in SI units that replaces the file's.
+    parameter_file
+        Parameter file; the model's own public data by default.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name or value is wrong, or the mechanism can't be assembled.
+    """
+    from vehiclemor.simulation.algebraic import build
+
+    registry.component("model", name)
+    return build(name, Path(parameter_file) if parameter_file else None, parameters)
+
+
+_model = model
+
+
+def simulate(
+    model: str | AlgebraicModel,
+    method: str = "full_order",
+    *,
+    maneuver: str | Maneuver | None = None,
+    start: str | None = None,
+    frequency: float = 1.0,
+    amplitude: float = 1.0,
+    preset: str = "recommended",
+    training: str = "matched",
+    training_set: Sequence[tuple[float, float]] = (),
+    rtol: float | None = None,
+    **settings: object,
+) -> xr.Dataset:
+    """Simulate a model with a method and measure its errors against the full-order solution.
+
+    Parameters
+    ----------
+    model
+        Registered name, or a model made by `model()`.
+    method
+        Registered name, see `methods()`.
+    maneuver
+        Registered name; the model's own by default.
+    start
+        Initial condition; the model's first by default.
+    frequency, amplitude
+        Factors on the maneuver.
+    preset
+        `recommended`, or another preset of the method, such as `literal` (the paper's words).
+    training
+        `matched` (the very run that is simulated), `nominal` (factors 1) or `set`.
+    training_set
+        (frequency, amplitude) factors of the policy `set`.
+    rtol
+        Tolerance of the solver; for a kinematic model the largest step of the last iteration.
+    **settings
+        Settings of the method, such as `rank=3`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Histories, errors, floors, counts, seconds and status, with units.
+
+    Raises
+    ------
+    VehiclemorError
+        If the input is wrong or asks for a position that can't be reached.  A reduced model that
+        diverges is a result: its status says so.
+    """
+    from vehiclemor.simulation.algebraic import AlgebraicModel
+    from vehiclemor.study.cells import make_cell
+    from vehiclemor.study.execution import compute_cell
+
+    ready = model if isinstance(model, AlgebraicModel) else _model(model)
+    if isinstance(maneuver, str) or maneuver is None:
+        default = registry.component("model", ready.name).MANEUVER
+        maneuver = registry.component("maneuver", maneuver or default)
+    if rtol is not None:
+        settings["tolerance"] = rtol
+    cell = make_cell(
+        ready,
+        maneuver.perturbed(frequency, amplitude),
+        start or ready.starts[0],
+        method,
+        settings,
+        preset,
+        training,
+        tuple((float(f), float(a)) for f, a in training_set),
+    )
+    dataset = compute_cell(cell)
+    status = str(dataset["status"].item())
+    if status in ("unreachable", "rejected"):
+        error = UnreachableError if status == "unreachable" else InputError
+        raise error(str(dataset["message"].item()))
+    return dataset
+
+
+def run_study(
+    study: str,
+    jobs: int = 1,
+    out: str | Path = RESULTS,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> xr.Dataset:
+    """Run a study, resuming where an earlier run stopped.
+
+    Parameters
+    ----------
+    study
+        Name of a study or collection (see `studies()`), or path of a TOML file.
+    jobs
+        Number of processes.
+    out
+        Results folder.
+    progress
+        Called with (study, finished cells, all cells).
+
+    Returns
+    -------
+    xarray.Dataset
+        Combined dataset on the dimensions of the study's grid.  For a collection, one row for each
+        cell of its studies on the dimension `cell`, without histories; the studies' own datasets
+        are in the folder `studies`.
+    """
+    from vehiclemor.study.combine import flattened
+    from vehiclemor.study.run import run_studies
+
+    results = run_studies(study, Path(out), jobs, progress)
+    return next(iter(results.values())) if len(results) == 1 else flattened(results)
+
+
+def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:
+    """Published beside reproduced; studies and timings that are missing are run first.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns model, item, published, reproduced, unit, floor, replay, verdict (`met`, `missed`
+        or `not_comparable`), reason.
+    """
+    from vehiclemor.report.compare import comparison
+
+    return comparison(what, Path(out), jobs)
+
+
+def figures(
+    only: Sequence[str] = (), out: str | Path = RESULTS, results: str | Path = RESULTS, jobs: int = 1
+) -> list[Path]:
+    """Regenerate figures of the paper from stored results; studies that are missing are run first.
+
+    Parameters
+    ----------
+    only
+        Figure names such as `6`; all by default.
+    out
+        Folder of the figures.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+    """
+    from vehiclemor.report.regenerate import regenerate_figures
+
+    return regenerate_figures(Path(results), Path(out), only, jobs)
