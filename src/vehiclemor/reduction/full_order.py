@@ -11,7 +11,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.algebraic import SOLVERS, AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "no reduction: the full-order model, the baseline"
@@ -20,8 +20,9 @@ SETTINGS = {
     "solver": Setting(
         "text",
         "newton",
-        "newton: fresh Jacobians; chord: constant inverse and predictor",
-        choices=("newton", "chord"),
+        "newton: fresh Jacobians; newton_dense: without the generated elimination; chord: constant "
+        "inverse and predictor",
+        choices=SOLVERS,
     ),
     "tolerance": Setting(
         "number", 1e-12, "largest step of the last iteration", minimum=0.0, above=True

@@ -5,41 +5,10 @@ test basis (Petrov-Galerkin), or W = Phi_q basis, fresh in each iteration (least
 Gauss-Newton).  Bases are padded with zero columns to N x N, so that the compiler knows all sizes.
 """
 
-import math
-
 import numpy as np
 
 from vehiclemor.codegen.stubs import INPUTS, WORK, N, residual_tangent
-
-
-def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
-    """Solve the leading r x r block of a for column N by elimination with partial pivoting.
-
-    The solution replaces column N.  False if a pivot is zero or not finite.
-    """
-    for k in range(r):
-        pivot = k
-        for i in range(k + 1, r):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
-            return False
-        if pivot != k:
-            for j in range(k, r):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            a[k, N], a[pivot, N] = a[pivot, N], a[k, N]
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, r):
-            factor = a[i, k] * inverse
-            for j in range(k + 1, r):
-                a[i, j] -= factor * a[k, j]
-            a[i, N] -= factor * a[k, N]
-    for k in range(r - 1, -1, -1):
-        total = a[k, N]
-        for j in range(k + 1, r):
-            total -= a[k, j] * a[j, N]
-        a[k, N] = total / a[k, k]
-    return True
+from vehiclemor.simulation.newton_loops import all_below, failure, small_solve
 
 
 def weighted(test, k, product, j):  # noqa: ANN001, ANN201 - compiled
@@ -84,7 +53,7 @@ def projected_path(
     iterations = 0
     product = np.empty((N, N + 1))
     reduced = np.empty((N, N + 1))
-    basis, mean, qh = np.empty((N, N)), np.empty(N), np.empty(N)
+    basis, mean, qh, step = np.empty((N, N)), np.empty(N), np.empty(N), np.empty(N)
     test = product if least_squares else np.empty((N, N + 1))
     for window in range(ranks.shape[0]):
         r = ranks[window]
@@ -112,19 +81,15 @@ def projected_path(
                     reduced[k, N] = weighted(test, k, product, N)
                 if not small_solve(reduced, r):
                     return 3, sample
-                size = 0.0
                 for j in range(r):
-                    qh[j] -= reduced[j, N]
-                    if not abs(reduced[j, N]) <= size:
-                        size = abs(reduced[j, N])
-                if not math.isfinite(size):
-                    return 2, sample
+                    step[j] = reduced[j, N]
+                    qh[j] -= step[j]
                 lift(mean, basis, qh, r, q)
-                if size < tolerance:
+                if all_below(step, r, tolerance):
                     converged = True
                     break
             if not converged:
-                return 1, sample
+                return failure(q), sample
             for i in range(N):
                 path[sample, i] = q[i]
     for kind in range(4):

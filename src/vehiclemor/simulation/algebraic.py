@@ -25,7 +25,7 @@ from vehiclemor.errors import ConvergenceError, GeometryError, InputError, Unrea
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.equations import AlgebraicEquations
 from vehiclemor.parameters import ParameterSet, load_parameters
-from vehiclemor.registry import component
+from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.reach import reachable_range
 from vehiclemor.simulation.trajectory import COUNTS, Trajectory
@@ -35,6 +35,7 @@ from vehiclemor.simulation.trajectory import COUNTS, Trajectory
 LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
+SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position, so that
 # studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
@@ -43,7 +44,7 @@ SMALLEST_SINGULAR_VALUE = 1e-8
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",
-    3: "the reduced Jacobian is singular",
+    newton_loops.SINGULAR: "the matrix of a linear system is singular",
 }
 
 
@@ -186,7 +187,8 @@ class AlgebraicModel:
         times
             Increasing times (samples,) in s.
         solver
-            `newton`: fresh Jacobians, started at the previous sample.  `chord`: constant inverse of
+            `newton`: fresh Jacobians, generated elimination, started at the previous sample.
+            `newton_dense`: the same with dense elimination and partial pivoting.  `chord`: constant inverse of
             the design position, started at a quadratic extrapolation.
         tolerance
             Largest component of the last step of an iteration (rad or m).
@@ -220,11 +222,14 @@ class AlgebraicModel:
         counts = np.zeros(len(COUNTS), dtype=np.int64)
         u_start = np.zeros(len(self.inputs))
         settings = (tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
-        if solver == "newton":
+        if solver in ("newton", "newton_dense"):
+            dense = solver == "newton_dense"
             began = time.perf_counter()
             status, sample = self.kernels.newton_path(
-                self.design, u_start, inputs, self.constants, *settings
+                self.design, u_start, inputs, self.constants, dense, *settings
             )
+        elif solver != "chord":
+            raise unknown("solver", solver, SOLVERS)
         else:
             inverse_t = np.linalg.inv(self.jacobian(self.design, u_start)).T.copy()
             counts[2] = 1
@@ -289,8 +294,10 @@ class AlgebraicModel:
             if len(outside):
                 sample = outside[0]
                 raise UnreachableError(
-                    f"{self.name}: height {inputs[sample, 0]:.4f} m at t = {times[sample]:.6g} s is out "
-                    f"of reach; the reachable range is {low:.4f} to {high:.4f} m (rack at {rack:g} m)"
+                    f"{self.name}: height {inputs[sample, 0]:.5f} m at t = {times[sample]:.6g} s is out "
+                    f"of reach (heights up to {inputs[:, 0].max():.4f} m and down to "
+                    f"{inputs[:, 0].min():.4f} m are asked for); the reachable range is {low:.4f} to "
+                    f"{high:.4f} m (rack at {rack:g} m)"
                 )
 
     def _work(self) -> np.ndarray:

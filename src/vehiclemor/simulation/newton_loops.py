@@ -7,11 +7,21 @@ import math
 
 import numpy as np
 
-from vehiclemor.codegen.stubs import INPUTS, OUTPUTS, WORK, N, newton_step, outputs, residual
+from vehiclemor.codegen.stubs import (
+    INPUTS,
+    OUTPUTS,
+    WORK,
+    N,
+    newton_step,
+    outputs,
+    residual,
+    residual_jacobian,
+)
 
 CONVERGED = 0
 TOO_MANY_ITERATIONS = 1
 NOT_FINITE = 2
+SINGULAR = 3
 # Columns of the counts array.
 ITERATIONS = 0
 RESIDUALS = 1
@@ -31,16 +41,66 @@ def increments(u, target, largest):  # noqa: ANN001, ANN201 - compiled
     return math.ceil(distance / largest - 1e-9)
 
 
+def all_below(step, size, tolerance):  # noqa: ANN001, ANN201 - compiled
+    """Whether the first entries of a step are all below a tolerance; never if one is not a number."""
+    below = True
+    for i in range(size):
+        below &= abs(step[i]) < tolerance
+    return below
+
+
+def failure(q):  # noqa: ANN001, ANN201 - compiled
+    """Status of an iteration that has used up its limit."""
+    for i in range(N):
+        if not math.isfinite(q[i]):
+            return 2
+    return 1
+
+
+def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
+    """Solve the leading r x r block of a for column N by elimination with partial pivoting.
+
+    The solution replaces column N.  False if a pivot is zero or not finite.
+    """
+    for k in range(r):
+        pivot = k
+        for i in range(k + 1, r):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
+            return False
+        if pivot != k:
+            for j in range(k, r):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+            a[k, N], a[pivot, N] = a[pivot, N], a[k, N]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, r):
+            factor = a[i, k] * inverse
+            for j in range(k + 1, r):
+                a[i, j] -= factor * a[k, j]
+            a[i, N] -= factor * a[k, N]
+    for k in range(r - 1, -1, -1):
+        total = a[k, N]
+        for j in range(k + 1, r):
+            total -= a[k, j] * a[j, N]
+        a[k, N] = total / a[k, k]
+    return True
+
+
 def newton_path(
-    q_start, u_start, inputs, constants, tolerance, limit, largest, path, counts
+    q_start, u_start, inputs, constants, dense, tolerance, limit, largest, path, counts
 ):  # noqa: ANN001, ANN201 - compiled
     """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
+
+    The step comes from the generated straight-line elimination or, if `dense`, from elimination
+    with partial pivoting, as a solver that knows nothing about the model would do it.
 
     An input increment above `largest` is cut into substeps, so that the iteration can't jump to
     another branch of solutions.
     """
     q, step, work = q_start.copy(), np.empty(N), np.empty(WORK)
     u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
+    full = np.empty((N, N + 1))
     iterations = 0
     for sample in range(inputs.shape[0]):
         for i in range(INPUTS):
@@ -51,21 +111,22 @@ def newton_path(
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
             converged = False
             for _ in range(limit):
-                newton_step(q, u, constants, work, step)
+                if dense:
+                    residual_jacobian(q, u, constants, work, full)
+                    if not small_solve(full, N):
+                        return 3, sample
+                    for i in range(N):
+                        step[i] = full[i, N]
+                else:
+                    newton_step(q, u, constants, work, step)
                 iterations += 1
-                size = 0.0
                 for i in range(N):
                     q[i] -= step[i]
-                    # A step that is not a number must not look small.
-                    if not abs(step[i]) <= size:
-                        size = abs(step[i])
-                if not math.isfinite(size):
-                    return 2, sample
-                if size < tolerance:
+                if all_below(step, N, tolerance):
                     converged = True
                     break
             if not converged:
-                return 1, sample
+                return failure(q), sample
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):
@@ -108,19 +169,13 @@ def chord_path(
                 for j in range(N):
                     for i in range(N):
                         step[i] += inverse_t[j, i] * phi[j]
-                size = 0.0
                 for i in range(N):
                     q[i] -= step[i]
-                for i in range(N):
-                    if not abs(step[i]) <= size:
-                        size = abs(step[i])
-                if not math.isfinite(size):
-                    return 2, sample
-                if size < tolerance:
+                if all_below(step, N, tolerance):
                     converged = True
                     break
             if not converged:
-                return 1, sample
+                return failure(q), sample
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):

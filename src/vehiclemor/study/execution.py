@@ -44,6 +44,8 @@ def compute_cell(cell: Cell) -> xr.Dataset:
         reference = model.simulate(maneuver)
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
         reduced = method.fit(model, runs, cell.settings)
+        # The first run loads machine code and warms caches, the second is timed.
+        reduced.simulate(maneuver, cell.start)
         trajectory = reduced.simulate(maneuver, cell.start)
         approximation = reduced.best_approximation(reference.coordinates)
     except UnreachableError as error:

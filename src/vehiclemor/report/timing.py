@@ -1,0 +1,148 @@
+"""Timing pass: full-order and reduced runs interleaved in one process, medians.
+
+Seconds stored with the cells of a study are measured while other cells run beside them; a speed-up
+is quoted from this pass only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.study.provenance import code_digest, machine, versions
+from vehiclemor.study.store import prepare_folder, read_dataset, write_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ROUNDS = 41
+FIT_ROUNDS = 9
+COUNTS = ("iterations", "residual_evaluations", "jacobian_evaluations", "linear_solves")
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One line of the timing table: a method with settings, run on the nominal maneuver."""
+
+    label: str
+    method: str
+    preset: str = "recommended"
+    settings: dict[str, Value] = field(default_factory=dict)
+
+
+BASELINE, STRONGEST = "full order, Newton", "full order, strongest"
+# Per model: what is timed.  The first is the paper's kind of baseline, the second the strongest.
+CONTESTANTS = {
+    "double_wishbone": (
+        Contestant(BASELINE, "full_order"),
+        Contestant(STRONGEST, "full_order", "strongest"),
+        Contestant("full order, dense", "full_order", settings={"solver": "newton_dense"}),
+        Contestant("replay", "replay"),
+        Contestant("pod r=3", "pod", settings={"rank": 3}),
+        Contestant("pod literal r=3", "pod", "literal", {"rank": 3}),
+        Contestant("pod r=4", "pod", settings={"rank": 4}),
+        Contestant("pod literal r=6", "pod", "literal", {"rank": 6}),
+        Contestant("fixed basis r=3", "fixed_basis", settings={"rank": 3}),
+        Contestant("fixed basis r=4", "fixed_basis", settings={"rank": 4}),
+    ),
+}
+
+
+def timing(model_name: str, folder: Path) -> xr.Dataset:
+    """Stored timing of a model's contestants, measured first if it is missing or out of date.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimension `contestant`: median and quartiles of the seconds of a run, seconds for a
+        time point, offline seconds, counts.
+    """
+    model = build(model_name)
+    path = folder / "studies" / f"timing-{model_name}.nc"
+    key = _identity(model)
+    if path.exists():
+        dataset = read_dataset(path, "source", "vehiclemor")
+        if dataset.attrs.get("timing") == key:
+            return dataset
+    prepare_folder(folder)
+    dataset = measure(model, CONTESTANTS[model_name])
+    dataset.attrs["timing"] = key
+    write_dataset(dataset, path)
+    return dataset
+
+
+def _identity(model: AlgebraicModel) -> str:
+    contestants = [repr(contestant) for contestant in CONTESTANTS[model.name]]
+    digests = [code_digest(model.name, c.method, "sine_travel") for c in CONTESTANTS[model.name]]
+    content = json.dumps([contestants, digests, model.kernel_hash, machine(), ROUNDS])
+    return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Dataset:
+    """Time the contestants on the model's nominal maneuver."""
+    import xarray as xr
+
+    maneuver: Maneuver = component("maneuver", component("model", model.name).MANEUVER)
+    start = model.starts[0]
+    fits: list[list[float]] = [[] for _ in contestants]
+    reduced: list[ReducedModel] = []
+    for index, contestant in enumerate(contestants):
+        method: Method = component("method", contestant.method)
+        preset = method.presets(model.name)[contestant.preset]
+        settings = validated(contestant.method, method.SETTINGS, contestant.settings, preset)
+        runs = training_runs(model, maneuver, start, "nominal")
+        # The first fit loads machine code and is not counted.
+        candidates = [method.fit(model, runs, settings) for _ in range(FIT_ROUNDS + 1)]
+        fits[index] = [candidate.offline.seconds for candidate in candidates[1:]]
+        reduced.append(candidates[-1])
+    seconds = np.empty((ROUNDS + 1, len(contestants)))
+    counts: list[dict[str, int]] = [{} for _ in contestants]
+    for turn in range(ROUNDS + 1):
+        for index, candidate in enumerate(reduced):
+            trajectory = candidate.simulate(maneuver, start)
+            seconds[turn, index] = trajectory.seconds
+            counts[index] = trajectory.counts
+    seconds = seconds[1:]
+    samples = maneuver.samples
+    columns: dict[str, tuple] = {
+        "seconds": (np.median(seconds, axis=0), "s", "median time of a run in the compiled loop"),
+        "seconds_lower": (np.quantile(seconds, 0.25, axis=0), "s", "lower quartile"),
+        "seconds_upper": (np.quantile(seconds, 0.75, axis=0), "s", "upper quartile"),
+        "seconds_per_sample": (np.median(seconds, axis=0) / samples, "s", "for one time point"),
+        "offline_seconds": ([float(np.median(f)) for f in fits], "s", "training and fit, median"),
+        "offline_residual_evaluations": (
+            [candidate.offline.residual_evaluations for candidate in reduced],
+            "1",
+            "full residual evaluations in training",
+        ),
+        "effective_rank": ([candidate.effective_rank for candidate in reduced], "1", "rank"),
+    }
+    for name in COUNTS:
+        columns[name] = ([count[name] for count in counts], "1", name.replace("_", " "))
+    dataset = xr.Dataset(
+        {
+            name: ("contestant", values, {"units": unit, "long_name": text})
+            for name, (values, unit, text) in columns.items()
+        },
+        {"contestant": [contestant.label for contestant in contestants]},
+    )
+    dataset.attrs = {
+        "title": f"timing of {model.name}, interleaved, {ROUNDS} rounds, {samples} time points",
+        "source": "vehiclemor",
+        "model": model.name,
+        "machine": machine(),
+        "versions": versions(),
+        "kernel_hash": model.kernel_hash,
+    }
+    return dataset
