@@ -45,7 +45,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         entry["offline_us"] = offline * 1e6
         for name, baseline in (("break_even", BASELINE), ("break_even_strongest", STRONGEST)):
             saved = float(seconds.sel(contestant=baseline)) - own
-            pays = saved > 0.0 and offline > 0.0 and own > 0.0
+            pays = saved > 0.0 and offline > 0.0
             entry[name] = offline / saved if pays else float("nan")
         rows.append(entry)
     return pd.DataFrame(rows)
@@ -69,6 +69,8 @@ def printed_costs(folder: Path) -> str:
         for row in table.itertuples(index=False):
             speed = "".join(f"{_cell(v, 2):>7}" for v in (row.speed_up, row.speed_up_strongest))
             even = f"{_even(row.break_even)} / {_even(row.break_even_strongest)}"
+            if row.offline_us == 0.0:
+                even = "-"
             lines.append(
                 f"{row.contestant:<22}{row.rank:>5}{row.us_per_run:>9.1f}{row.ns_per_sample:>10.1f}"
                 f"{row.iterations:>12}{row.residual_evaluations:>11}{row.jacobian_evaluations:>11}"
@@ -83,4 +85,4 @@ def _cell(value: float, digits: int) -> str:
 
 
 def _even(value: float) -> str:
-    return "never" if value != value else f"{value:.0f}"
+    return "never" if value != value else f"{value:.1f}"

@@ -1,0 +1,215 @@
+"""The paper's claims on figures 6 and 11 to 14 as numeric criteria that can fail.
+
+The paper shows curves; a reader sees a deviation on them when it is a visible share of the signal's
+range.  `VISIBLE` was fixed before the first evaluation.  Each criterion is evaluated for the default
+settings and for the paper's literal ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Share of a signal's range from which on a deviation counts as visible in a figure: 2 mm on a curve
+# that is 40 mm high.
+VISIBLE = 0.05
+# The end of the simulation: the last fifth.
+END = 0.8
+DISPLACEMENT, ANGLE = "spindle_y", "second_euler_angle"
+Results = Mapping[str, "xr.Dataset"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Outcome of one criterion.
+
+    Attributes
+    ----------
+    measured
+        The number that decides.
+    bound
+        What it is compared with.
+    met
+        Whether the claim holds.
+    explanation
+        What the number is, and what else was seen.
+    """
+
+    measured: float
+    bound: float
+    met: bool
+    explanation: str
+
+
+def _point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
+    # A dictionary: `method` is also the name of an argument of `sel`.
+    return dataset.sel({"method": label, **place}).squeeze(drop=True)
+
+
+def _deviation(point: xr.Dataset, output: str) -> xr.DataArray:
+    """Error history as a share of the full-order signal's range."""
+    error = point["outputs"].sel(output=output) - point["reference_outputs"].sel(output=output)
+    return error / point["signal_range"].sel(output=output)
+
+
+def _largest(point: xr.Dataset, output: str) -> float:
+    chosen = point.sel(output=output)
+    return float(chosen["max_error"] / chosen["signal_range"])
+
+
+def _relative_rms(dataset: xr.Dataset, label: str, output: str) -> np.ndarray:
+    chosen = dataset.sel({"method": label, "output": output}).squeeze(drop=True)
+    return (chosen["rms_error"] / chosen["signal_range"]).values
+
+
+def _not_visible(point: xr.Dataset, outputs: tuple[str, ...]) -> Finding:
+    largest = max(_largest(point, output) for output in outputs)
+    text = "largest deviation, as a share of the signal's range"
+    return Finding(largest, VISIBLE, largest < VISIBLE, text)
+
+
+def nearly_identical(results: Results, label: str) -> Finding:
+    """Figure 6: original and reduced outputs can't be told apart."""
+    return _not_visible(_point(results["figures-6-7"], label, rank=3), (DISPLACEMENT, ANGLE))
+
+
+def displacement_unaffected(results: Results, label: str) -> Finding:
+    """Figure 11: the displacement follows at frequency +20 %."""
+    return _not_visible(_point(results["figure-11"], label, rank=3), (DISPLACEMENT,))
+
+
+def angle_diverges_at_end(results: Results, label: str) -> Finding:
+    """Figure 11: the largest error of the angle is visible and lies at the end of the run."""
+    deviation = np.abs(_deviation(_point(results["figure-11"], label, rank=3), ANGLE))
+    largest, moment = float(deviation.max()), float(deviation["time"][int(np.argmax(deviation.values))])
+    end = END * float(deviation["time"][-1])
+    before = float(deviation.sel(time=slice(0.0, end)).max())
+    text = (
+        f"largest deviation of the angle, as a share of its range, at t = {moment:.2f} s; "
+        f"before {end:g} s it stays below {before:.2g}"
+    )
+    return Finding(largest, VISIBLE, largest > VISIBLE and moment > end, text)
+
+
+def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
+    """Figure 11: a shorter control period reduces the angle's deviation."""
+    data = _point(results["figure-11-control-period"], label)
+    errors = data["rms_error"].sel(output=ANGLE)
+    nominal = float(errors.sel(control_period=5.0))
+    ratios = {float(p): float(errors.sel(control_period=p)) / nominal for p in errors.control_period}
+    shorter = {period: ratio for period, ratio in ratios.items() if period < 5.0}
+    listed = ", ".join(f"{ratio:.3g} at {period:g} s" for period, ratio in shorter.items())
+    worst = max(shorter.values())
+    text = f"RMS error of the angle as a multiple of that at 5 s: {listed}"
+    return Finding(worst, 1.0, worst < 1.0, text)
+
+
+def no_divergence(results: Results, label: str) -> Finding:
+    """Figure 12: neither output deviates visibly at amplitude +20 %."""
+    return _not_visible(_point(results["figure-12"], label, rank=3), (DISPLACEMENT, ANGLE))
+
+
+def _not_monotone(results: Results, study: str, factor: str, label: str) -> Finding:
+    factors = results[study][factor].values
+    decreases = {}
+    for output in (DISPLACEMENT, ANGLE):
+        errors = _relative_rms(results[study], label, output)
+        outwards = [np.diff(errors[factors >= 1.0]), np.diff(errors[factors <= 1.0][::-1])]
+        decreases[output] = int(np.sum(np.concatenate(outwards) < 0.0))
+    text = (
+        f"steps away from the nominal input, out of {len(factors) - 1} for each output, at which the "
+        f"RMS error falls: displacement {decreases[DISPLACEMENT]}, angle {decreases[ANGLE]}"
+    )
+    total = sum(decreases.values())
+    return Finding(float(total), 1.0, total >= 1, text)
+
+
+def not_monotone_frequency(results: Results, label: str) -> Finding:
+    """Figure 13, top: a larger frequency perturbation need not give a larger error."""
+    return _not_monotone(results, "figure-13-frequency", "frequency_factor", label)
+
+
+def not_monotone_amplitude(results: Results, label: str) -> Finding:
+    """Figure 13, bottom: a larger amplitude perturbation need not give a larger error."""
+    return _not_monotone(results, "figure-13-amplitude", "amplitude_factor", label)
+
+
+def angle_more_sensitive(results: Results, label: str) -> Finding:
+    """Figure 13: the angle's error, as a share of its range, is the larger one mostly."""
+    more = []
+    for study in ("figure-13-frequency", "figure-13-amplitude"):
+        angle = _relative_rms(results[study], label, ANGLE)
+        more.append(angle > _relative_rms(results[study], label, DISPLACEMENT))
+    share = float(np.concatenate(more).mean())
+    text = "share of perturbations at which the angle's RMS error / range exceeds the displacement's"
+    return Finding(share, 0.5, share > 0.5, text)
+
+
+def three_states_fail(results: Results, label: str) -> Finding:
+    """Figure 14: at frequency +100 % the angle deviates visibly with r = 3."""
+    largest = _largest(_point(results["figure-14"], label, rank=3), ANGLE)
+    text = "largest deviation of the angle, as a share of its range, r = 3"
+    return Finding(largest, VISIBLE, largest > VISIBLE, text)
+
+
+def six_states_follow(results: Results, label: str) -> Finding:
+    """Figure 14: with r = 6 it follows, whichever two of the six directions rounding chooses."""
+    if label == "replay":
+        return _not_visible(_point(results["figure-14"], label, rank=6), (ANGLE,))
+    spread_label = {"pod": "pod_uncut", "pod_literal": "pod_literal"}[label]
+    spread = results["figure-14-spread"].sel(
+        {"method": spread_label, "output": ANGLE}
+    )
+    share = (spread["max_error"] / spread["signal_range"]).squeeze(drop=True)
+    six, four = share.sel(rank=6).values, share.sel(rank=4).values
+    if not np.isfinite(six).all():
+        failed = int(np.sum(~np.isfinite(six)))
+        return Finding(float("nan"), VISIBLE, False, f"{failed} of {len(six)} variants diverged")
+    text = (
+        f"largest deviation of the angle, as a share of its range, worst of {len(six)} roundings of "
+        f"the snapshots, whose rank is 4 (least {six.min():.2g}; r = 4: {four.max():.2g})"
+    )
+    return Finding(float(six.max()), VISIBLE, bool(six.max() < VISIBLE), text)
+
+
+def more_robust_to_amplitude(results: Results, label: str) -> Finding:
+    """Conclusion: at equal perturbations the error is smaller for amplitude than for frequency."""
+    smaller = []
+    by_amplitude = results["figure-13-amplitude"]
+    by_frequency = results["figure-13-frequency"]
+    for output in (DISPLACEMENT, ANGLE):
+        frequency = dict(
+            zip(
+                by_frequency["frequency_factor"].values,
+                _relative_rms(by_frequency, label, output),
+                strict=True,
+            )
+        )
+        amplitude = _relative_rms(by_amplitude, label, output)
+        for factor, error in zip(by_amplitude["amplitude_factor"].values, amplitude, strict=True):
+            if factor != 1.0 and factor in frequency:
+                smaller.append(error < frequency[factor])
+    share = float(np.mean(smaller))
+    text = f"share of {len(smaller)} pairs of equal perturbations at which amplitude hurts less"
+    return Finding(share, 0.5, share > 0.5, text)
+
+
+CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
+    "dw_fig6_nearly_identical": nearly_identical,
+    "dw_fig11_displacement_unaffected": displacement_unaffected,
+    "dw_fig11_angle_diverges_at_end": angle_diverges_at_end,
+    "dw_fig11_shorter_period_reduces_deviation": shorter_period_reduces_deviation,
+    "dw_fig12_no_divergence": no_divergence,
+    "dw_fig13_not_monotone_frequency": not_monotone_frequency,
+    "dw_fig13_not_monotone_amplitude": not_monotone_amplitude,
+    "dw_fig13_angle_more_sensitive": angle_more_sensitive,
+    "dw_fig14_three_states_fail": three_states_fail,
+    "dw_fig14_six_states_follow": six_states_follow,
+    "dw_more_robust_to_amplitude": more_robust_to_amplitude,
+}

@@ -1,0 +1,140 @@
+"""Figure 5: the suspension drawn from the model in space, beside its topological graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = {
+    "upper arm": "#0072B2",
+    "lower arm": "#D55E00",
+    "wheel carrier": "#000000",
+    "tie rod": "#009E73",
+    "rack": "#CC79A7",
+    "chassis": "#777777",
+}
+WHEEL_RADIUS = 0.30  # m, for the outline only: the kinematic model has no wheel.
+# Node -> place; edge -> (nodes, joint, coordinates).
+NODES = {
+    "chassis": (0.0, 1.0),
+    "upper arm": (1.6, 2.0),
+    "lower arm": (1.6, 0.0),
+    "rack": (1.0, 1.0),
+    "tie rod": (1.95, 1.0),
+    "wheel carrier": (3.2, 1.0),
+}
+EDGES = (
+    ("chassis", "upper arm", r"R  $\theta_u$"),
+    ("chassis", "lower arm", r"R  $\theta_l$"),
+    ("chassis", "rack", r"P  $s$"),
+    ("rack", "tie rod", "U\n" + r"$\alpha,\beta$"),
+    ("upper arm", "wheel carrier", r"S  $\zeta,\eta,\xi$"),
+    ("lower arm", "wheel carrier", "S  closure"),
+    ("tie rod", "wheel carrier", "S\nclosure"),
+)
+
+
+def figure_5(results: Mapping[str, xr.Dataset]) -> Figure:
+    """Mechanism at design, with its positions at +-0.1 m of travel, and the graph."""
+    del results
+    model = build("double_wishbone")
+    # Placed by hand: the style's automatic layout can't deal with axes in space.
+    figure = plt.figure(figsize=(6.7, 4.1))
+    figure.set_layout_engine("none")
+    space = figure.add_axes((0.0, 0.17, 0.5, 0.76), projection="3d")
+    graph = figure.add_axes((0.52, 0.14, 0.48, 0.76))
+    for travel, alpha in ((-0.1, 0.25), (0.1, 0.25), (0.0, 1.0)):
+        _draw(space, model, model.solve([travel, 0.0]), alpha)
+    _axes_in_space(space)
+    _draw_graph(graph)
+    handles, labels = space.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower left", ncols=3, fontsize=7.5)
+    figure.text(0.02, 0.94, "(a)")
+    figure.text(0.55, 0.94, "(b)")
+    figure.text(0.07, 0.94, "faint: wheel travel of -0.1 and +0.1 m", fontsize=7, color="#555555")
+    return figure
+
+
+def _draw(axis: Axes, model: AlgebraicModel, q: np.ndarray, alpha: float) -> None:
+    fixed, moving = model.parameters.values(), model.joints_at(q)
+    upper, lower = moving["upper_ball_joint"], moving["lower_ball_joint"]
+    centre, outer = moving["wheel_centre"], moving["tie_rod_outer"]
+    bodies = {
+        "upper arm": [fixed["upper_arm_front_pivot"], upper, fixed["upper_arm_rear_pivot"]],
+        "lower arm": [fixed["lower_arm_front_pivot"], lower, fixed["lower_arm_rear_pivot"]],
+        "wheel carrier": [upper, lower, outer, upper],
+        "tie rod": [moving["tie_rod_inner"], outer],
+        "rack": [
+            moving["tie_rod_inner"] - np.array([0.0, 0.12, 0.0]),
+            moving["tie_rod_inner"] + np.array([0.0, 0.03, 0.0]),
+        ],
+    }
+    for name, points in bodies.items():
+        line = np.array(points).T
+        width = 2.2 if alpha == 1.0 else 1.0
+        label = name if alpha == 1.0 else None
+        axis.plot(*line, color=COLORS[name], linewidth=width, alpha=alpha, label=label)
+    carrier = Poly3DCollection([[upper, lower, outer]], color=COLORS["wheel carrier"], linewidth=0.0)
+    carrier.set_alpha(0.25 * alpha)
+    axis.add_collection3d(carrier)
+    spindle = np.array([(upper + lower) / 2.0, centre]).T
+    axis.plot(*spindle, color=COLORS["wheel carrier"], linewidth=1.4, alpha=alpha)
+    if alpha == 1.0:
+        joints = np.array([upper, lower, outer, moving["tie_rod_inner"]]).T
+        axis.plot(*joints, "o", color="white", markeredgecolor="black", markersize=4.5)
+        pivots = [fixed[f"{arm}_arm_{end}_pivot"] for arm in ("upper", "lower") for end in ("front", "rear")]
+        axis.plot(*np.array(pivots).T, "s", color=COLORS["chassis"], markersize=4.5, label="chassis pivot")
+    _wheel(axis, centre, moving["axle_direction"], alpha)
+
+
+def _wheel(axis: Axes, centre: np.ndarray, spin: np.ndarray, alpha: float) -> None:
+    up = np.cross([1.0, 0.0, 0.0], spin)
+    up /= np.linalg.norm(up)
+    forward = np.cross(spin, up)
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]
+    rim = centre + WHEEL_RADIUS * (np.cos(angle) * forward + np.sin(angle) * up)
+    axis.plot(*rim.T, color="#999999", linewidth=1.0, alpha=alpha)
+
+
+def _axes_in_space(axis: Axes) -> None:
+    axis.set_xlabel("x (m)", labelpad=0)
+    axis.set_ylabel("y (m)", labelpad=0)
+    axis.set_zlabel("z (m)", labelpad=0)
+    axis.zaxis.set_rotate_label(False)
+    axis.zaxis.label.set_rotation(90.0)
+    axis.set_box_aspect((0.75, 0.6, 0.85), zoom=0.95)
+    axis.set_xlim(-0.375, 0.375)
+    axis.set_ylim(0.3, 0.9)
+    axis.set_zlim(-0.5, 0.35)
+    axis.view_init(elev=14, azim=28)
+    axis.tick_params(pad=0, labelsize=7)
+    axis.locator_params(nbins=4)
+
+
+def _draw_graph(axis: Axes) -> None:
+    axis.set_axis_off()
+    axis.set_xlim(-0.45, 3.65)
+    axis.set_ylim(-0.35, 2.35)
+    for start, end, text in EDGES:
+        (xa, ya), (xb, yb) = NODES[start], NODES[end]
+        closure = "closure" in text
+        style = "--" if closure else "-"
+        axis.plot([xa, xb], [ya, yb], style, color="#555555", linewidth=1.2, zorder=1)
+        place = {"ha": "center", "va": "center", "fontsize": 7.5, "zorder": 2}
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        axis.text((xa + xb) / 2, (ya + yb) / 2, text, bbox=box, **place)
+    for name, (x, y) in NODES.items():
+        box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": COLORS[name]}
+        text = name.replace(" ", "\n")
+        axis.text(x, y, text, ha="center", va="center", fontsize=7.5, bbox=box, zorder=3)
