@@ -16,7 +16,7 @@ from vehiclemor.report.regenerate import regenerate_all
 
 def main() -> int:
     """Regenerate everything; wrong input is one line and exit status 2."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
     parser.add_argument("--out", type=Path, default=Path("results"), help="folder for the files")
     parser.add_argument("--jobs", type=int, default=1, help="processes for missing studies")

@@ -31,7 +31,9 @@ def methods() -> dict[str, str]:
 
 def maneuvers() -> dict[str, str]:
     """Registered maneuvers: name -> one line."""
-    return {name: registry.component("maneuver", name).summary for name in registry.names("maneuver")}
+    return {
+        name: registry.component("maneuver", name).summary for name in registry.names("maneuver")
+    }
 
 
 def studies() -> dict[str, str]:
@@ -130,12 +132,14 @@ def simulate(
     ready = model if isinstance(model, AlgebraicModel) else _model(model)
     if isinstance(maneuver, str) or maneuver is None:
         default = registry.component("model", ready.name).MANEUVER
-        maneuver = registry.component("maneuver", maneuver or default)
+        base: Maneuver = registry.component("maneuver", maneuver or default)
+    else:
+        base = maneuver
     if rtol is not None:
         settings["tolerance"] = rtol
     cell = make_cell(
         ready,
-        maneuver.perturbed(frequency, amplitude),
+        base.perturbed(frequency, amplitude),
         start or ready.starts[0],
         method,
         settings,
@@ -199,7 +203,10 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
 
 
 def figures(
-    only: Sequence[str] = (), out: str | Path = RESULTS, results: str | Path = RESULTS, jobs: int = 1
+    only: Sequence[str] = (),
+    out: str | Path = RESULTS,
+    results: str | Path = RESULTS,
+    jobs: int = 1,
 ) -> list[Path]:
     """Regenerate figures of the paper from stored results; studies that are missing are run first.
 

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -15,6 +15,8 @@ from vehiclemor.errors import InputError, VehiclemorError
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
+    from rich.progress import TaskID
 
 # Exit statuses: 0 done, 1 a published bound is missed, 2 wrong input, 130 interrupted.
 MISSED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
@@ -98,7 +100,7 @@ def simulate(
     """
     from vehiclemor.reduction.settings import parsed
 
-    chosen: dict[str, object] = {}
+    chosen: dict[str, Any] = {}
     for setting in settings:
         key, separator, value = setting.partition("=")
         if not separator or not key:
@@ -119,7 +121,7 @@ def simulate(
         amplitude=amplitude,
         preset=preset,
         training=training,
-        **chosen,  # type: ignore[arg-type]
+        **chosen,
     )
     if out is not None:
         from vehiclemor.study.store import write_dataset
@@ -140,7 +142,7 @@ def _check_writable(out: Path) -> None:
         read_dataset(out, "source", "vehiclemor")
 
 
-def _print_simulation(dataset, out: Path | None) -> None:  # noqa: ANN001
+def _print_simulation(dataset: xr.Dataset, out: Path | None) -> None:
     status = dataset["status"].item()
     print(f"{dataset.attrs['title']}: {status} {dataset['message'].item()}".rstrip())
     print(f"{'output':<20} {'RMS error':>12} {'floor':>12} {'largest':>12} {'range':>12}")
@@ -194,13 +196,13 @@ class _progress:  # noqa: N801 - reads as a function
         console = Console(stderr=True)
         self._bar = Progress(console=console, disable=not console.is_terminal)
         self._bar.start()
-        self._tasks: dict[str, object] = {}
+        self._tasks: dict[str, TaskID] = {}
         return self._update
 
     def _update(self, study: str, done: int, total: int) -> None:
         if study not in self._tasks:
             self._tasks[study] = self._bar.add_task(study, total=total)
-        self._bar.update(self._tasks[study], completed=done)  # type: ignore[arg-type]
+        self._bar.update(self._tasks[study], completed=done)
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
@@ -234,7 +236,7 @@ def compare(
         print(rows.to_json(orient="records", indent=2))
     else:
         _print_comparison(rows, out)
-    return MISSED if (rows["verdict"] == "missed").any() else 0
+    return MISSED if "missed" in set(rows["verdict"]) else 0
 
 
 def _print_comparison(rows: pd.DataFrame, out: Path) -> None:
@@ -292,7 +294,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except VehiclemorError as error:
         return _fail(str(error))
     except KeyboardInterrupt:
-        print("vehiclemor: interrupted; finished cells are stored, run again to resume", file=sys.stderr)
+        print(
+            "vehiclemor: interrupted; finished cells are stored, run again to resume",
+            file=sys.stderr,
+        )
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()

@@ -53,7 +53,9 @@ class Maneuver:
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at the given times (n,) in s."""
-        return self.signal(np.asarray(times, dtype=float), self.frequency_factor, self.amplitude_factor)
+        return self.signal(
+            np.asarray(times, dtype=float), self.frequency_factor, self.amplitude_factor
+        )
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> "Maneuver":
         """The maneuver with its factors set.

@@ -127,7 +127,9 @@ def load_parameters(
         _check_point(entry.value, where, FileError)
     for name, value in (overrides or {}).items():
         if name not in entries:
-            raise InputError(f"{name!r} is not a parameter of {model}; it has {', '.join(expected)}")
+            raise InputError(
+                f"{name!r} is not a parameter of {model}; it has {', '.join(expected)}"
+            )
         components = _components(value, name)
         _check_point(components, f"parameter {name}", InputError)
         entries[name] = entries[name].model_copy(
@@ -140,7 +142,9 @@ def _components(value: object, name: str) -> list[float]:
     try:
         return [float(component) for component in np.atleast_1d(np.array(value, dtype=float))]
     except (TypeError, ValueError):
-        raise InputError(f"parameter {name}: {value!r} is not a number or list of numbers") from None
+        raise InputError(
+            f"parameter {name}: {value!r} is not a number or list of numbers"
+        ) from None
 
 
 def _check_point(

@@ -12,7 +12,11 @@ from typing import Any
 
 from vehiclemor.errors import InputError
 
-GROUPS = {"model": "vehiclemor.models", "method": "vehiclemor.methods", "maneuver": "vehiclemor.maneuvers"}
+GROUPS = {
+    "model": "vehiclemor.models",
+    "method": "vehiclemor.methods",
+    "maneuver": "vehiclemor.maneuvers",
+}
 
 
 def names(kind: str) -> list[str]:
@@ -35,7 +39,9 @@ def component(kind: str, name: str) -> Any:
     try:
         return entries[name].load()
     except (ImportError, AttributeError) as error:
-        raise InputError(f"{kind} {name!r} ({entries[name].value}) can't be imported: {error}") from error
+        raise InputError(
+            f"{kind} {name!r} ({entries[name].value}) can't be imported: {error}"
+        ) from error
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:

@@ -17,7 +17,9 @@ def data_folder() -> Path:
     for folder in (package / "data", package.parents[1] / "data"):
         if (folder / "parameters").is_dir():
             return folder
-    raise FileError(f"the data files are missing: neither {package / 'data'} nor a checkout has them")
+    raise FileError(
+        f"the data files are missing: neither {package / 'data'} nor a checkout has them"
+    )
 
 
 def data_names(kind: str) -> list[str]:

@@ -34,7 +34,10 @@ def cache_folder() -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"vehiclemor-{os.getuid() if os.name == 'posix' else 'cache'}"
+        folder = (
+            Path(tempfile.gettempdir())
+            / f"vehiclemor-{os.getuid() if os.name == 'posix' else 'cache'}"
+        )
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder
 

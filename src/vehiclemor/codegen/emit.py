@@ -31,9 +31,9 @@ class _Printer(PythonCodePrinter):
             return f"math.sqrt({self._print(base)})"
         if exponent == sp.Rational(-1, 2):
             return f"1.0/math.sqrt({self._print(base)})"
-        if exponent.is_Integer and 0 < abs(int(exponent)) <= 4:  # type: ignore[arg-type]
+        if isinstance(exponent, sp.Integer) and 0 < abs(int(exponent)) <= 4:
             factor = self.parenthesize(base, 1000, strict=True)
-            product = "*".join([factor] * abs(int(exponent)))  # type: ignore[arg-type]
+            product = "*".join([factor] * abs(int(exponent)))
             return product if exponent.is_positive else f"1.0/({product})"
         return super()._print_Pow(expr, rational=rational)
 
@@ -161,14 +161,15 @@ def _expressions(function: Function) -> list[sp.Expr]:
     return [e for _, e in function.assignments] + list(function.results)
 
 
-def _trigonometric(expressions: list[sp.Expr] | tuple[sp.Expr, ...]) -> list[sp.Expr]:
+def _trigonometric(expressions: list[sp.Expr] | tuple[sp.Expr, ...]) -> list[sp.Symbol]:
     """Arguments of all sines and cosines, each once, in order of appearance."""
-    found: dict[sp.Expr, None] = {}
+    found: dict[sp.Symbol, None] = {}
     for expression in expressions:
         for call in sorted(expression.atoms(sp.sin, sp.cos), key=str):
-            if not call.args[0].is_Symbol:
+            angle = call.args[0]
+            if not isinstance(angle, sp.Symbol):
                 raise ValueError(f"{call}: name the angle on the tape first")
-            found[call.args[0]] = None
+            found[angle] = None
     return list(found)
 
 
@@ -207,7 +208,7 @@ def _scalar_pairs(
     lines = []
     for angle in _trigonometric(expressions):
         if angle not in known:
-            known.add(angle)  # type: ignore[arg-type]
+            known.add(angle)
             lines.append(f"    sin_{angle}, cos_{angle} = sincos({angle})")
     return lines
 
@@ -233,7 +234,7 @@ def operation_counts(source: str) -> dict[str, dict[str, int]]:
     for definition in ast.parse(source).body:
         if not isinstance(definition, ast.FunctionDef):
             continue
-        count = dict.fromkeys(OPERATIONS, 0)
+        count: dict[str, int] = dict.fromkeys(OPERATIONS, 0)
         for node in ast.walk(definition):
             if isinstance(node, ast.BinOp):
                 count[operators.get(type(node.op), "power")] += 1

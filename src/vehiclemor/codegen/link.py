@@ -46,8 +46,8 @@ def linked_source(
     ]
     from vehiclemor.codegen import sincos
 
-    for text in (_functions(sincos), kernels, *(_functions(module) for module in loops)):
-        lines.append(_decorated(text))
+    texts = (_functions(sincos), kernels, *(_functions(module) for module in loops))
+    lines += [_decorated(text) for text in texts]
     body = "\n".join(lines)
     digest = hashlib.sha256(body.encode()).hexdigest()
     return f"{body}\nSOURCE_DIGEST = '{digest}'\n"

@@ -7,6 +7,7 @@ displacement of the steering rack.
 """
 
 from collections.abc import Mapping
+from typing import cast
 
 import numpy as np
 import sympy as sp
@@ -104,7 +105,7 @@ def derive() -> AlgebraicEquations:
     program = assemble(
         tape,
         {"q": q, "u": u},
-        [component for point in points.values() for component in point],  # type: ignore[misc]
+        cast("list[sp.Symbol]", [component for point in points.values() for component in point]),
         {
             "residual": (residual, (n,)),
             "residual_jacobian": (augmented, (n, n + 1)),
@@ -133,9 +134,7 @@ JOINTS = (
 )
 
 
-def _positions(
-    tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]
-) -> dict[str, g.Vector]:
+def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> dict[str, g.Vector]:
     """Moving points in the chassis frame, each ball joint as seen from both of its bodies."""
     zeta, eta, xi, theta_u, theta_l, alpha, beta, s = q
 

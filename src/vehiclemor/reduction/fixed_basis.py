@@ -36,7 +36,10 @@ def presets(model: str) -> dict[str, dict[str, Value]]:
 
 def accepts(model: AlgebraicModel) -> tuple[bool, str]:
     """Whether the model is of a kind that this method can reduce."""
-    return model.kind == "ae", f"fixed_basis reduces models of kind ae, {model.name} is {model.kind}"
+    return (
+        model.kind == "ae",
+        f"fixed_basis reduces models of kind ae, {model.name} is {model.kind}",
+    )
 
 
 def check(model: AlgebraicModel, settings: Mapping[str, Value]) -> None:

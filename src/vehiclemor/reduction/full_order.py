@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class FullOrderModel:
     model: AlgebraicModel
     solver: str
     tolerance: float
-    offline: Offline = Offline()
+    offline: Offline = field(default_factory=Offline)
 
     @property
     def effective_rank(self) -> int:

@@ -25,9 +25,9 @@ SETTINGS = {
         "number", 5.0, "length of a control period in s", minimum=0.0, above=True
     ),
 }
-# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on the
-# order and signs in which the equations are written (galerkin does, by orders of magnitude), and the
-# rank cut keeps directions out that rounding chooses.
+# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on
+# the order and signs in which the equations are written (galerkin does, by orders of magnitude),
+# and the rank cut keeps directions out that rounding chooses.
 PRESETS: dict[str, dict[str, Value]] = {
     "recommended": {},
     "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},

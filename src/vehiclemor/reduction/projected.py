@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +38,10 @@ SUBSPACE_SETTINGS = {
         choices=("least_squares", "galerkin"),
     ),
     "equation_seed": Setting(
-        "integer", 0, "galerkin: seed of a random order and signs of the equations; 0: natural", minimum=0
+        "integer",
+        0,
+        "galerkin: seed of a random order and signs of the equations; 0: natural",
+        minimum=0,
     ),
     "reversed_coordinates": Setting(
         "text", "", "galerkin: coordinates counted the other way round, separated by commas"
@@ -119,7 +123,8 @@ class ProjectedModel:
         times = np.linspace(self.edges[0], self.edges[-1], len(coordinates))
         first = first_samples(times, self.edges)
         parts = [
-            project(coordinates[first[k] : first[k + 1]], basis) for k, basis in enumerate(self.bases)
+            project(coordinates[first[k] : first[k + 1]], basis)
+            for k, basis in enumerate(self.bases)
         ]
         return np.concatenate(parts)
 
@@ -143,7 +148,7 @@ def fit_windows(
     """
     began = time.perf_counter()
     count, rank = int(settings["snapshots"]), int(settings["rank"])
-    moments = [np.linspace(a, b, count) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]
     histories = [run.at(np.concatenate(moments)) for run in training]
     bases = []
     for k in range(len(moments)):

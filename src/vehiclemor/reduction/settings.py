@@ -84,10 +84,11 @@ def _checked(where: str, setting: Setting, value: object) -> Value:
         value = int(value)
     else:
         value = float(value)
-    if setting.minimum is not None:
-        if value < setting.minimum or (setting.above and value == setting.minimum):
-            bound = "above" if setting.above else "at least"
-            raise InputError(f"{where} is {value:g}; it must be {bound} {setting.minimum:g}")
+    if setting.minimum is not None and (
+        value < setting.minimum or (setting.above and value == setting.minimum)
+    ):
+        bound = "above" if setting.above else "at least"
+        raise InputError(f"{where} is {value:g}; it must be {bound} {setting.minimum:g}")
     return value
 
 

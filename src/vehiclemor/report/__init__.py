@@ -1,0 +1,1 @@
+"""Comparison with the published numbers, tables and figures."""

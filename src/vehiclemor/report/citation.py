@@ -1,8 +1,11 @@
 """How to cite the suite, the paper that it rebuilds, and its methods."""
 
-from vehiclemor import __version__
+from importlib.metadata import version
+
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import load_published
+
+TITLE = "vehiclemor: benchmark suite for model order reduction of multibody vehicle models"
 
 
 def citations() -> str:
@@ -12,8 +15,8 @@ def citations() -> str:
     lines = [
         "@software{vehiclemor,",
         "  author  = {{The vehiclemor developers}},",
-        "  title   = {{vehiclemor: benchmark suite for model order reduction of multibody vehicle models}},",
-        f"  version = {{{__version__}}},",
+        f"  title   = {{{{{TITLE}}}}},",
+        f"  version = {{{version('vehiclemor')}}},",
         "  year    = {2026},",
         "}",
         "",

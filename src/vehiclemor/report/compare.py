@@ -27,7 +27,9 @@ COLUMNS = (
     "reason",
 )
 VARIANTS = {"pod": "default", "pod_literal": "literal"}
-PARAMETERS = "the paper's parameters were never published; ours are public data (Project Chrono sedan)"
+PARAMETERS = (
+    "the paper's parameters were never published; ours are public data (Project Chrono sedan)"
+)
 
 
 def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
@@ -93,7 +95,10 @@ def _error_row(number: Number, results: Results, label: str) -> dict[str, object
 
 
 def _time_rows(number: Number, costs: pd.DataFrame) -> list[dict[str, object]]:
-    contestants = {3: {"default": "pod r=3", "literal": "pod literal r=3"}, 6: {"literal": "pod literal r=6"}}
+    contestants = {
+        3: {"default": "pod r=3", "literal": "pod literal r=3"},
+        6: {"literal": "pod literal r=6"},
+    }
     baseline, strongest = costs.loc["full order, Newton"], costs.loc["full order, strongest"]
     dense = costs.loc["full order, dense"]
     rows: list[dict[str, object]] = []
@@ -104,7 +109,9 @@ def _time_rows(number: Number, costs: pd.DataFrame) -> list[dict[str, object]]:
             "the strongest solver": float(row["us_per_run"]) / float(strongest["us_per_run"]),
             "Newton with dense elimination": float(row["us_per_run"]) / float(dense["us_per_run"]),
         }
-        times = ", ".join(f"{ratio:.2f} times the time of {name}" for name, ratio in against.items())
+        times = ", ".join(
+            f"{ratio:.2f} times the time of {name}" for name, ratio in against.items()
+        )
         rows.append(
             {
                 "model": number.model,
@@ -116,8 +123,9 @@ def _time_rows(number: Number, costs: pd.DataFrame) -> list[dict[str, object]]:
                 "replay": 1.0,
                 "verdict": "met" if reduction >= number.value else "missed",
                 "reason": (
-                    f"share of the time of Newton with fresh Jacobians and generated elimination that "
-                    f"is saved; {row['iterations']:.0f} iterations against {baseline['iterations']:.0f}; {times}; "
+                    f"share of the time of Newton with fresh Jacobians and generated elimination "
+                    f"that is saved; {row['iterations']:.0f} iterations against "
+                    f"{baseline['iterations']:.0f}; {times}; "
                     f"the paper names neither its solver nor its machine"
                 ),
             }
@@ -166,17 +174,18 @@ def printed(rows: pd.DataFrame) -> str:
     for model, part in rows.groupby("model", sort=False):
         lines += ["", str(model)]
         lines.append(
-            f"  {'item':<62}{'published':>11}{'reproduced':>12}{'floor':>10}{'replay':>10}  {'unit':<5}verdict"
+            f"  {'item':<62}{'published':>11}{'reproduced':>12}"
+            f"{'floor':>10}{'replay':>10}  {'unit':<5}verdict"
         )
-        for row in part.itertuples(index=False):
-            item = textwrap.wrap(str(row.item), 60)
+        for row in part.to_dict("records"):
+            item = textwrap.wrap(str(row["item"]), 60)
             numbers = (
-                f"{_number(row.published):>11}{_number(row.reproduced):>12}"
-                f"{_number(row.floor):>10}{_number(row.replay):>10}"
+                f"{_number(row['published']):>11}{_number(row['reproduced']):>12}"
+                f"{_number(row['floor']):>10}{_number(row['replay']):>10}"
             )
-            lines.append(f"  {item[0]:<62}{numbers}  {row.unit:<5}{row.verdict}")
+            lines.append(f"  {item[0]:<62}{numbers}  {row['unit']:<5}{row['verdict']}")
             lines += [f"    {text}" for text in item[1:]]
-            reason = str(row.reason).removesuffix(f"; {PARAMETERS}")
+            reason = str(row["reason"]).removesuffix(f"; {PARAMETERS}")
             lines += [f"      {text}" for text in textwrap.wrap(reason, 104)]
     verdicts = rows["verdict"].value_counts()
     counted = ", ".join(f"{verdicts.get(v, 0)} {v}" for v in ("met", "missed", "not_comparable"))

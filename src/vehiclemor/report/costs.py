@@ -19,8 +19,8 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     pandas.DataFrame
         `us_per_run`, `ns_per_sample`, counts, `speed_up` (against Newton's method with fresh
         Jacobians, the paper's kind of baseline), `speed_up_strongest` (against the strongest
-        full-order solver), `offline_us`, and the number of runs after which a reduced model has paid
-        for its training against either baseline (missing where it never does).
+        full-order solver), `offline_us`, and the number of runs after which a reduced model has
+        paid for its training against either baseline (missing where it never does).
     """
     import pandas as pd
 
@@ -61,20 +61,26 @@ def printed_costs(folder: Path) -> str:
         table = cost_table(model, folder)
         lines = [
             f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})",
-            "speed-up x1: against Newton with fresh Jacobians; x2: against the strongest full-order "
-            "solver",
-            f"{'':<22}{'rank':>5}{'us/run':>9}{'ns/point':>10}{'iterations':>12}{'residuals':>11}"
-            f"{'Jacobians':>11}{'x1':>7}{'x2':>7}{'offline us':>12}{'break-even x1/x2 (runs)':>26}",
+            (
+                "speed-up x1: against Newton with fresh Jacobians; x2: against the strongest "
+                "full-order solver"
+            ),
+            (
+                f"{'':<22}{'rank':>5}{'us/run':>9}{'ns/point':>10}{'iterations':>12}"
+                f"{'residuals':>11}{'Jacobians':>11}{'x1':>7}{'x2':>7}{'offline us':>12}"
+                f"{'break-even x1/x2 (runs)':>26}"
+            ),
         ]
-        for row in table.itertuples(index=False):
-            speed = "".join(f"{_cell(v, 2):>7}" for v in (row.speed_up, row.speed_up_strongest))
-            even = f"{_even(row.break_even)} / {_even(row.break_even_strongest)}"
-            if row.offline_us == 0.0:
+        for row in table.to_dict("records"):
+            speed = f"{_cell(row['speed_up'], 2):>7}{_cell(row['speed_up_strongest'], 2):>7}"
+            even = f"{_even(row['break_even'])} / {_even(row['break_even_strongest'])}"
+            if row["offline_us"] == 0.0:
                 even = "-"
             lines.append(
-                f"{row.contestant:<22}{row.rank:>5}{row.us_per_run:>9.1f}{row.ns_per_sample:>10.1f}"
-                f"{row.iterations:>12}{row.residual_evaluations:>11}{row.jacobian_evaluations:>11}"
-                f"{speed}{row.offline_us:>12.1f}{even:>26}"
+                f"{row['contestant']:<22}{row['rank']:>5}{row['us_per_run']:>9.1f}"
+                f"{row['ns_per_sample']:>10.1f}{row['iterations']:>12}"
+                f"{row['residual_evaluations']:>11}{row['jacobian_evaluations']:>11}"
+                f"{speed}{row['offline_us']:>12.1f}{even:>26}"
             )
         parts.append("\n".join(lines))
     return "\n\n".join(parts)

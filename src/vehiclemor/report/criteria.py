@@ -1,8 +1,8 @@
 """The paper's claims on figures 6 and 11 to 14 as numeric criteria that can fail.
 
-The paper shows curves; a reader sees a deviation on them when it is a visible share of the signal's
-range.  `VISIBLE` was fixed before the first evaluation.  Each criterion is evaluated for the default
-settings and for the paper's literal ones.
+The paper shows curves; a reader sees a deviation on them when it is a visible share of the
+signal's range.  `VISIBLE` was fixed before the first evaluation.  Each criterion is evaluated for
+the default settings and for the paper's literal ones.
 """
 
 from __future__ import annotations
@@ -86,8 +86,11 @@ def displacement_unaffected(results: Results, label: str) -> Finding:
 
 def angle_diverges_at_end(results: Results, label: str) -> Finding:
     """Figure 11: the largest error of the angle is visible and lies at the end of the run."""
-    deviation = np.abs(_deviation(_point(results["figure-11"], label, rank=3), ANGLE))
-    largest, moment = float(deviation.max()), float(deviation["time"][int(np.argmax(deviation.values))])
+    deviation = abs(_deviation(_point(results["figure-11"], label, rank=3), ANGLE))
+    largest, moment = (
+        float(deviation.max()),
+        float(deviation["time"][int(np.argmax(deviation.values))]),
+    )
     end = END * float(deviation["time"][-1])
     before = float(deviation.sel(time=slice(0.0, end)).max())
     text = (
@@ -102,7 +105,9 @@ def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
     data = _point(results["figure-11-control-period"], label)
     errors = data["rms_error"].sel(output=ANGLE)
     nominal = float(errors.sel(control_period=5.0))
-    ratios = {float(p): float(errors.sel(control_period=p)) / nominal for p in errors.control_period}
+    ratios = {
+        float(p): float(errors.sel(control_period=p)) / nominal for p in errors.control_period
+    }
     shorter = {period: ratio for period, ratio in ratios.items() if period < 5.0}
     listed = ", ".join(f"{ratio:.3g} at {period:g} s" for period, ratio in shorter.items())
     worst = max(shorter.values())
@@ -123,8 +128,8 @@ def _not_monotone(results: Results, study: str, factor: str, label: str) -> Find
         outwards = [np.diff(errors[factors >= 1.0]), np.diff(errors[factors <= 1.0][::-1])]
         decreases[output] = int(np.sum(np.concatenate(outwards) < 0.0))
     text = (
-        f"steps away from the nominal input, out of {len(factors) - 1} for each output, at which the "
-        f"RMS error falls: displacement {decreases[DISPLACEMENT]}, angle {decreases[ANGLE]}"
+        f"steps away from the nominal input, out of {len(factors) - 1} for each output, at which "
+        f"the RMS error falls: displacement {decreases[DISPLACEMENT]}, angle {decreases[ANGLE]}"
     )
     total = sum(decreases.values())
     return Finding(float(total), 1.0, total >= 1, text)
@@ -147,7 +152,9 @@ def angle_more_sensitive(results: Results, label: str) -> Finding:
         angle = _relative_rms(results[study], label, ANGLE)
         more.append(angle > _relative_rms(results[study], label, DISPLACEMENT))
     share = float(np.concatenate(more).mean())
-    text = "share of perturbations at which the angle's RMS error / range exceeds the displacement's"
+    text = (
+        "share of perturbations at which the angle's RMS error / range exceeds the displacement's"
+    )
     return Finding(share, 0.5, share > 0.5, text)
 
 
@@ -163,17 +170,15 @@ def six_states_follow(results: Results, label: str) -> Finding:
     if label == "replay":
         return _not_visible(_point(results["figure-14"], label, rank=6), (ANGLE,))
     spread_label = {"pod": "pod_uncut", "pod_literal": "pod_literal"}[label]
-    spread = results["figure-14-spread"].sel(
-        {"method": spread_label, "output": ANGLE}
-    )
+    spread = results["figure-14-spread"].sel({"method": spread_label, "output": ANGLE})
     share = (spread["max_error"] / spread["signal_range"]).squeeze(drop=True)
     six, four = share.sel(rank=6).values, share.sel(rank=4).values
     if not np.isfinite(six).all():
         failed = int(np.sum(~np.isfinite(six)))
         return Finding(float("nan"), VISIBLE, False, f"{failed} of {len(six)} variants diverged")
     text = (
-        f"largest deviation of the angle, as a share of its range, worst of {len(six)} roundings of "
-        f"the snapshots, whose rank is 4 (least {six.min():.2g}; r = 4: {four.max():.2g})"
+        f"largest deviation of the angle, as a share of its range, worst of {len(six)} roundings "
+        f"of the snapshots, whose rank is 4 (least {six.min():.2g}; r = 4: {four.max():.2g})"
     )
     return Finding(float(six.max()), VISIBLE, bool(six.max() < VISIBLE), text)
 

@@ -82,8 +82,10 @@ def markdown(table: pd.DataFrame) -> str:
     """The table as Markdown."""
     lines = ["| " + " | ".join(str(c) for c in table.columns) + " |"]
     lines.append("|" + "---|" * len(table.columns))
-    for row in table.itertuples(index=False):
-        lines.append("| " + " | ".join(_text(v).replace("|", "\\|") for v in row) + " |")
+    lines += [
+        "| " + " | ".join(_text(v).replace("|", "\\|") for v in row) + " |"
+        for row in table.itertuples(index=False)
+    ]
     return "\n".join(lines) + "\n"
 
 

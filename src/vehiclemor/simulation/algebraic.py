@@ -26,7 +26,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.equations import AlgebraicEquations
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component, unknown
-from vehiclemor.simulation import newton_loops
+from vehiclemor.simulation import newton_loops, projected_loops
 from vehiclemor.simulation.reach import reachable_range
 from vehiclemor.simulation.trajectory import COUNTS, Trajectory
 
@@ -36,8 +36,8 @@ LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_dense", "chord")
-# A mechanism without forces has no equilibrium to find: the name stands for its design position, so that
-# studies can name the same start for every kind of model.
+# A mechanism without forces has no equilibrium to find: the name stands for its design position,
+# so that studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
 SMALLEST_SINGULAR_VALUE = 1e-8
@@ -188,8 +188,8 @@ class AlgebraicModel:
             Increasing times (samples,) in s.
         solver
             `newton`: fresh Jacobians, generated elimination, started at the previous sample.
-            `newton_dense`: the same with dense elimination and partial pivoting.  `chord`: constant inverse of
-            the design position, started at a quadratic extrapolation.
+            `newton_dense`: the same with dense elimination and partial pivoting.  `chord`: constant
+            inverse of the design position, started at a quadratic extrapolation.
         tolerance
             Largest component of the last step of an iteration (rad or m).
 
@@ -242,7 +242,8 @@ class AlgebraicModel:
             low, high = self.reach(float(inputs[sample, 1]))
             raise ConvergenceError(
                 f"{self.name}: {REASONS[status]} at t = {times[sample]:.6g} s, height "
-                f"{inputs[sample, 0]:.4f} m ({solver}); the reachable range is {low:.4f} to {high:.4f} m"
+                f"{inputs[sample, 0]:.4f} m ({solver}); the reachable range is "
+                f"{low:.4f} to {high:.4f} m"
             )
         return self.trajectory(times, inputs, path, counts, seconds)
 
@@ -280,7 +281,15 @@ class AlgebraicModel:
         return result
 
     def check_reach(self, times: np.ndarray, inputs: np.ndarray) -> None:
-        """Raise `UnreachableError` if a height is out of reach, `InputError` if one isn't finite."""
+        """Raise if a height is out of reach or an input isn't finite.
+
+        Raises
+        ------
+        InputError
+            If an input isn't finite.
+        UnreachableError
+            If a height is out of reach.
+        """
         bad = np.argwhere(~np.isfinite(inputs))
         if len(bad):
             sample, column = bad[0]
@@ -294,10 +303,10 @@ class AlgebraicModel:
             if len(outside):
                 sample = outside[0]
                 raise UnreachableError(
-                    f"{self.name}: height {inputs[sample, 0]:.5f} m at t = {times[sample]:.6g} s is out "
-                    f"of reach (heights up to {inputs[:, 0].max():.4f} m and down to "
-                    f"{inputs[:, 0].min():.4f} m are asked for); the reachable range is {low:.4f} to "
-                    f"{high:.4f} m (rack at {rack:g} m)"
+                    f"{self.name}: height {inputs[sample, 0]:.5f} m at t = {times[sample]:.6g} s "
+                    f"is out of reach (heights up to {inputs[:, 0].max():.4f} m and down to "
+                    f"{inputs[:, 0].min():.4f} m are asked for); the reachable range is {low:.4f} "
+                    f"to {high:.4f} m (rack at {rack:g} m)"
                 )
 
     def _work(self) -> np.ndarray:
@@ -316,8 +325,6 @@ class AlgebraicModel:
 @lru_cache(maxsize=8)
 def _compiled(name: str) -> tuple[AlgebraicEquations, ModuleType, str]:
     """Equations and compiled kernels of a registered model; parameters play no part here."""
-    from vehiclemor.reduction import projected_loops
-
     equations: AlgebraicEquations = component("model", name).derive()
     sizes = {
         "N": len(equations.coordinates),
@@ -326,9 +333,7 @@ def _compiled(name: str) -> tuple[AlgebraicEquations, ModuleType, str]:
         "WORK": work_size(equations.program),
     }
     kernels = kernel_source(equations.program) + "\n\n" + tangent_source(equations.program)
-    source = linked_source(
-        kernels, [newton_loops, projected_loops], sizes, f"model {name}"
-    )
+    source = linked_source(kernels, [newton_loops, projected_loops], sizes, f"model {name}")
     return equations, load_module(name, source), kernel_hash(source)
 
 

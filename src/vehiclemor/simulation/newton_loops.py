@@ -29,7 +29,7 @@ JACOBIANS = 2
 SOLVES = 3
 
 
-def increments(u, target, largest):  # noqa: ANN001, ANN201 - compiled
+def increments(u, target, largest):
     """Number of substeps from inputs u to target, none longer than `largest`."""
     distance = 0.0
     for i in range(INPUTS):
@@ -41,15 +41,15 @@ def increments(u, target, largest):  # noqa: ANN001, ANN201 - compiled
     return math.ceil(distance / largest - 1e-9)
 
 
-def all_below(step, size, tolerance):  # noqa: ANN001, ANN201 - compiled
-    """Whether the first entries of a step are all below a tolerance; never if one is not a number."""
+def all_below(step, size, tolerance):
+    """Whether the first entries of a step are all below a tolerance; never if one is no number."""
     below = True
     for i in range(size):
         below &= abs(step[i]) < tolerance
     return below
 
 
-def failure(q):  # noqa: ANN001, ANN201 - compiled
+def failure(q):
     """Status of an iteration that has used up its limit."""
     for i in range(N):
         if not math.isfinite(q[i]):
@@ -57,7 +57,7 @@ def failure(q):  # noqa: ANN001, ANN201 - compiled
     return 1
 
 
-def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
+def small_solve(a, r):
     """Solve the leading r x r block of a for column N by elimination with partial pivoting.
 
     The solution replaces column N.  False if a pivot is zero or not finite.
@@ -89,7 +89,7 @@ def small_solve(a, r):  # noqa: ANN001, ANN201 - compiled
 
 def newton_path(
     q_start, u_start, inputs, constants, dense, tolerance, limit, largest, path, counts
-):  # noqa: ANN001, ANN201 - compiled
+):
     """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
 
     The step comes from the generated straight-line elimination or, if `dense`, from elimination
@@ -138,13 +138,13 @@ def newton_path(
 
 def chord_path(
     q_start, u_start, inputs, constants, inverse_t, tolerance, limit, largest, path, counts
-):  # noqa: ANN001, ANN201 - compiled
+):
     """Chord method: one constant inverse Jacobian, started from a quadratic extrapolation in time.
 
-    `inverse_t` is the transposed inverse Jacobian at the design position.  Only the residual is evaluated.
-    The extrapolation assumes equidistant samples; where they are not, it is just a worse start.
-    One of higher order would start nearer, but multiplies the errors of earlier samples by more
-    than one iteration takes away (15 times, cubic, against 7).
+    `inverse_t` is the transposed inverse Jacobian at the design position.  Only the residual is
+    evaluated.  The extrapolation assumes equidistant samples; where they are not, it is just a
+    worse start.  One of higher order would start nearer, but multiplies the errors of earlier
+    samples by more than one iteration takes away (15 times, cubic, against 7).
     """
     q, phi, step, work = q_start.copy(), np.empty(N), np.empty(N), np.empty(WORK)
     u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
@@ -184,7 +184,7 @@ def chord_path(
     return 0, inputs.shape[0]
 
 
-def output_path(path, inputs, constants, result):  # noqa: ANN001, ANN201 - compiled
+def output_path(path, inputs, constants, result):
     """Outputs at every sample of a path of coordinates into result (samples, OUTPUTS)."""
     q, u, y, work = np.empty(N), np.empty(INPUTS), np.empty(OUTPUTS), np.empty(WORK)
     for sample in range(path.shape[0]):
@@ -197,7 +197,7 @@ def output_path(path, inputs, constants, result):  # noqa: ANN001, ANN201 - comp
             result[sample, i] = y[i]
 
 
-def residual_path(path, inputs, constants, result):  # noqa: ANN001, ANN201 - compiled
+def residual_path(path, inputs, constants, result):
     """Residuals at every sample of a path of coordinates into result (samples, N)."""
     q, u, phi, work = np.empty(N), np.empty(INPUTS), np.empty(N), np.empty(WORK)
     for sample in range(path.shape[0]):

@@ -11,7 +11,7 @@ from vehiclemor.codegen.stubs import INPUTS, WORK, N, residual_tangent
 from vehiclemor.simulation.newton_loops import all_below, failure, small_solve
 
 
-def weighted(test, k, product, j):  # noqa: ANN001, ANN201 - compiled
+def weighted(test, k, product, j):
     """Column k of the test basis times column j of the product."""
     total = 0.0
     for i in range(N):
@@ -19,7 +19,7 @@ def weighted(test, k, product, j):  # noqa: ANN001, ANN201 - compiled
     return total
 
 
-def lift(mean, basis, qh, r, q):  # noqa: ANN001, ANN201 - compiled
+def lift(mean, basis, qh, r, q):
     """Full coordinates mean + basis qh into q."""
     for i in range(N):
         total = mean[i]
@@ -42,7 +42,7 @@ def projected_path(
     limit,
     path,
     counts,
-):  # noqa: ANN001, ANN201 - compiled
+):
     """Solve the reduced equations sample by sample, window by window.
 
     Window k holds the samples from first_samples[k] up to first_samples[k + 1].  The iteration

@@ -177,7 +177,12 @@ def _expand(name: str, study: StudyFile) -> Grid:
         settings: dict[str, object] = dict(entry.settings)
         declared = component("method", entry.method).SETTINGS
         settings |= {d: point[d] for d in study.grid if d in declared}
-        identity = (point["method"], point["start"], *(point[f] for f in FACTORS), *settings.values())
+        identity = (
+            point["method"],
+            point["start"],
+            *(point[f] for f in FACTORS),
+            *settings.values(),
+        )
         if identity not in made:
             made[identity] = make_cell(
                 model,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,12 @@ LONG_NAMES = {
     "equation_seed": "seed of the order and signs of the equations; 0 is the natural order",
     "rounding_seed": "seed of rounding noise on the snapshots; 0 is none",
 }
+
+
+def cells_digest(grid: Grid) -> str:
+    """Hash of all cells of a grid at their places: tells whether a combined dataset is current."""
+    text = "\n".join(f"{place} {cell.key}" for place, cell in grid.cells.items())
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 def combined(grid: Grid, folder: Path) -> xr.Dataset:
@@ -74,6 +81,7 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
         "study": grid.name,
         "model": cell.model,
         "training": cell.training,
+        "cells": cells_digest(grid),
         "configuration": json.dumps(grid.definition.model_dump(), sort_keys=True),
         "kernel_hash": cell.kernel,
         "versions": versions(),
@@ -96,7 +104,7 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
     """
     import xarray as xr
 
-    parts = []
+    parts: list[xr.Dataset] = []
     for name, dataset in results.items():
         rows = dataset.drop_dims([d for d in ("time", "input") if d in dataset.dims])
         kept = ("output", "coordinate")

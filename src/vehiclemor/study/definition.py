@@ -30,7 +30,7 @@ class MethodEntry(FileSchema):
     method: str
     label: str = ""
     preset: str = "recommended"
-    settings: dict[str, int | float | str] = {}
+    settings: dict[str, int | float | str] = Field(default_factory=dict)
 
 
 class StudyFile(FileSchema):
@@ -40,15 +40,15 @@ class StudyFile(FileSchema):
     """
 
     title: str
-    studies: list[str] = []
+    studies: list[str] = Field(default_factory=list)
     model: str = ""
     maneuver: str = ""
-    start: list[str] = []
+    start: list[str] = Field(default_factory=list)
     training: str = "matched"
-    training_set: list[list[float]] = []
+    training_set: list[list[float]] = Field(default_factory=list)
     keep: Literal["trajectories", "metrics"] = "trajectories"
-    grid: dict[str, list[int | float | str] | Span] = {}
-    methods: list[MethodEntry] = []
+    grid: dict[str, list[int | float | str] | Span] = Field(default_factory=dict)
+    methods: list[MethodEntry] = Field(default_factory=list)
 
     @field_validator("training_set")
     @classmethod

@@ -54,8 +54,7 @@ def compute_cell(cell: Cell) -> xr.Dataset:
         return _failed(model, maneuver, cell, "diverged", str(error))
     except VehiclemorError:
         raise
-    except Exception as error:
-        # A plug-in's bug spoils its own cell, not the study.
+    except Exception as error:  # noqa: BLE001 - a plug-in's bug spoils its own cell, not the study
         return _failed(model, maneuver, cell, "error", f"{type(error).__name__}: {error}")
     return _result(
         model, cell, trajectory, reference, approximation, reduced.offline, reduced.effective_rank
@@ -116,7 +115,11 @@ def _result(
     )
     scalars = {
         "largest_residual": (float(np.abs(residual).max()), "m", "largest residual of an equation"),
-        "effective_rank": (effective_rank, "1", "largest number of reduced coordinates in a window"),
+        "effective_rank": (
+            effective_rank,
+            "1",
+            "largest number of reduced coordinates in a window",
+        ),
         "offline_seconds": (offline.seconds, "s", "training simulations and fit"),
         "offline_residual_evaluations": (
             offline.residual_evaluations,

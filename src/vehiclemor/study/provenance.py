@@ -7,6 +7,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from vehiclemor.registry import component
 
@@ -61,10 +62,10 @@ def code_digest(model: str, method: str, maneuver: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def _source(thing: object) -> bytes:
+def _source(thing: Any) -> bytes:
     """Text of the file that defines a component; its name where there is no file."""
     try:
-        path = inspect.getsourcefile(thing)  # type: ignore[arg-type]
+        path = inspect.getsourcefile(thing)
     except TypeError:
         path = inspect.getsourcefile(type(thing))
     return Path(path).read_bytes() if path else repr(thing).encode()

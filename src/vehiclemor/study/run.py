@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.errors import InputError
 from vehiclemor.study.cells import Cell, Grid, expand
-from vehiclemor.study.combine import combined
+from vehiclemor.study.combine import cells_digest, combined
 from vehiclemor.study.definition import load_studies
 from vehiclemor.study.execution import compute_cell
 from vehiclemor.study.store import cell_path, prepare_folder, read_dataset, write_dataset
@@ -83,7 +83,16 @@ def compute_and_store(cell: Cell, folder: Path) -> None:
 def _combine_and_store(grid: Grid, folder: Path) -> xr.Dataset:
     path = folder / "studies" / f"{grid.name}.nc"
     if path.exists():
-        read_dataset(path, "source", "vehiclemor")
+        stored = read_dataset(path, "source", "vehiclemor")
+        if stored.attrs.get("cells") == cells_digest(grid) and _newer_than_cells(
+            path, grid, folder
+        ):
+            return stored
     dataset = combined(grid, folder)
     write_dataset(dataset, path)
     return dataset
+
+
+def _newer_than_cells(path: Path, grid: Grid, folder: Path) -> bool:
+    written = path.stat().st_mtime_ns
+    return all(cell_path(folder, key).stat().st_mtime_ns < written for key in grid.unique)

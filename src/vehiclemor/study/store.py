@@ -94,9 +94,8 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     """
     import xarray as xr
 
-    with _readable(path):
-        with xr.open_dataset(path, engine="netcdf4") as opened:
-            dataset = opened.load()
+    with _readable(path), xr.open_dataset(path, engine="netcdf4") as opened:
+        dataset = opened.load()
     _check_owner(path, dataset.attrs, attribute, expected)
     return dataset
 

@@ -47,11 +47,12 @@ def choose_pivots(matrix: np.ndarray, threshold: float = 0.1) -> Pivots:
         for column in columns:
             largest = np.abs(work[rows, column]).max()
             for row in rows:
-                size = abs(work[row, column])
+                size = float(abs(work[row, column]))
                 if largest == 0.0 or size < threshold * largest or size < 1e-12:
                     continue
-                fill = (np.count_nonzero(work[row, columns]) - 1) * (
-                    np.count_nonzero(work[rows, column]) - 1
+                fill = int(
+                    (np.count_nonzero(work[row, columns]) - 1)
+                    * (np.count_nonzero(work[rows, column]) - 1)
                 )
                 candidate = (fill, -size, row, column)
                 best = candidate if best is None or candidate < best else best

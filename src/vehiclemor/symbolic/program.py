@@ -7,10 +7,11 @@ that run at every time point read its results.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import sympy as sp
 
-from vehiclemor.symbolic.tape import Tape, dependencies
+from vehiclemor.symbolic.tape import Tape, dependencies, free_symbols
 
 Assignments = tuple[tuple[sp.Symbol, sp.Expr], ...]
 
@@ -101,9 +102,9 @@ def assemble(
     read: dict[sp.Symbol, None] = {}
     for function in functions.values():
         for expression in [e for _, e in function.assignments] + list(function.results):
-            for symbol in sorted(expression.free_symbols, key=str):
+            for symbol in free_symbols(expression):
                 if symbol in constant_definitions or symbol in parameter_set:
-                    read[symbol] = None  # type: ignore[index]
+                    read[symbol] = None
     symbols = tuple(read)
     constants = Function(
         tuple((s, constant_definitions[s]) for s in dependencies(symbols, constant_definitions)),
@@ -124,8 +125,10 @@ def _share(
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
     """Common subexpression elimination over all definitions and results together."""
     names = sp.numbered_symbols("w", real=True)
-    shared, reduced = sp.cse(
-        [expression for _, expression in assignments] + wanted, symbols=names, order="none"
+    expressions = [expression for _, expression in assignments] + wanted
+    shared, reduced = cast(
+        "tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]",
+        sp.cse(expressions, symbols=names, order="none"),
     )
     definitions = dict(shared)
     definitions.update(zip((s for s, _ in assignments), reduced, strict=False))
@@ -159,7 +162,7 @@ class _Hoisting:
             if (-expression).is_Atom:
                 return expression
             return self._constant(expression)
-        arguments = expression.args
+        arguments = cast("tuple[sp.Expr, ...]", expression.args)
         if expression.is_Add or expression.is_Mul:
             fixed = [a for a in arguments if a.free_symbols <= self.constant]
             symbolic = any(a.free_symbols for a in fixed)

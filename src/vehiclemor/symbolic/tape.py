@@ -6,6 +6,7 @@ expressions stay short and derivatives follow by the chain rule, entry by entry.
 """
 
 from collections.abc import Iterable, Sequence
+from typing import cast
 
 import sympy as sp
 
@@ -81,20 +82,27 @@ class Tape:
             if row:
                 derivatives[symbol] = row
         rows = [self._chain_rule(sp.sympify(e), derivatives) for e in expressions]
-        return [[row.get(column, sp.Integer(0)) for column in range(len(variables))] for row in rows]
+        return [
+            [row.get(column, sp.Integer(0)) for column in range(len(variables))] for row in rows
+        ]
 
     def _chain_rule(
         self, expression: sp.Expr, derivatives: dict[sp.Symbol, dict[int, sp.Expr]]
     ) -> dict[int, sp.Expr]:
         total: dict[int, sp.Expr] = {}
-        for argument in sorted(expression.free_symbols, key=str):
-            inner = derivatives.get(argument)  # type: ignore[arg-type]
+        for argument in free_symbols(expression):
+            inner = derivatives.get(argument)
             if not inner:
                 continue
             outer = expression.diff(argument)
             for column, derivative in inner.items():
                 total[column] = total.get(column, sp.Integer(0)) + outer * derivative
         return {column: self.let(value) for column, value in total.items() if value != 0}
+
+
+def free_symbols(expression: sp.Expr) -> list[sp.Symbol]:
+    """Free symbols of an expression, sorted by name."""
+    return cast("list[sp.Symbol]", sorted(expression.free_symbols, key=str))
 
 
 def dependencies(
@@ -106,11 +114,11 @@ def dependencies(
     def visit(symbol: sp.Symbol) -> None:
         if symbol in order or symbol not in definitions:
             return
-        for argument in sorted(definitions[symbol].free_symbols, key=str):
-            visit(argument)  # type: ignore[arg-type]
+        for argument in free_symbols(definitions[symbol]):
+            visit(argument)
         order[symbol] = None
 
     for expression in expressions:
-        for argument in sorted(sp.sympify(expression).free_symbols, key=str):
+        for argument in free_symbols(sp.sympify(expression)):
             visit(argument)
     return list(order)

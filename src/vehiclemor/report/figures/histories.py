@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,10 +18,10 @@ LABELS = {
     "spindle_y": "spindle displacement y (m)",
     "second_euler_angle": r"second Euler angle $\eta$ (rad)",
 }
-FULL = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
-DEFAULT = {"color": "#0072B2", "linestyle": "--"}
-LITERAL = {"color": "#D55E00", "linestyle": "-."}
-REPLAY = {"color": "#666666", "linestyle": ":", "linewidth": 1.2}
+FULL: dict[str, Any] = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
+DEFAULT: dict[str, Any] = {"color": "#0072B2", "linestyle": "--"}
+LITERAL: dict[str, Any] = {"color": "#D55E00", "linestyle": "-."}
+REPLAY: dict[str, Any] = {"color": "#666666", "linestyle": ":", "linewidth": 1.2}
 
 
 def point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
@@ -53,7 +53,9 @@ def _comparison(dataset: xr.Dataset, replay: bool) -> Figure:
     full, reduced = point(dataset, "full_order", rank=3), point(dataset, "pod", rank=3)
     for axis, output in zip(axes, LABELS, strict=True):
         axis.plot(full.time, full["outputs"].sel(output=output), label="full order", **FULL)
-        axis.plot(reduced.time, reduced["outputs"].sel(output=output), label="POD, r = 3", **DEFAULT)
+        axis.plot(
+            reduced.time, reduced["outputs"].sel(output=output), label="POD, r = 3", **DEFAULT
+        )
         if replay:
             recorded = point(dataset, "replay", rank=3)["outputs"].sel(output=output)
             axis.plot(full.time, recorded, label="replay", **REPLAY)
@@ -118,7 +120,7 @@ def figure_14(results: Results) -> Figure:
     six = point(spread, "pod_literal", rank=6)["outputs"].sel(output="second_euler_angle")
     six = six.transpose("rounding_seed", "time").values
     lowest, highest = np.nanmin(six, axis=0), np.nanmax(six, axis=0)
-    span = dict(color="#D55E00", alpha=0.3, linewidth=0.0)
+    span: dict[str, Any] = {"color": "#D55E00", "alpha": 0.3, "linewidth": 0.0}
     axes[1].fill_between(full.time, lowest, highest, label="POD, r = 6 (literal), spread", **span)
     uncut = point(spread, "pod_uncut", rank=6)["outputs"].sel(output="second_euler_angle")
     uncut = uncut.transpose("rounding_seed", "time").values

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -66,7 +66,7 @@ def figure_5(results: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _draw(axis: Axes, model: AlgebraicModel, q: np.ndarray, alpha: float) -> None:
+def _draw(axis: Any, model: AlgebraicModel, q: np.ndarray, alpha: float) -> None:
     fixed, moving = model.parameters.values(), model.joints_at(q)
     upper, lower = moving["upper_ball_joint"], moving["lower_ball_joint"]
     centre, outer = moving["wheel_centre"], moving["tie_rod_outer"]
@@ -85,7 +85,9 @@ def _draw(axis: Axes, model: AlgebraicModel, q: np.ndarray, alpha: float) -> Non
         width = 2.2 if alpha == 1.0 else 1.0
         label = name if alpha == 1.0 else None
         axis.plot(*line, color=COLORS[name], linewidth=width, alpha=alpha, label=label)
-    carrier = Poly3DCollection([[upper, lower, outer]], color=COLORS["wheel carrier"], linewidth=0.0)
+    carrier = Poly3DCollection(
+        [[upper, lower, outer]], color=COLORS["wheel carrier"], linewidth=0.0
+    )
     carrier.set_alpha(0.25 * alpha)
     axis.add_collection3d(carrier)
     spindle = np.array([(upper + lower) / 2.0, centre]).T
@@ -93,12 +95,18 @@ def _draw(axis: Axes, model: AlgebraicModel, q: np.ndarray, alpha: float) -> Non
     if alpha == 1.0:
         joints = np.array([upper, lower, outer, moving["tie_rod_inner"]]).T
         axis.plot(*joints, "o", color="white", markeredgecolor="black", markersize=4.5)
-        pivots = [fixed[f"{arm}_arm_{end}_pivot"] for arm in ("upper", "lower") for end in ("front", "rear")]
-        axis.plot(*np.array(pivots).T, "s", color=COLORS["chassis"], markersize=4.5, label="chassis pivot")
+        pivots = [
+            fixed[f"{arm}_arm_{end}_pivot"]
+            for arm in ("upper", "lower")
+            for end in ("front", "rear")
+        ]
+        axis.plot(
+            *np.array(pivots).T, "s", color=COLORS["chassis"], markersize=4.5, label="chassis pivot"
+        )
     _wheel(axis, centre, moving["axle_direction"], alpha)
 
 
-def _wheel(axis: Axes, centre: np.ndarray, spin: np.ndarray, alpha: float) -> None:
+def _wheel(axis: Any, centre: np.ndarray, spin: np.ndarray, alpha: float) -> None:
     up = np.cross([1.0, 0.0, 0.0], spin)
     up /= np.linalg.norm(up)
     forward = np.cross(spin, up)
@@ -107,7 +115,7 @@ def _wheel(axis: Axes, centre: np.ndarray, spin: np.ndarray, alpha: float) -> No
     axis.plot(*rim.T, color="#999999", linewidth=1.0, alpha=alpha)
 
 
-def _axes_in_space(axis: Axes) -> None:
+def _axes_in_space(axis: Any) -> None:
     axis.set_xlabel("x (m)", labelpad=0)
     axis.set_ylabel("y (m)", labelpad=0)
     axis.set_zlabel("z (m)", labelpad=0)

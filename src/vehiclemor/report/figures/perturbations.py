@@ -82,13 +82,23 @@ def figure_13_map(results: Results) -> Figure:
             min(float(np.nanmin(e[e > 0.0])) for e in errors.values()),
             max(float(np.nanmax(e)) for e in errors.values()),
         )
+        meshes = []
         for column, (method, values) in enumerate(errors.items()):
             axis = axes[row, column]
             mesh = axis.pcolormesh(
-                frequency, amplitude, values, norm=norm, cmap="cividis", shading="nearest", rasterized=True
+                frequency,
+                amplitude,
+                values,
+                norm=norm,
+                cmap="cividis",
+                shading="nearest",
+                rasterized=True,
             )
+            meshes.append(mesh)
             bound = published[NUMBERS[output]].value
-            axis.contour(frequency, amplitude, values, levels=[bound], colors="white", linewidths=1.2)
+            axis.contour(
+                frequency, amplitude, values, levels=[bound], colors="white", linewidths=1.2
+            )
             axis.grid(visible=False)
             name = "POD, r = 3" if method == "pod" else "replay"
             axis.set_title(f"({'abcd'[2 * row + column]}) {name}")
@@ -96,5 +106,5 @@ def figure_13_map(results: Results) -> Figure:
                 axis.set_ylabel("amplitude perturbation (%)")
             if row == 1:
                 axis.set_xlabel("frequency perturbation (%)")
-        figure.colorbar(mesh, ax=axes[row, :], label=label)
+        figure.colorbar(meshes[-1], ax=axes[row, :], label=label)
     return figure

@@ -1,0 +1,87 @@
+"""Contract tests that every registered model and method must pass, plug-ins included.
+
+Each function raises `AssertionError` with what is broken.  Call them from a test of your own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import validated
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.trajectory import COUNTS
+
+
+def _nominal(model: AlgebraicModel) -> Maneuver:
+    return component("maneuver", component("model", model.name).MANEUVER)
+
+
+def check_model(name: str) -> None:
+    """A model has named quantities with units, consistent derivatives, and closes its loops."""
+    model = build(name)
+    equations = model.equations
+    for quantities in (equations.coordinates, equations.inputs, equations.outputs):
+        labels = [quantity.name for quantity in quantities]
+        assert len(set(labels)) == len(labels), f"{name}: a name occurs twice in {labels}"
+        assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
+    maneuver = _nominal(model)
+    assert maneuver.inputs == model.inputs, f"{name}: its maneuver gives other inputs"
+    trajectory = model.simulate(maneuver)
+    assert np.isfinite(trajectory.coordinates).all(), f"{name}: coordinates are not finite"
+    largest = np.abs(model.residual_at(trajectory.coordinates, trajectory.inputs)).max()
+    assert largest < 1e-10, f"{name}: residual {largest:.1e} along the nominal run"
+    q, u = trajectory.coordinates[len(trajectory.time) // 3], trajectory.inputs[0]
+    step = 1e-6
+    differences = np.column_stack(
+        [
+            (model.residual(q + step * e, u) - model.residual(q - step * e, u)) / (2.0 * step)
+            for e in np.eye(len(q))
+        ]
+    )
+    error = np.abs(differences - model.jacobian(q, u)).max()
+    assert error < 1e-8, f"{name}: the Jacobian differs from differences by {error:.1e}"
+
+
+def check_method(name: str, model_name: str) -> None:
+    """A method declares its settings, and gives complete, repeatable trajectories.
+
+    A model that the method does not accept must be refused with a reason.
+    """
+    method: Method = component("method", name)
+    model = build(model_name)
+    assert method.SUMMARY, f"{name}: no summary"
+    accepted, reason = method.accepts(model)
+    if not accepted:
+        assert reason, f"{name}: refuses {model_name} without a reason"
+        return
+    presets = method.presets(model_name)
+    assert "recommended" in presets, f"{name}: no preset 'recommended'"
+    for setting in method.SETTINGS.values():
+        assert setting.doc, f"{name}: a setting is not described"
+    maneuver = _nominal(model)
+    for preset, values in presets.items():
+        settings = validated(name, method.SETTINGS, {}, values)
+        method.check(model, settings)
+        for policy in ("matched", "nominal"):
+            test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)
+            runs = training_runs(model, test, model.starts[0], policy)
+            reduced = method.fit(model, runs, settings)
+            first = reduced.simulate(test, model.starts[0])
+            again = reduced.simulate(test, model.starts[0])
+            where = f"{name} ({preset}, {policy}) on {model_name}"
+            shape = (len(test.times), len(model.coordinates))
+            assert first.coordinates.shape == shape, f"{where}: coordinates have a wrong shape"
+            assert first.outputs.shape == (shape[0], len(model.outputs)), f"{where}: wrong outputs"
+            assert first.status in ("ok", "diverged"), f"{where}: status {first.status!r}"
+            if first.status == "ok":
+                assert np.isfinite(first.coordinates).all(), f"{where}: ok, but not finite"
+            assert set(first.counts) == set(COUNTS), f"{where}: counts are incomplete"
+            same = np.array_equal(first.coordinates, again.coordinates, equal_nan=True)
+            assert same, f"{where}: two runs differ"
+            assert first.counts == again.counts, f"{where}: the counts of two runs differ"
+            assert reduced.effective_rank >= 0, f"{where}: negative rank"
+            assert reduced.offline.seconds >= 0.0, f"{where}: negative offline cost"

@@ -1,0 +1,51 @@
+"""Fixtures and settings that all tests share."""
+
+import os
+
+import hypothesis
+import matplotlib
+import numpy as np
+import pytest
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.trajectory import Trajectory
+
+matplotlib.use("Agg")
+
+# Timing decides nothing, so no example has a deadline; in CI every run tries the same examples.
+hypothesis.settings.register_profile("dev", deadline=None)
+hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
+IN_CI = os.environ.get("CI", "").lower() in ("1", "true", "yes")
+hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN_CI else "dev"))
+
+
+@pytest.fixture(scope="session")
+def model() -> AlgebraicModel:
+    """Double wishbone with its own parameters."""
+    return build("double_wishbone")
+
+
+@pytest.fixture(scope="session")
+def points(model: AlgebraicModel) -> dict[str, np.ndarray]:
+    """Hard points by name."""
+    return model.parameters.values()
+
+
+@pytest.fixture(scope="session")
+def nominal() -> Maneuver:
+    """The paper's wheel travel."""
+    return component("maneuver", "sine_travel")
+
+
+@pytest.fixture(scope="session")
+def full(model: AlgebraicModel, nominal: Maneuver) -> Trajectory:
+    """Full-order solution of the paper's wheel travel."""
+    return model.simulate(nominal)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers, the same in every run."""
+    return np.random.default_rng(20150301)

@@ -1,0 +1,1 @@
+"""Contracts that every registered component keeps, built in or plugged in."""

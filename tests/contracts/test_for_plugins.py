@@ -1,0 +1,63 @@
+"""The contracts that authors of plug-ins call: they pass what works and name what is broken."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from vehiclemor import contracts
+from vehiclemor.registry import component, names
+
+KINEMATIC = [name for name in names("model") if component("model", name).KIND == "ae"]
+
+
+@pytest.mark.parametrize("name", KINEMATIC)
+def test_registered_models_pass(name: str) -> None:
+    contracts.check_model(name)
+
+
+@pytest.mark.parametrize("model", KINEMATIC)
+@pytest.mark.parametrize("name", names("method"))
+def test_registered_methods_pass(model: str, name: str) -> None:
+    contracts.check_method(name, model)
+
+
+class Altered:
+    """The method `replay` whose trajectories are altered, each in another way."""
+
+    def __init__(self, alter) -> None:
+        self._method, self._alter, self._runs = component("method", "replay"), alter, 0
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._method, name)
+
+    def fit(self, *arguments: object) -> SimpleNamespace:
+        reduced = self._method.fit(*arguments)
+
+        def simulate(*arguments: object):
+            self._runs += 1
+            return self._alter(reduced.simulate(*arguments), self._runs)
+
+        return SimpleNamespace(simulate=simulate, effective_rank=0, offline=reduced.offline)
+
+
+@pytest.mark.parametrize(
+    ("alter", "message"),
+    [
+        (lambda run, _: replace(run, coordinates=run.coordinates[1:]), "wrong shape"),
+        (lambda run, k: replace(run, coordinates=run.coordinates + 1e-15 * k), "two runs differ"),
+        (lambda run, k: replace(run, counts=run.counts | {"iterations": k}), "counts of two runs"),
+        (lambda run, _: replace(run, counts={}), "counts are incomplete"),
+        (lambda run, _: replace(run, coordinates=run.coordinates * np.nan), "not finite"),
+        (lambda run, _: replace(run, status="fine"), "status 'fine'"),
+    ],
+)
+def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message: str) -> None:
+    monkeypatch.setattr(
+        contracts,
+        "component",
+        lambda kind, name: Altered(alter) if kind == "method" else component(kind, name),
+    )
+    with pytest.raises(AssertionError, match=message):
+        contracts.check_method("replay", KINEMATIC[0])

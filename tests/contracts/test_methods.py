@@ -1,0 +1,168 @@
+"""What every registered reduction method keeps, on every registered model that it accepts."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.settings import Setting, validated
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.registry import component, names
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.trajectory import COUNTS, STATUSES, Trajectory, trajectory_dataset
+
+METHODS = names("method")
+KINEMATIC = [name for name in names("model") if component("model", name).KIND == "ae"]
+PAIRS = [(model, method) for model in KINEMATIC for method in METHODS]
+
+
+class Pair:
+    """A method on a model: fits and runs it."""
+
+    def __init__(self, model: str, method: str) -> None:
+        self.model: AlgebraicModel = build(model)
+        self.name, self.method = method, component("method", method)
+        self.maneuver: Maneuver = component("maneuver", component("model", model).MANEUVER)
+
+    def fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:
+        differing = self.method.presets(self.model.name)[preset]
+        settings = validated(self.name, self.method.SETTINGS, {}, differing)
+        self.method.check(self.model, settings)
+        before = copy.deepcopy(settings)
+        start = self.model.starts[0]
+        runs = training_runs(self.model, self.maneuver, start, policy)
+        reduced = self.method.fit(self.model, runs, settings)
+        assert settings == before
+        return reduced
+
+    def run(self, reduced: ReducedModel, maneuver: Maneuver | None = None) -> Trajectory:
+        return reduced.simulate(maneuver or self.maneuver, self.model.starts[0])
+
+
+@pytest.fixture(scope="module", params=PAIRS, ids="-".join)
+def pair(request: pytest.FixtureRequest) -> Pair:
+    pair = Pair(*request.param)
+    accepted, reason = pair.method.accepts(pair.model)
+    if not accepted:
+        assert reason
+        assert "\n" not in reason
+        pytest.skip(reason)
+    return pair
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_method_describes_itself(name: str) -> None:
+    method: Method = component("method", name)
+    assert method.SUMMARY
+    assert "\n" not in method.SUMMARY
+    assert isinstance(method.REFERENCE, str)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_settings_are_documented_and_their_defaults_allowed(name: str) -> None:
+    method: Method = component("method", name)
+    for key, setting in method.SETTINGS.items():
+        assert key.isidentifier()
+        assert isinstance(setting, Setting)
+        assert setting.doc
+        assert "\n" not in setting.doc
+        assert setting.kind != "text" or not setting.choices or setting.default in setting.choices
+    defaults = validated(name, method.SETTINGS, {})
+    assert defaults == {key: setting.default for key, setting in method.SETTINGS.items()}
+
+
+@pytest.mark.parametrize(("model", "name"), PAIRS)
+def test_presets_are_valid(model: str, name: str) -> None:
+    method: Method = component("method", name)
+    presets = method.presets(model)
+    assert "recommended" in presets
+    for settings in presets.values():
+        complete = validated(name, method.SETTINGS, settings)
+        assert set(complete) == set(method.SETTINGS)
+
+
+def test_unknown_setting_is_refused(pair: Pair) -> None:
+    with pytest.raises(InputError, match="unknown setting"):
+        validated(pair.name, pair.method.SETTINGS, {"no_such_setting": 1})
+
+
+def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
+    for preset in pair.method.presets(pair.model.name):
+        run = pair.run(pair.fit(preset))
+        assert (run.status, run.message) == ("ok", "")
+        shape = (pair.maneuver.samples, len(pair.model.coordinates))
+        assert run.coordinates.shape == shape
+        assert run.outputs.shape == (shape[0], len(pair.model.outputs))
+        np.testing.assert_array_equal(run.time, pair.maneuver.times)
+        np.testing.assert_array_equal(run.inputs, pair.maneuver.at(pair.maneuver.times))
+        assert np.isfinite(run.coordinates).all()
+        assert np.isfinite(run.outputs).all()
+        # Outputs are those of the coordinates.
+        outputs = pair.model.outputs_at(run.coordinates, run.inputs)
+        np.testing.assert_array_equal(run.outputs, outputs)
+        assert set(run.counts) == set(COUNTS)
+        assert all(type(count) is int and count >= 0 for count in run.counts.values())
+        assert run.seconds >= 0.0
+
+
+def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
+    run, full = pair.run(pair.fit()), pair.model.simulate(pair.maneuver)
+    size = full.outputs.max(axis=0) - full.outputs.min(axis=0)
+    moving = size > 0.0
+    error = np.abs(run.outputs - full.outputs).max(axis=0)
+    assert np.all(error[moving] < 0.01 * size[moving])
+
+
+def test_runs_are_labelled(pair: Pair) -> None:
+    dataset = trajectory_dataset(pair.model, pair.run(pair.fit()))
+    assert tuple(dataset["coordinate"].values) == pair.model.coordinates
+    assert tuple(dataset["output"].values) == pair.model.outputs
+    assert tuple(dataset["input"].values) == pair.model.inputs
+
+
+def test_results_are_deterministic(pair: Pair) -> None:
+    reduced = pair.fit()
+    other = pair.maneuver.perturbed(0.9, 0.8)
+    first, _, again, refitted = (
+        pair.run(reduced),
+        pair.run(reduced, other),
+        pair.run(reduced),
+        pair.run(pair.fit()),
+    )
+    for run in (again, refitted):
+        np.testing.assert_array_equal(run.coordinates, first.coordinates)
+        np.testing.assert_array_equal(run.outputs, first.outputs)
+        assert (run.counts, run.status, run.message) == (first.counts, first.status, first.message)
+
+
+@pytest.mark.parametrize("factors", [(1.2, 1.0), (1.0, 1.2), (2.0, 0.5)])
+def test_untrained_inputs_give_a_result_or_say_why_not(
+    pair: Pair, factors: tuple[float, float]
+) -> None:
+    perturbed = pair.maneuver.perturbed(*factors)
+    run = pair.run(pair.fit(policy="nominal"), perturbed)
+    assert run.status in STATUSES
+    assert np.isfinite(run.outputs).all() == (run.status == "ok")
+    assert bool(run.message) == (run.status != "ok")
+    np.testing.assert_array_equal(run.inputs, perturbed.at(perturbed.times))
+
+
+def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
+    reduced, full = pair.fit(), pair.model.simulate(pair.maneuver)
+    assert 0 <= reduced.effective_rank <= len(pair.model.coordinates)
+    assert reduced.offline.seconds >= 0.0
+    assert reduced.offline.residual_evaluations >= 0
+    best = reduced.best_approximation(full.coordinates)
+    if best is not None:
+        assert best.shape == full.coordinates.shape
+        # A projection: what it gives is its own best approximation.
+        again = reduced.best_approximation(best)
+        np.testing.assert_allclose(again, best, rtol=0, atol=1e-12)
+
+
+def test_unknown_start_is_refused(pair: Pair) -> None:
+    with pytest.raises(InputError, match="unknown start"):
+        pair.fit().simulate(pair.maneuver, "upside_down")

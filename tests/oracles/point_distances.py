@@ -1,0 +1,123 @@
+"""The double wishbone as points at constant distances: no angles, no rotations.
+
+Unknown are the upper and lower ball joint and the outer tie-rod joint.  Rigid links keep distances;
+the wheel centre is a fixed combination of the carrier's two edges and their vector product.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy import optimize
+
+JOINTS = ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer")
+PIVOTS = (
+    (0, "upper_arm_front_pivot"),
+    (0, "upper_arm_rear_pivot"),
+    (1, "lower_arm_front_pivot"),
+    (1, "lower_arm_rear_pivot"),
+    (2, "tie_rod_inner"),
+)
+CARRIER = ((0, 1), (1, 2), (2, 0))
+
+
+class PointMechanism:
+    """Positions (9,) of the three joints, found by continuation from the design position."""
+
+    def __init__(self, points: Mapping[str, np.ndarray]) -> None:
+        self.points = points
+        self.design = np.concatenate([points[name] for name in JOINTS])
+        joints = self.design.reshape(3, 3)
+        self._links = [np.sum((joints[i] - points[name]) ** 2) for i, name in PIVOTS]
+        self._carrier = [np.sum((joints[a] - joints[b]) ** 2) for a, b in CARRIER]
+        lever = points["wheel_centre"] - joints[0]
+        self._combination = np.linalg.solve(edges(self.design), lever)
+
+    def wheel_centre(self, x: np.ndarray) -> np.ndarray:
+        """Position (3,) of the wheel centre."""
+        return x[:3] + edges(x) @ self._combination
+
+    def rotation(self, x: np.ndarray) -> np.ndarray:
+        """Rotation matrix of the carrier since the design position."""
+        return edges(x) @ np.linalg.inv(edges(self.design))
+
+    def closures(self, x: np.ndarray, rack: float) -> np.ndarray:
+        """Differences (8,) of squared distances to those of the design position."""
+        joints, moved = x.reshape(3, 3), dict(self.points)
+        moved["tie_rod_inner"] = moved["tie_rod_inner"] + [0.0, rack, 0.0]
+        links = [np.sum((joints[i] - moved[name]) ** 2) for i, name in PIVOTS]
+        carrier = [np.sum((joints[a] - joints[b]) ** 2) for a, b in CARRIER]
+        return np.concatenate(
+            [np.subtract(links, self._links), np.subtract(carrier, self._carrier)]
+        )
+
+    def height(self, x: np.ndarray) -> float:
+        """Height of the wheel centre above its design position."""
+        return self.wheel_centre(x)[2] - self.points["wheel_centre"][2]
+
+    def solve(self, near: np.ndarray, height: float, rack: float) -> np.ndarray:
+        """Joints at a height and rack displacement, near known ones."""
+        solution = optimize.root(
+            lambda x: np.append(self.closures(x, rack), self.height(x) - height), near, tol=1e-14
+        )
+        assert np.abs(solution.fun).max() < 1e-12
+        return solution.x
+
+    def path(self, heights: np.ndarray, rack: float) -> np.ndarray:
+        """Joints (heights, 9): first the rack moves, then the wheel from height to height."""
+        x = self.design
+        for step in np.linspace(0.0, rack, 5):
+            x = self.solve(x, 0.0, step)
+        found = []
+        for height in heights:
+            x = self.solve(x, height, rack)
+            found.append(x)
+        return np.array(found)
+
+    def extreme_height(self, direction: float, step: float = 0.01) -> float:
+        """Turning point of the height along the mechanism's curve, rack at 0.
+
+        The curve is followed along its arc length: nothing is singular at the turning point.
+        """
+        x, tangent = self.design, np.zeros(9)
+        tangent[2] = direction
+        while True:
+            tangent = self._tangent(x, tangent)
+            ahead = self._along(x, tangent, step)
+            if direction * self._slope(ahead, self._tangent(ahead, tangent)) < 0.0:
+                break
+            x = ahead
+
+        def slope(length: float) -> float:
+            at = self._along(x, tangent, length)
+            return self._slope(at, self._tangent(at, tangent))
+
+        length = optimize.brentq(slope, 0.0, step, xtol=1e-13)
+        return self.height(self._along(x, tangent, float(length)))
+
+    def _tangent(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
+        gradient = np.empty((8, 9))
+        for k in range(9):
+            # Squared distances are quadratic: central differences are exact but for rounding.
+            step = np.zeros(9)
+            step[k] = 0.5
+            gradient[:, k] = self.closures(x + step, 0.0) - self.closures(x - step, 0.0)
+        null = np.linalg.svd(gradient)[2][-1]
+        return null if null @ like > 0.0 else -null
+
+    def _along(self, x: np.ndarray, tangent: np.ndarray, length: float) -> np.ndarray:
+        def equations(y: np.ndarray) -> np.ndarray:
+            return np.append(self.closures(y, 0.0), tangent @ (y - x) - length)
+
+        solution = optimize.root(equations, x + length * tangent, tol=1e-14)
+        assert np.abs(solution.fun).max() < 1e-12
+        return solution.x
+
+    def _slope(self, x: np.ndarray, tangent: np.ndarray) -> float:
+        step = 1e-6
+        return (self.height(x + step * tangent) - self.height(x - step * tangent)) / (2.0 * step)
+
+
+def edges(x: np.ndarray) -> np.ndarray:
+    """Two edges of the carrier and their vector product, in columns; its hand never changes."""
+    first, second = x[3:6] - x[:3], x[6:] - x[:3]
+    return np.column_stack([first, second, np.cross(first, second)])

@@ -1,0 +1,54 @@
+"""Short ways to fit methods for the tests."""
+
+import numpy as np
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.metrics import rms
+from vehiclemor.reduction.interface import ReducedModel
+from vehiclemor.reduction.settings import validated
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.trajectory import Trajectory
+
+FIGURES = ("spindle_y", "second_euler_angle")
+
+
+def fitted(
+    model: AlgebraicModel,
+    maneuver: Maneuver,
+    method: str,
+    policy: str = "matched",
+    **settings: object,
+) -> ReducedModel:
+    """Reduced model by a registered method, its recommended preset and these settings."""
+    definition = component("method", method)
+    preset = definition.presets(model.name)["recommended"]
+    complete = validated(method, definition.SETTINGS, settings, preset)
+    definition.check(model, complete)
+    runs = training_runs(model, maneuver, model.starts[0], policy)
+    return definition.fit(model, runs, complete)
+
+
+def figure_errors(model: AlgebraicModel, outputs: np.ndarray, reference: Trajectory) -> np.ndarray:
+    """RMS errors (2,) of the paper's two figures: spindle y (m) and second Euler angle (rad)."""
+    columns = [model.outputs.index(name) for name in FIGURES]
+    return rms(outputs - reference.outputs)[columns]
+
+
+def floor_errors(model: AlgebraicModel, reduced: ReducedModel, reference: Trajectory) -> np.ndarray:
+    """The same of the best approximation in the reduced model's subspaces."""
+    best = reduced.best_approximation(reference.coordinates)
+    assert best is not None
+    return figure_errors(model, model.outputs_at(best, reference.inputs), reference)
+
+
+def two_way_travel() -> Maneuver:
+    """Travel that sweeps in frequency while the rack moves to both sides."""
+
+    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+        travel = 0.1 * np.sin(2.0 * np.pi * frequency * (0.1 + 0.015 * times) * times)
+        rack = 0.04 * np.sin(2.0 * np.pi * frequency * 0.17 * times)
+        return amplitude * np.column_stack([travel, rack])
+
+    return Maneuver("two_way", "", signal, ("z", "s0"), 10.0, 401, lambda _: ())

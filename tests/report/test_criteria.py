@@ -1,0 +1,123 @@
+"""Criteria for the paper's claims: each can be met and each can fail."""
+
+import numpy as np
+import pytest
+
+from vehiclemor.report.criteria import ANGLE, CRITERIA, DISPLACEMENT, VISIBLE
+from vehiclemor.report.published import load_published
+
+AT_R3 = {"method": "pod", "rank": 3}
+
+
+def changed(results, study, change):
+    """Results in which one study was changed."""
+    dataset = results[study].copy(deep=True)
+    change(dataset)
+    return {**results, study: dataset}
+
+
+def set_error(dataset, output, size, when=slice(None)):
+    """Give the reduced output an error of `size` times its range at the times `when`."""
+    place = {**AT_R3, "output": output}
+    exact = dataset["reference_outputs"].loc[place]
+    scale = float(dataset["signal_range"].loc[place].squeeze())
+    dataset["outputs"].loc[place] = exact
+    dataset["outputs"].loc[{**place, "time": when}] = exact.sel(time=when) + size * scale
+    dataset["max_error"].loc[place] = size * scale
+
+
+def exact_everywhere(dataset):
+    for output in (DISPLACEMENT, ANGLE):
+        set_error(dataset, output, 0.0)
+
+
+def wrong_angle(dataset):
+    set_error(dataset, ANGLE, 2.0 * VISIBLE)
+
+
+def wrong_displacement(dataset):
+    set_error(dataset, DISPLACEMENT, 2.0 * VISIBLE)
+
+
+def rising(factor):
+    def change(dataset):
+        distance = np.abs(dataset[factor] - 1.0)
+        dataset["rms_error"] = (dataset["rms_error"] * 0.0 + 1.0) * distance * 1e-3
+
+    return change
+
+
+def displacement_worse(dataset):
+    dataset["rms_error"].loc[{"output": DISPLACEMENT}] = 1.0
+
+
+def amplitude_worse(dataset):
+    dataset["rms_error"] = dataset["rms_error"] + 1.0
+
+
+def one_rounding_fails(dataset):
+    place = {"method": "pod_uncut", "rank": 6, "rounding_seed": 7, "output": ANGLE}
+    dataset["max_error"].loc[place] = 1.0
+
+
+def one_rounding_diverges(dataset):
+    place = {"method": "pod_uncut", "rank": 6, "rounding_seed": 7, "output": ANGLE}
+    dataset["max_error"].loc[place] = np.nan
+
+
+def early_error(dataset):
+    set_error(dataset, ANGLE, 2.0 * VISIBLE, when=slice(0.0, 1.0))
+
+
+def shorter_is_worse(dataset):
+    dataset["rms_error"].loc[{"control_period": 1.0}] = 1.0
+
+
+COUNTEREXAMPLES = [
+    ("dw_fig6_nearly_identical", "figures-6-7", wrong_angle),
+    ("dw_fig6_nearly_identical", "figures-6-7", wrong_displacement),
+    ("dw_fig11_displacement_unaffected", "figure-11", wrong_displacement),
+    ("dw_fig11_angle_diverges_at_end", "figure-11", exact_everywhere),
+    ("dw_fig11_angle_diverges_at_end", "figure-11", early_error),
+    ("dw_fig11_shorter_period_reduces_deviation", "figure-11-control-period", shorter_is_worse),
+    ("dw_fig12_no_divergence", "figure-12", wrong_angle),
+    ("dw_fig13_not_monotone_frequency", "figure-13-frequency", rising("frequency_factor")),
+    ("dw_fig13_not_monotone_amplitude", "figure-13-amplitude", rising("amplitude_factor")),
+    ("dw_fig13_angle_more_sensitive", "figure-13-frequency", displacement_worse),
+    ("dw_fig14_three_states_fail", "figure-14", exact_everywhere),
+    ("dw_fig14_six_states_follow", "figure-14-spread", one_rounding_fails),
+    ("dw_fig14_six_states_follow", "figure-14-spread", one_rounding_diverges),
+    ("dw_more_robust_to_amplitude", "figure-13-amplitude", amplitude_worse),
+]
+
+
+@pytest.mark.parametrize(("claim", "study", "change"), COUNTEREXAMPLES)
+def test_a_criterion_fails_on_a_counterexample(results, claim, study, change):
+    assert not CRITERIA[claim](changed(results, study, change), "pod").met
+
+
+def test_every_criterion_has_a_counterexample_and_a_claim():
+    assert set(CRITERIA) == {claim for claim, _, _ in COUNTEREXAMPLES}
+    assert set(CRITERIA) <= set(load_published().claims)
+
+
+def test_an_exact_model_meets_the_claims_of_agreement(results):
+    for study in ("figures-6-7", "figure-11", "figure-12"):
+        results = changed(results, study, exact_everywhere)
+    for claim in (
+        "dw_fig6_nearly_identical",
+        "dw_fig11_displacement_unaffected",
+        "dw_fig12_no_divergence",
+    ):
+        finding = CRITERIA[claim](results, "pod")
+        assert finding.met
+        assert finding.measured == 0.0
+
+
+def test_an_error_at_the_end_meets_the_claim_of_divergence(results):
+    def late(dataset):
+        set_error(dataset, ANGLE, 1.5 * VISIBLE, when=slice(9.5, 10.0))
+
+    finding = CRITERIA["dw_fig11_angle_diverges_at_end"](changed(results, "figure-11", late), "pod")
+    assert finding.met
+    assert finding.measured == pytest.approx(1.5 * VISIBLE)

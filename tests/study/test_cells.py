@@ -1,0 +1,121 @@
+"""Cells: identity follows from content, grids are complete, rows of a collection are all there."""
+
+import dataclasses
+
+import pytest
+
+from vehiclemor.errors import FileError, InputError, UnreachableError
+from vehiclemor.maneuvers import sine_travel
+from vehiclemor.simulation.algebraic import build
+from vehiclemor.study.cells import expand, make_cell
+from vehiclemor.study.combine import flattened
+from vehiclemor.study.definition import load_studies
+from vehiclemor.study.execution import compute_cell
+from vehiclemor.study.run import run_studies
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rank": 3})
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("frequency_factor", 1.0000001),
+        ("amplitude_factor", 0.9),
+        ("kernel", "another"),
+        ("code", "another"),
+        ("training", "nominal"),
+        ("settings", {"rank": 4}),
+        ("parameters", {}),
+        ("keep", "metrics"),
+    ],
+)
+def test_key_changes_with_all_that_determines_the_result(cell, field, value):
+    assert dataclasses.replace(cell, **{field: value}).key != cell.key
+
+
+def test_key_is_the_same_for_the_same_cell(cell):
+    again = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rank": 3})
+    assert again.key == cell.key
+
+
+def test_another_geometry_gives_another_key_and_result(cell):
+    moved = build("double_wishbone", overrides={"tie_rod_inner": [-0.2, 0.4921, -0.0962]})
+    other = make_cell(moved, sine_travel, "equilibrium", "full_order", {})
+    assert other.key != cell.key
+    dataset = compute_cell(other)
+    # The low-bump-steer tie rod of the source: toe within 0.06 deg over +-0.1 m.
+    assert float(abs(dataset["outputs"].sel(output="toe")).max()) < 0.06 * 3.15 / 180.0
+
+
+def test_a_method_that_a_setting_does_not_concern_is_computed_once():
+    grid = expand("figures-6-7", load_studies("figures-6-7")["figures-6-7"])
+    labels = grid.dimensions["method"]
+    assert len(grid.cells) == 2 * len(labels)
+    shared = {"full_order", "full_order_strongest", "replay"}
+    assert len(grid.unique) == len(shared) + 2 * (len(labels) - len(shared))
+
+
+def test_a_plug_in_error_spoils_only_its_cell(cell, monkeypatch):
+    from vehiclemor.reduction import pod
+
+    def broken(*_):
+        raise ZeroDivisionError("in a plug-in")
+
+    monkeypatch.setattr(pod, "fit", broken)
+    dataset = compute_cell(cell)
+    assert dataset["status"].item() == "error"
+    assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
+
+
+def test_divergence_is_a_result(cell):
+    singular = dataclasses.replace(cell, settings={**cell.settings, "tolerance": 1e-300})
+    dataset = compute_cell(singular)
+    assert dataset["status"].item() == "diverged"
+    assert "no convergence" in dataset["message"].item()
+
+
+def test_set_policy_needs_and_uses_its_factors():
+    model = build("double_wishbone")
+    with pytest.raises(InputError, match="training_set"):
+        make_cell(model, sine_travel, "equilibrium", "pod", {}, training="set")
+    errors = {}
+    for factors in (((1.0, 1.0),), ((1.0, 1.0), (1.2, 1.0))):
+        cell = make_cell(
+            model,
+            sine_travel.perturbed(1.2),
+            "equilibrium",
+            "pod",
+            {"rank": 4},
+            training="set",
+            training_set=factors,
+        )
+        errors[len(factors)] = float(compute_cell(cell)["rms_error"].sel(output="spindle_y"))
+    assert errors[2] < 0.5 * errors[1]
+
+
+def test_unreachable_training_set_is_named(cell):
+    with pytest.raises(UnreachableError, match="reachable range"):
+        build("double_wishbone").simulate(sine_travel.perturbed(1.0, 2.9))
+
+
+def test_collection_as_rows(tmp_path):
+    results = run_studies("figures-6-7", tmp_path) | run_studies("equation-order", tmp_path)
+    rows = flattened(results)
+    assert rows.sizes["cell"] == 2 * 6 + 25 * 3
+    assert set(rows["study"].values) == {"figures-6-7", "equation-order"}
+
+
+def test_every_shipped_study_expands():
+    for name, study in load_studies("paper").items():
+        assert expand(name, study).unique
+    grid = expand("perturbation-grid", load_studies("perturbation-grid")["perturbation-grid"])
+    assert len(grid.cells) == 21 * 21 * 4
+
+
+def test_wrong_study_names_the_study():
+    study = load_studies("figure-11")["figure-11"]
+    with pytest.raises(FileError, match="study mine: unknown model"):
+        expand("mine", study.model_copy(update={"model": "single_wishbone"}))

@@ -1,0 +1,106 @@
+"""A study killed half-way resumes to the same dataset; the number of processes changes nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from vehiclemor.study.run import run_studies
+from vehiclemor.study.store import TEMPORARY
+
+STUDY = """
+title = "for the tests"
+model = "double_wishbone"
+training = "nominal"
+
+[grid]
+frequency_factor = { first = 0.8, last = 1.4, count = 7 }
+amplitude_factor = [0.9, 1.0, 1.1, 3.0]
+rank = [2, 3]
+
+[[methods]]
+method = "full_order"
+
+[[methods]]
+method = "replay"
+
+[[methods]]
+method = "pod"
+"""
+TIMED = ["seconds", "offline_seconds"]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("study") / "small.toml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(study, tmp_path_factory) -> xr.Dataset:
+    folder = tmp_path_factory.mktemp("one")
+    return run_studies(str(study), folder, jobs=1)["small"]
+
+
+def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
+    xr.testing.assert_identical(one.drop_vars(TIMED), other.drop_vars(TIMED))
+
+
+def test_two_processes_give_the_same_dataset(study, uninterrupted, tmp_path):
+    assert_same(uninterrupted, run_studies(str(study), tmp_path, jobs=2)["small"])
+
+
+def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_path):
+    command = [sys.executable, "-m", "vehiclemor.cli", "run", str(study), "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True)
+    cells = tmp_path / "cells"
+    deadline = time.monotonic() + 120
+    while len(list(cells.glob("[!.]*.nc"))) < 20:
+        assert process.poll() is None, "the study ended before it could be killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    finished = {path.name: path.stat().st_mtime_ns for path in cells.glob("[!.]*.nc")}
+    (cells / f"{TEMPORARY}{process.pid}-left.nc").write_bytes(b"half a file")
+    resumed = run_studies(str(study), tmp_path)["small"]
+    assert 20 <= len(finished) < 140
+    for name, written in finished.items():
+        assert (cells / name).stat().st_mtime_ns == written, "a finished cell was computed again"
+    assert not list(cells.glob(f"{TEMPORARY}*"))
+    assert_same(uninterrupted, resumed)
+
+
+def test_unreachable_cells_are_results(uninterrupted):
+    status = uninterrupted["status"].sel(amplitude_factor=3.0)
+    assert (status == "unreachable").all()
+    messages = uninterrupted["message"].sel(amplitude_factor=3.0).values.ravel()
+    assert all("reachable range is -0.2146 to 0.2966 m" in message for message in messages)
+    reached = uninterrupted.sel(amplitude_factor=[0.9, 1.0, 1.1])
+    assert (reached["status"] == "ok").all()
+    assert np.isfinite(reached["rms_error"]).all()
+    assert np.isnan(uninterrupted["rms_error"].sel(amplitude_factor=3.0)).all()
+
+
+def test_dataset_is_labelled(uninterrupted):
+    for name in ("frequency_factor", "amplitude_factor", "method", "rank", "time", "output"):
+        assert name in uninterrupted.dims
+    for name, variable in uninterrupted.variables.items():
+        assert variable.attrs.get("long_name"), name
+    for name in ("rms_error", "seconds", "coordinates", "time", "largest_residual"):
+        assert uninterrupted[name].attrs["units"]
+    for name in ("title", "source", "versions", "machine", "configuration", "kernel_hash"):
+        assert uninterrupted.attrs[name]
+
+
+def test_stored_dataset_round_trips(study, tmp_path):
+    written = run_studies(str(study), tmp_path)["small"]
+    with xr.open_dataset(tmp_path / "studies" / "small.nc") as read:
+        xr.testing.assert_identical(written, read.load())

@@ -1,0 +1,60 @@
+"""Evaluation of tapes and generated sources, and random straight-line programs to try them on."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import mpmath as mp
+import numpy as np
+import sympy as sp
+
+from vehiclemor.codegen.emit import reference_source
+from vehiclemor.symbolic.program import Program
+from vehiclemor.symbolic.tape import Tape
+
+DIGITS = 30
+
+
+def inlined(expression: sp.Expr, tape: Tape) -> sp.Expr:
+    """The expression with every name of the tape replaced by what it stands for."""
+    for symbol, definition in reversed(tape.definitions.items()):
+        expression = expression.xreplace({symbol: definition})
+    return expression
+
+
+def precise(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, float]) -> np.ndarray:
+    """Expressions without names of a tape, evaluated at 30 digits and rounded once."""
+    with mp.workdps(DIGITS):
+        function = sp.lambdify(list(values), list(expressions), "mpmath")
+        return np.array([float(v) for v in function(*[mp.mpf(v) for v in values.values()])])
+
+
+def run(program: Program, name: str, values: Mapping[sp.Symbol, float]) -> np.ndarray:
+    """Result of one function of a program, from its reference source in plain Python."""
+    namespace: dict = {"math": math}
+    exec(reference_source(program), namespace)  # noqa: S102 - the package's own source
+    constants = np.full(len(program.constant_symbols), np.nan)
+    namespace["constants"](np.array([values[p] for p in program.parameters]), None, constants)
+    arguments = [np.array([values[s] for s in symbols]) for symbols in program.arguments.values()]
+    result = np.full(program.functions[name].shape, np.nan)
+    namespace[name](*arguments, constants, None, result)
+    return result
+
+
+def random_program(seed: int, symbols: Sequence[sp.Symbol], length: int = 14) -> tuple[Tape, list]:
+    """Tape of random operations, smooth everywhere, and its last three names."""
+    rng = np.random.default_rng(seed)
+    tape, known = Tape(), list(symbols)
+    while len(tape.definitions) < length:
+        a, b = (known[int(k)] for k in rng.integers(len(known), size=2))
+        choices = [
+            a * b,
+            a - 2 * b,
+            sp.sin(a),
+            sp.cos(a) + b,
+            sp.sqrt(1 + a * a),
+            a / (2 + sp.cos(b)),
+            sp.atan2(a, 3 + b * b),
+            1 / (1 + a**2),
+        ]
+        known.append(tape.let(choices[int(rng.integers(len(choices)))]))
+    return tape, known[-3:]

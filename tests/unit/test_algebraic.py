@@ -1,0 +1,183 @@
+"""Full-order solvers: accuracy, counts, branch safety, and errors that name what is reachable."""
+
+import numpy as np
+import pytest
+
+from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.trajectory import Trajectory
+
+JUMPS = pytest.mark.xfail(
+    strict=True, reason="the extrapolation leaves the branch: whole turns off"
+)
+
+
+def test_reach_is_that_of_the_specification(model: AlgebraicModel) -> None:
+    assert model.reach() == pytest.approx((-0.2145, 0.2965), abs=1e-3)
+
+
+def test_limits_of_reach_can_be_reached(model: AlgebraicModel) -> None:
+    for limit in model.reach():
+        q = model.solve([limit, 0.0])
+        assert np.abs(model.residual(q, [limit, 0.0])).max() < 1e-12
+
+
+@pytest.mark.parametrize("height", [-0.2147, 0.2967, -3.0, 1e9])
+def test_height_out_of_reach_names_both_limits(model: AlgebraicModel, height: float) -> None:
+    with pytest.raises(UnreachableError) as error:
+        model.solve([height, 0.0])
+    message = str(error.value)
+    assert "\n" not in message
+    assert f"{height:.4f}" in message
+    assert "-0.2146 to 0.2966 m" in message
+
+
+def test_time_of_an_unreachable_height_is_named(model: AlgebraicModel, nominal: Maneuver) -> None:
+    with pytest.raises(UnreachableError, match=r"at t = 7\.\d+ s"):
+        model.simulate(nominal.perturbed(amplitude=2.2))
+
+
+def test_reach_depends_on_the_rack(model: AlgebraicModel) -> None:
+    # At the lower limit it is the tie rod that stops the wheel.
+    (straight, _), (steered, _) = model.reach(0.0), model.reach(-0.05)
+    assert steered > straight + 1e-3
+    between = (steered + straight) / 2.0
+    model.solve([between, 0.0])
+    with pytest.raises(UnreachableError, match=r"rack at -0\.05 m"):
+        model.solve([between, -0.05])
+
+
+@pytest.mark.xfail(strict=True, reason="an unreachable rack counts as reachable at height 0")
+def test_rack_out_of_reach_is_unreachable(model: AlgebraicModel) -> None:
+    with pytest.raises(UnreachableError):
+        model.solve([0.0, 0.5])
+
+
+@pytest.mark.xfail(strict=True, reason="all heights are compared with the limits at extreme racks")
+def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: AlgebraicModel) -> None:
+    low = (model.reach(0.0)[0] + model.reach(-0.05)[0]) / 2.0
+    times = np.linspace(0.0, 1.0, 201)
+    heights = low * np.sin(np.pi * np.minimum(2.0 * times, 1.0))
+    racks = -0.05 * np.maximum(2.0 * times - 1.0, 0.0)
+    assert model.solve_path(times, np.column_stack([heights, racks])).status == "ok"
+
+
+@pytest.mark.parametrize(
+    ("solver", "share"),
+    [
+        ("newton", 0.99),
+        ("newton_dense", 0.99),
+        pytest.param("chord", 0.6, marks=JUMPS),
+    ],
+)
+def test_sudden_jumps_of_the_input_stay_on_the_branch(
+    model: AlgebraicModel, solver: str, share: float
+) -> None:
+    low, high = model.reach()
+    stops = share * np.array([high, low, high, 0.0])
+    inputs = np.column_stack([stops, np.zeros(4)])
+    jumps = model.solve_path(np.arange(4.0), inputs, solver).coordinates
+    for stop, q in zip(stops, jumps, strict=True):
+        way = np.column_stack([np.linspace(0.0, stop, 2001), np.zeros(2001)])
+        slow = model.solve_path(np.arange(2001.0), way).coordinates[-1]
+        np.testing.assert_allclose(q, slow, rtol=0, atol=1e-9)
+
+
+def test_result_does_not_depend_on_the_sampling(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    coarse = model.simulate(nominal, nominal.times[::50])
+    np.testing.assert_allclose(coarse.coordinates, full.coordinates[::50], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(coarse.outputs, full.outputs[::50], rtol=0, atol=1e-13)
+
+
+def test_newton_converges_quadratically(full: Trajectory) -> None:
+    counts = full.counts
+    # Three iterations a sample, the last of which only confirms.
+    assert 2 * 1001 <= counts["iterations"] <= 3 * 1001 + 10
+    assert counts["iterations"] == counts["residual_evaluations"] == counts["linear_solves"]
+    assert counts["iterations"] == counts["jacobian_evaluations"]
+
+
+def test_dense_elimination_gives_the_same_iterates(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    dense = model.simulate(nominal, solver="newton_dense")
+    np.testing.assert_allclose(dense.coordinates, full.coordinates, rtol=0, atol=1e-13)
+    assert dense.counts == full.counts
+
+
+def test_chord_solver_needs_one_residual_a_sample(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    chord = model.simulate(nominal, solver="chord", tolerance=1e-6)
+    assert np.abs(chord.coordinates - full.coordinates).max() < 3e-8
+    assert 1001 <= chord.counts["residual_evaluations"] <= 1.02 * 1001
+    assert chord.counts["jacobian_evaluations"] == 1
+    exact = model.simulate(nominal, solver="chord", tolerance=1e-12)
+    assert np.abs(exact.coordinates - full.coordinates).max() < 1e-11
+
+
+def test_runs_are_bitwise_repeatable(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    again = build("double_wishbone").simulate(nominal)
+    np.testing.assert_array_equal(again.coordinates, full.coordinates)
+    np.testing.assert_array_equal(again.outputs, full.outputs)
+    assert again.counts == full.counts
+
+
+def test_input_that_is_not_finite_is_named(model: AlgebraicModel) -> None:
+    inputs = np.array([[0.0, 0.0], [0.1, np.nan]])
+    with pytest.raises(InputError, match=r"input s0 is not finite at t = 0\.5 s"):
+        model.solve_path(np.array([0.0, 0.5]), inputs)
+
+
+@pytest.mark.parametrize(
+    ("q", "u", "message"),
+    [
+        (np.zeros(7), np.zeros(2), r"q has shape \(7,\), double_wishbone needs \(8,\)"),
+        (np.zeros(8), np.zeros(3), r"u has shape \(3,\), double_wishbone needs \(2,\)"),
+        (np.full(8, np.inf), np.zeros(2), r"q\[0\] is not finite"),
+        (np.zeros(8), np.array([0.0, np.nan]), r"u\[1\] is not finite"),
+    ],
+)
+def test_wrong_arguments_are_one_line(
+    model: AlgebraicModel, q: np.ndarray, u: np.ndarray, message: str
+) -> None:
+    for function in (model.residual, model.jacobian, model.newton_step):
+        with pytest.raises(InputError, match=message):
+            function(q, u)
+
+
+def test_strided_arguments_are_read_rightly(
+    model: AlgebraicModel, rng: np.random.Generator
+) -> None:
+    table, u = rng.uniform(-0.5, 0.5, (8, 3)), [0.05, 0.0]
+    column = table[:, 1]
+    assert not column.flags.c_contiguous
+    np.testing.assert_array_equal(model.residual(column, u), model.residual(column.copy(), u))
+    np.testing.assert_array_equal(model.residual(list(column), u), model.residual(column, u))
+
+
+def test_unknown_solver_and_start_name_the_known_ones(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    with pytest.raises(InputError, match=r"unknown solver 'chrod'; did you mean chord\?"):
+        model.simulate(nominal, solver="chrod")
+    with pytest.raises(InputError, match="unknown start 'dropped'; double_wishbone has"):
+        model.start("dropped")
+
+
+def test_maneuver_for_other_inputs_is_refused(model: AlgebraicModel) -> None:
+    steering = Maneuver(
+        "steer", "", lambda t, *_: np.zeros((len(t), 1)), ("delta",), 1.0, 11, lambda _: ()
+    )
+    with pytest.raises(InputError, match="gives inputs delta, double_wishbone needs z, s0"):
+        model.simulate(steering)
+
+
+def test_changing_a_start_does_not_change_the_model(model: AlgebraicModel) -> None:
+    model.start(model.starts[0])[:] = 99.0
+    assert np.abs(model.design).max() < 1.0

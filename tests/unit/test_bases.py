@@ -1,0 +1,104 @@
+"""POD bases are orthonormal, best, and independent of how their columns are signed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vehiclemor.reduction.bases import Basis, pod_basis, project
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import AlgebraicModel
+
+
+def snapshots_of(seed: int, n: int = 8, m: int = 12, decay: float = 0.3) -> np.ndarray:
+    """Snapshots (n, m) with a mean and decreasing singular values."""
+    rng = np.random.default_rng(seed)
+    left, right = (np.linalg.qr(rng.standard_normal((k, min(n, m))))[0] for k in (n, m))
+    return rng.standard_normal((n, 1)) + left * decay ** np.arange(min(n, m)) @ right.T
+
+
+@given(seed=st.integers(0, 10**6), n=st.integers(2, 10), m=st.integers(2, 14), data=st.data())
+def test_basis_is_orthonormal_and_projection_idempotent(
+    seed: int, n: int, m: int, data: st.DataObject
+) -> None:
+    rank = data.draw(st.integers(1, min(n, m)))
+    basis = pod_basis(snapshots_of(seed, n, m), rank)
+    assert basis.rank == rank
+    assert basis.vectors.T @ basis.vectors == pytest.approx(np.eye(rank), abs=1e-13)
+    points = np.random.default_rng(seed + 1).standard_normal((5, n))
+    once = project(points, basis)
+    assert project(once, basis) == pytest.approx(once, abs=1e-12)
+    # The error is perpendicular to the subspace: nothing in it is nearer.
+    assert (points - once) @ basis.vectors == pytest.approx(np.zeros((5, rank)), abs=1e-12)
+    assert project(basis.mean[None, :], basis) == pytest.approx(basis.mean[None, :], abs=1e-15)
+
+
+@given(seed=st.integers(0, 10**6), rank=st.integers(1, 8))
+def test_error_of_the_snapshots_is_the_tail_of_the_singular_values(seed: int, rank: int) -> None:
+    snapshots = snapshots_of(seed)
+    basis = pod_basis(snapshots, rank)
+    error = np.sum((project(snapshots.T, basis).T - snapshots) ** 2)
+    assert error == pytest.approx(np.sum(basis.singular_values[rank:] ** 2), rel=1e-9, abs=1e-28)
+
+
+@given(seed=st.integers(0, 10**6), rank=st.integers(1, 7))
+def test_no_other_subspace_is_better(seed: int, rank: int) -> None:
+    snapshots, rng = snapshots_of(seed), np.random.default_rng(seed)
+    basis = pod_basis(snapshots, rank)
+    nearby = basis.vectors + 1e-2 * rng.standard_normal(basis.vectors.shape)
+    other = Basis(basis.mean + 1e-2 * rng.standard_normal(8), np.linalg.qr(nearby)[0], np.zeros(8))
+    best, error = (np.sum((project(snapshots.T, b).T - snapshots) ** 2) for b in (basis, other))
+    assert best <= error
+
+
+def test_mean_and_singular_values_are_those_of_the_snapshots() -> None:
+    snapshots = snapshots_of(3)
+    basis = pod_basis(snapshots, 4)
+    assert basis.mean == pytest.approx(snapshots.mean(axis=1), abs=1e-15)
+    centred = snapshots - snapshots.mean(axis=1, keepdims=True)
+    eigenvalues = np.linalg.eigvalsh(centred @ centred.T)[::-1]
+    assert basis.singular_values**2 == pytest.approx(np.maximum(eigenvalues, 0.0), abs=1e-14)
+    assert np.all(np.diff(basis.singular_values) <= 0.0)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_signs_of_the_columns_are_fixed(seed: int) -> None:
+    snapshots = snapshots_of(seed)
+    vectors = pod_basis(snapshots, 5).vectors
+    largest = np.abs(vectors).argmax(axis=0)
+    assert np.all(vectors[largest, np.arange(5)] > 0.0)
+    # Mirrored snapshots have the same directions.
+    assert pod_basis(-snapshots, 5).vectors == pytest.approx(vectors, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "kept"), [(0.0, 6), (1e-8, 6), (2e-3, 3), (0.05, 2), (0.5, 1)]
+)
+def test_rank_tolerance_drops_small_modes(tolerance: float, kept: int) -> None:
+    rng = np.random.default_rng(0)
+    left, right = (np.linalg.qr(rng.standard_normal((k, 6)))[0] for k in (8, 12))
+    right -= right.mean(axis=0)
+    snapshots = left * 0.1 ** np.arange(6) @ np.linalg.qr(right)[0].T
+    basis = pod_basis(snapshots, 6, tolerance)
+    assert basis.rank == kept
+    assert len(basis.singular_values) == 8
+
+
+def test_rank_tolerance_never_adds_modes() -> None:
+    assert pod_basis(snapshots_of(1), 2, 1e-12).rank == 2
+
+
+def test_snapshots_that_do_not_move_have_no_mode_above_a_tolerance() -> None:
+    snapshots = np.outer(np.arange(1.0, 9.0), np.ones(10))
+    basis = pod_basis(snapshots, 3, 1e-10)
+    assert basis.rank == 0
+    assert project(np.ones((2, 8)), basis) == pytest.approx(np.tile(basis.mean, (2, 1)))
+
+
+def test_half_a_sine_has_four_directions(model: AlgebraicModel) -> None:
+    # Ten equidistant snapshots of half a sine hold five heights: four directions about their mean.
+    run = model.simulate(component("maneuver", "sine_travel"), np.linspace(0.0, 5.0, 10))
+    values = pod_basis(run.coordinates.T, 8).singular_values
+    assert values[3] > 1e-6 * values[0]
+    assert values[4] < 1e-14 * values[0]
+    assert values[:4] == pytest.approx([0.67, 1.06e-2, 2.6e-4, 8.9e-6], rel=0.02)

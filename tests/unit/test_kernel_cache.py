@@ -1,0 +1,107 @@
+"""Compiled kernels are kept by content: a second process compiles nothing, new source is new."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vehiclemor.codegen import cache
+from vehiclemor.codegen.link import linked_source
+from vehiclemor.simulation import newton_loops
+
+SIMULATE = """
+import json
+from vehiclemor.registry import component
+from vehiclemor.simulation.algebraic import build
+
+model = build("double_wishbone")
+run = model.simulate(component("maneuver", "sine_travel"))
+used = {
+    name: [sum(d.stats.cache_hits.values()), sum(d.stats.cache_misses.values())]
+    for name, d in vars(model.kernels).items()
+    if getattr(d, "signatures", None)
+}
+print(json.dumps([used, model.kernels.__file__, run.coordinates[250].tolist()]))
+"""
+
+
+def test_second_process_compiles_nothing(tmp_path: Path) -> None:
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
+    environment["VEHICLEMOR_CACHE"] = str(tmp_path)
+
+    def process() -> tuple[dict[str, list[int]], Path, list[float]]:
+        done = subprocess.run(
+            [sys.executable, "-c", SIMULATE],
+            env=environment,
+            cwd=tmp_path,
+            check=False,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        used, path, state = json.loads(done.stdout)
+        return used, Path(path), state
+
+    first, source, cold = process()
+    assert first["newton_path"] == [0, 1]
+    written = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+    second, same, warm = process()
+    assert {"newton_path", "residual", "residual_jacobian", "constants"} <= set(second)
+    for name, (hits, misses) in second.items():
+        assert hits > 0, name
+        assert misses == 0, name
+    assert same == source
+    assert tmp_path in source.parents
+    assert warm == cold
+    # Nothing was written again, and no half-written file is left.
+    assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*") if p.is_file()} == written
+    assert not [path for path in written if path.suffix == ".tmp"]
+
+
+def test_hash_follows_source_and_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    digest = cache.kernel_hash("x = 1\n")
+    assert digest == cache.kernel_hash("x = 1\n")
+    assert digest != cache.kernel_hash("x = 2\n")
+    for package in cache.COMPILER_PACKAGES:
+        with monkeypatch.context() as patch:
+            patch.setattr(cache, "version", lambda name, package=package: f"{name == package}")
+            changed = cache.kernel_hash("x = 1\n")
+            patch.setattr(cache, "version", lambda _: "False")
+            assert changed != cache.kernel_hash("x = 1\n")
+    monkeypatch.setattr(cache.platform, "python_version", lambda: "9.9.9")
+    assert digest != cache.kernel_hash("x = 1\n")
+
+
+def test_changed_source_is_another_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path))
+    old = cache.load_module("toy", "VALUE = 1\n")
+    new = cache.load_module("toy", "VALUE = 2\n")
+    assert (old.VALUE, new.VALUE) == (1, 2)
+    assert cache.load_module("toy", "VALUE = 1\n") is old
+    assert Path(old.__file__).read_text() == "VALUE = 1\n"
+
+
+def test_changed_loop_or_size_changes_the_source() -> None:
+    kernels = "def residual(q, result):\n    result[0] = q[0]\n"
+    source = linked_source(kernels, [newton_loops], {"N": 1}, "a test")
+    assert source == linked_source(kernels, [newton_loops], {"N": 1}, "a test")
+    for other in (
+        linked_source(kernels.replace("q[0]", "2.0*q[0]"), [newton_loops], {"N": 1}, "a test"),
+        linked_source(kernels, [newton_loops], {"N": 2}, "a test"),
+        linked_source(kernels, [], {"N": 1}, "a test"),
+    ):
+        assert cache.kernel_hash(other) != cache.kernel_hash(source)
+
+
+def test_cache_folder_that_cannot_be_written_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "file" / "below"))
+    monkeypatch.setattr(cache.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    folder = cache.cache_folder()
+    assert folder.is_dir()
+    assert folder.is_relative_to(tmp_path / "temporary")

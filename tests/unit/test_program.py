@@ -1,0 +1,98 @@
+"""Optimised programs keep their values, and evaluate parameter terms once."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from tests.unit.programs import inlined, precise, random_program, run
+from vehiclemor.codegen.emit import operation_counts, reference_source
+from vehiclemor.symbolic.program import Program, assemble
+from vehiclemor.symbolic.tape import Tape
+
+x, y = sp.symbols("x y", real=True)
+p, r = sp.symbols("p r", real=True)
+
+
+def assembled(expression: sp.Expr) -> Program:
+    return assemble(Tape(), {"q": [x, y]}, [p, r], {"f": ([expression], (1,))})
+
+
+DIVISION = pytest.mark.xfail(strict=True, reason="the quotient a/b**2 is printed as a/b*b")
+
+
+@pytest.mark.parametrize(
+    "seed", [4, 6, 7, *(pytest.param(seed, marks=DIVISION) for seed in (0, 1, 2, 3, 5))]
+)
+def test_program_keeps_the_value_of_every_function(seed: int) -> None:
+    tape, results = random_program(seed, (x, y, p, r), length=20)
+    jacobian = [e for row in tape.jacobian(results, (x, y)) for e in row]
+    program = assemble(
+        tape, {"q": [x], "u": [y]}, [p, r], {"f": (results, (3,)), "g": (jacobian, (3, 2))}
+    )
+    at = dict(zip((x, y, p, r), np.random.default_rng(seed).uniform(-1.2, 1.2, 4), strict=True))
+    for name, expressions in (("f", results), ("g", jacobian)):
+        direct = precise([inlined(e, tape) for e in expressions], at)
+        np.testing.assert_allclose(run(program, name, at).ravel(), direct, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("expression", "left"),
+    [
+        (sp.sin(p) * sp.cos(r) * x + sp.sqrt(p) * r + 1, {"multiply": 1, "add": 1}),
+        ((p * r + 2) * x * y, {"multiply": 2}),
+        (x + p + r, {"add": 1}),
+        (x / (p * p + r), {"multiply": 1}),
+        (sp.sin(p + r) ** 2, {}),
+        (2 * x + p, {"multiply": 1, "add": 1}),
+    ],
+)
+def test_parameter_terms_are_hoisted(expression: sp.Expr, left: dict[str, int]) -> None:
+    program = assembled(expression)
+    counts = operation_counts(reference_source(program))["f"]
+    assert {kind: n for kind, n in counts.items() if n and kind != "total"} == left
+    at = {x: 0.7, y: -1.3, p: 0.4, r: 1.9}
+    assert run(program, "f", at)[0] == pytest.approx(precise([expression], at)[0], rel=1e-14)
+
+
+def test_constants_depend_on_parameters_alone() -> None:
+    program = assembled(sp.sin(p * r) * sp.cos(x * p) * sp.exp(r) + sp.log(p) * y)
+    known = {p, r}
+    for symbol, expression in program.constants.assignments:
+        assert expression.free_symbols <= known
+        known.add(symbol)
+    assert set(program.constants.results) == set(program.constant_symbols) <= known
+
+
+def test_each_function_holds_what_it_needs_and_no_more() -> None:
+    tape = Tape()
+    shared, alone = tape.let(x * y), tape.let(sp.sin(x))
+    tape.let(sp.exp(x))
+    program = assemble(
+        tape,
+        {"q": [x, y]},
+        [p],
+        {"f": ([shared + p], (1,)), "g": ([shared * alone], (1,))},
+    )
+    for function in program.functions.values():
+        known, needed = {x, y, *program.constant_symbols}, set()
+        for symbol, expression in function.assignments:
+            assert expression.free_symbols <= known
+            known.add(symbol)
+        for expression in [e for _, e in function.assignments] + list(function.results):
+            needed |= expression.free_symbols
+        assert {symbol for symbol, _ in function.assignments} <= needed
+        assert not any(e.has(sp.exp) for _, e in function.assignments)
+
+
+def test_common_subexpressions_are_evaluated_once() -> None:
+    tape = Tape()
+    first, second = tape.let((x * y + 1) * x), tape.let((x * y + 1) * y)
+    program = assemble(tape, {"q": [x, y]}, [p], {"f": ([first, second, p], (3,))})
+    counts = operation_counts(reference_source(program))["f"]
+    assert (counts["multiply"], counts["add"]) == (3, 1)
+
+
+@pytest.mark.xfail(strict=True, reason="an empty function `constants` has no body")
+def test_program_without_hoisted_constants_has_a_valid_source() -> None:
+    program = assemble(Tape(), {"q": [x, y]}, [p], {"f": ([x * y], (1,))})
+    assert run(program, "f", {x: 2.0, y: 3.0, p: 1.0})[0] == 6.0

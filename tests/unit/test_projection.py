@@ -1,0 +1,211 @@
+"""Reduced equations against NumPy: order and signs of equations, signs of coordinates, restarts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.oracles.projection import reduced_path
+from tests.reducing import figure_errors, fitted
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.bases import Basis, pod_basis
+from vehiclemor.reduction.projected import ProjectedModel
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.trajectory import Trajectory
+
+# The paper's two control periods on 1001 samples.
+WINDOWS = (range(500), range(500, 1001))
+
+
+def subspaces(reduced: ProjectedModel) -> list[tuple[np.ndarray, np.ndarray]]:
+    return [(basis.mean, basis.vectors) for basis in reduced.bases]
+
+
+def signed_permutation(rng: np.random.Generator) -> np.ndarray:
+    return rng.choice([-1.0, 1.0], 8)[:, None] * np.eye(8)[rng.permutation(8)]
+
+
+def by_numpy(
+    model: AlgebraicModel,
+    reduced: ProjectedModel,
+    inputs: np.ndarray,
+    equations: np.ndarray,
+    **settings: object,
+) -> np.ndarray:
+    """Path on the same subspaces, with the equations put in another order and with other signs."""
+    path, _ = reduced_path(
+        lambda q, u: equations @ model.residual(q, u),
+        lambda q, u: equations @ model.jacobian(q, u),
+        subspaces(reduced),
+        WINDOWS,
+        inputs,
+        model.design,
+        **settings,
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def least_squares(model: AlgebraicModel, nominal: Maneuver) -> ProjectedModel:
+    return fitted(model, nominal, "pod", rank=3)
+
+
+@pytest.fixture(scope="module")
+def galerkin(model: AlgebraicModel, nominal: Maneuver) -> ProjectedModel:
+    return fitted(model, nominal, "pod", rank=3, test_space="galerkin")
+
+
+def test_least_squares_ignores_order_and_signs_of_the_equations(
+    model: AlgebraicModel,
+    nominal: Maneuver,
+    full: Trajectory,
+    least_squares: ProjectedModel,
+    rng: np.random.Generator,
+) -> None:
+    found = least_squares.simulate(nominal, model.starts[0]).coordinates
+    for equations in (np.eye(8), signed_permutation(rng)):
+        other = by_numpy(model, least_squares, full.inputs, equations)
+        np.testing.assert_allclose(found, other, rtol=0, atol=1e-11)
+
+
+def test_galerkin_depends_on_order_and_signs_of_the_equations(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, galerkin: ProjectedModel
+) -> None:
+    found = galerkin.simulate(nominal, model.starts[0])
+    other = by_numpy(model, galerkin, full.inputs, np.eye(8), galerkin=True)
+    np.testing.assert_allclose(found.coordinates, other, rtol=0, atol=1e-11)
+    # Only the closures of the tie rod are counted the other way round.
+    reversed_rod = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+    other = by_numpy(model, galerkin, full.inputs, reversed_rod, galerkin=True)
+    changed = figure_errors(model, model.outputs_at(other, full.inputs), full)
+    kept = figure_errors(model, found.outputs, full)
+    assert np.any(np.maximum(changed / kept, kept / changed) > 1.5)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_equation_seed_permutes_and_signs_the_equations(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, seed: int
+) -> None:
+    settings = {"test_space": "galerkin", "equation_seed": seed}
+    whole = fitted(model, nominal, "pod", rank=8, rank_tolerance=0.0, **settings)
+    # W = D^T U with an orthogonal U: D = U W^T must be a signed permutation.
+    equations = whole.bases[0].vectors @ whole.tests[0].T
+    np.testing.assert_allclose(np.abs(equations).sum(axis=0), 1.0, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.abs(equations).max(axis=1), 1.0, rtol=0, atol=1e-12)
+    assert np.abs(equations - np.eye(8)).max() > 0.5
+
+    reduced = fitted(model, nominal, "pod", rank=3, **settings)
+    run = reduced.simulate(nominal, model.starts[0])
+    other = by_numpy(model, reduced, full.inputs, np.round(equations), galerkin=True)
+    assert run.status == "ok"
+    np.testing.assert_allclose(run.coordinates, other, rtol=0, atol=1e-10)
+
+
+def test_settings_of_galerkin_do_not_touch_least_squares(
+    model: AlgebraicModel, nominal: Maneuver, least_squares: ProjectedModel
+) -> None:
+    plain = least_squares.simulate(nominal, model.starts[0]).coordinates
+    other = fitted(model, nominal, "pod", rank=3, equation_seed=3, reversed_coordinates="theta_u")
+    np.testing.assert_array_equal(other.simulate(nominal, model.starts[0]).coordinates, plain)
+
+
+def test_reversed_coordinates_equal_a_model_in_these_coordinates(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    names = ("theta_u", "theta_l")
+    signs = np.diag([-1.0 if name in names else 1.0 for name in model.coordinates])
+    reduced = fitted(
+        model, nominal, "pod", rank=3, test_space="galerkin", reversed_coordinates=",".join(names)
+    )
+    run = reduced.simulate(nominal, model.starts[0])
+
+    # The same model in coordinates p = S q: other snapshots and bases, U^T Phi(S p) = 0.
+    bases = []
+    for begin in (0.0, 5.0):
+        snapshots = model.simulate(nominal, np.linspace(begin, begin + 5.0, 10)).coordinates
+        bases.append(pod_basis(signs @ snapshots.T, 3))
+    path, _ = reduced_path(
+        lambda p, u: model.residual(signs @ p, u),
+        lambda p, u: model.jacobian(signs @ p, u) @ signs,
+        [(basis.mean, basis.vectors) for basis in bases],
+        WINDOWS,
+        full.inputs,
+        signs @ model.design,
+        galerkin=True,
+    )
+    np.testing.assert_allclose(run.coordinates, path @ signs, rtol=0, atol=1e-11)
+
+
+def test_the_wide_spread_of_galerkin(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    angles = []
+    for seed in range(1, 13):
+        reduced = fitted(model, nominal, "pod", rank=3, test_space="galerkin", equation_seed=seed)
+        run = reduced.simulate(nominal, model.starts[0])
+        if run.status == "ok":
+            angles.append(figure_errors(model, run.outputs, full)[1])
+    assert max(angles) > 30.0 * min(angles)
+
+
+def test_each_window_starts_at_the_projection_of_the_last_sample(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: ProjectedModel
+) -> None:
+    # With a coarse tolerance every sample gets one iteration, and the start decides the result.
+    coarse = replace(least_squares, tolerance=1.0).simulate(nominal, model.starts[0])
+    assert set(coarse.counts.values()) == {1001}
+    other = by_numpy(model, least_squares, full.inputs, np.eye(8), tolerance=1.0)
+    np.testing.assert_allclose(coarse.coordinates, other, rtol=0, atol=1e-12)
+    converged = least_squares.simulate(nominal, model.starts[0]).coordinates
+    assert np.abs(coarse.coordinates - converged).max() > 1e-9
+
+
+def test_restart_in_the_same_subspace_changes_nothing(
+    model: AlgebraicModel, nominal: Maneuver, least_squares: ProjectedModel
+) -> None:
+    basis = least_squares.bases[0]
+    whole = replace(least_squares, edges=np.array([0.0, 10.0]), bases=(basis,))
+    parts = replace(least_squares, edges=np.linspace(0.0, 10.0, 8), bases=(basis,) * 7)
+    runs = [m.simulate(nominal, model.starts[0]) for m in (whole, parts)]
+    np.testing.assert_allclose(runs[0].coordinates, runs[1].coordinates, rtol=0, atol=1e-12)
+
+
+def test_path_is_continuous_where_a_window_begins(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: ProjectedModel
+) -> None:
+    run = least_squares.simulate(nominal, model.starts[0]).coordinates
+    error = np.abs(run - full.coordinates).max(axis=1)
+    jump = np.abs(np.diff(run - full.coordinates, axis=0)).max(axis=1)
+    # The error may jump to that of the next subspace, but no farther than errors are large.
+    assert jump[499] <= error[499] + error[500]
+    assert error[498:502].max() <= error.max() < 1e-4
+
+
+def test_every_sample_lies_in_the_subspace_of_its_window(
+    model: AlgebraicModel, nominal: Maneuver, least_squares: ProjectedModel
+) -> None:
+    run = least_squares.simulate(nominal, model.starts[0]).coordinates
+    for (mean, vectors), samples in zip(subspaces(least_squares), WINDOWS, strict=True):
+        part = run[samples.start : samples.stop] - mean
+        np.testing.assert_allclose(part @ vectors @ vectors.T, part, rtol=0, atol=1e-14)
+
+
+def test_least_squares_is_stationary(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: ProjectedModel
+) -> None:
+    run = least_squares.simulate(nominal, model.starts[0]).coordinates
+    for (_, vectors), samples in zip(subspaces(least_squares), WINDOWS, strict=True):
+        for k in samples[::37]:
+            gradient = (model.jacobian(run[k], full.inputs[k]) @ vectors).T
+            assert np.abs(gradient @ model.residual(run[k], full.inputs[k])).max() < 1e-12
+
+
+def test_rounding_seed_changes_only_directions_that_rounding_chooses(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    def span(**settings: object) -> np.ndarray:
+        basis: Basis = fitted(model, nominal, "pod", rank_tolerance=0.0, **settings).bases[0]
+        return basis.vectors @ basis.vectors.T
+
+    assert np.abs(span(rank=4, rounding_seed=1) - span(rank=4)).max() < 1e-9
+    assert np.abs(span(rank=6, rounding_seed=1) - span(rank=6)).max() > 1e-2

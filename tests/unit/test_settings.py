@@ -1,0 +1,83 @@
+"""Settings of methods are checked at the border: kind, bounds, choices, names."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vehiclemor.errors import InputError
+from vehiclemor.reduction.settings import Setting, parsed, validated
+
+DECLARED = {
+    "rank": Setting("integer", 3, "how many", minimum=1),
+    "period": Setting("number", 5.0, "how long", minimum=0.0, above=True),
+    "mode": Setting("text", "fast", "how", choices=("fast", "slow")),
+    "label": Setting("text", "", "any text"),
+}
+
+
+def test_defaults_then_preset_then_given() -> None:
+    assert validated("m", DECLARED, {}) == {"rank": 3, "period": 5.0, "mode": "fast", "label": ""}
+    preset = {"rank": 4, "mode": "slow"}
+    settings = validated("m", DECLARED, {"rank": 5}, preset)
+    assert settings == {"rank": 5, "period": 5.0, "mode": "slow", "label": ""}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("rank", 0, "m: rank is 0; it must be at least 1"),
+        ("rank", 2.5, "m: rank is 2.5, not an integer"),
+        ("rank", "3", "m: rank is '3', not an integer"),
+        ("rank", True, "m: rank is True, not an integer"),
+        ("rank", None, "m: rank is None, not an integer"),
+        ("rank", float("nan"), "m: rank is nan, not finite"),
+        ("period", 0.0, "m: period is 0; it must be above 0"),
+        ("period", -1, "m: period is -1; it must be above 0"),
+        ("period", float("inf"), "m: period is inf, not finite"),
+        ("period", "long", "m: period is 'long', not a number"),
+        ("mode", "quick", "m: mode is 'quick'; allowed: fast, slow"),
+        ("mode", 1, "m: mode is 1; allowed: fast, slow"),
+        ("label", 1, "m: label is 1; allowed: text"),
+        ("rang", 3, "unknown setting of m 'rang'; did you mean rank?"),
+    ],
+)
+def test_wrong_setting_is_one_line(name: str, value: object, message: str) -> None:
+    with pytest.raises(InputError) as error:
+        validated("m", DECLARED, {name: value})
+    assert str(error.value) == message
+
+
+def test_wrong_preset_is_caught_too() -> None:
+    with pytest.raises(InputError, match="rank is 0"):
+        validated("m", DECLARED, {}, {"rank": 0})
+
+
+@given(rank=st.integers(1, 10**9), period=st.floats(1e-9, 1e9))
+def test_allowed_numbers_pass_with_their_declared_type(rank: int, period: float) -> None:
+    settings = validated("m", DECLARED, {"rank": float(rank), "period": period})
+    assert settings["rank"] == rank
+    assert type(settings["rank"]) is int
+    assert settings["period"] == period
+    assert type(settings["period"]) is float
+    assert type(validated("m", DECLARED, {"period": 2})["period"]) is float
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("3", 3), ("-2", -2), ("2.5", 2.5), ("1e-6", 1e-6), ("fast", "fast"), ("", ""), ("3a", "3a")],
+)
+def test_text_of_the_command_line_gets_its_kind(text: str, value: object) -> None:
+    assert parsed(text) == value
+    assert type(parsed(text)) is type(value)
+
+
+@pytest.mark.xfail(strict=True, raises=OverflowError, reason="the bound check makes it a float")
+def test_integer_beyond_all_floats_is_one_line() -> None:
+    with pytest.raises(InputError):
+        validated("m", {"rank": Setting("integer", 3, "how many", minimum=1)}, {"rank": -(10**400)})
+
+
+@pytest.mark.xfail(strict=True, reason="only Python's own integers are taken")
+def test_numpy_integers_are_integers() -> None:
+    assert validated("m", DECLARED, {"rank": np.int64(4)})["rank"] == 4
