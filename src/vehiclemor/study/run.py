@@ -71,8 +71,15 @@ def _executed(cells: list[Cell], folder: Path, jobs: int) -> Iterator[None]:
         return
     from joblib import Parallel, delayed
 
+    # One cell of each method first, so that its loops are compiled once and not in every process.
+    first = {cell.method: cell for cell in reversed(cells)}.values()
+    for cell in first:
+        yield compute_and_store(cell, folder)
+    done = {cell.key for cell in first}
     pool = Parallel(n_jobs=jobs, return_as="generator_unordered")
-    yield from pool(delayed(compute_and_store)(cell, folder) for cell in cells)
+    yield from pool(
+        delayed(compute_and_store)(cell, folder) for cell in cells if cell.key not in done
+    )
 
 
 def compute_and_store(cell: Cell, folder: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -21,7 +21,8 @@ OUTPUTS = {
     "spindle_y": "RMS error of y (m)",
     "second_euler_angle": r"RMS error of $\eta$ (rad)",
 }
-FLOOR = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
+ONE_BASIS: dict[str, Any] = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
+FLOOR: dict[str, Any] = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
 NUMBERS = {"spindle_y": "dw_rms_spindle_y", "second_euler_angle": "dw_rms_second_euler_angle"}
 
 
@@ -40,6 +41,7 @@ def figure_13(results: Results) -> Figure:
             for method, text, style in (
                 ("pod", "POD, r = 3 (least squares)", DEFAULT),
                 ("pod_literal", "POD, r = 3 (literal: Galerkin)", LITERAL),
+                ("fixed_basis", "one basis for the run, r = 3", ONE_BASIS),
                 ("replay", "replay", REPLAY),
             ):
                 errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
@@ -47,7 +49,7 @@ def figure_13(results: Results) -> Figure:
                 errors = np.where(errors > 0.0, errors, np.nan)
                 axis.semilogy(percent, errors, label=text, marker=".", markersize=4, **style)
             floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
-            axis.semilogy(percent, floor, label="projection floor", **FLOOR)
+            axis.semilogy(percent, floor, label="floor of the control periods", **FLOOR)
             axis.axhline(
                 published[NUMBERS[output]].value,
                 color="black",
