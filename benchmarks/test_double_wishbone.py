@@ -26,6 +26,7 @@ METHODS = {
 
 @pytest.fixture(scope="module")
 def model():
+    """The model, compiled and parametrised."""
     return build("double_wishbone")
 
 
@@ -45,6 +46,20 @@ def test_kernel(benchmark, model, kernel):
     q, u = model.solve([0.05, 0.0]), np.array([0.05, 0.0])
     benchmark(getattr(model.kernels, kernel), q, u, model.constants, work, result)
     benchmark.extra_info["operations"] = model.operation_counts[kernel]["total"]
+    assert np.isfinite(result).all()
+
+
+@pytest.mark.parametrize("kernel", ["residual", "output"])
+def test_kernel_in_loop(benchmark, model, kernel):
+    """1001 calls of a kernel in a compiled loop."""
+    benchmark.group = "kernels, 1001 calls in a compiled loop"
+    trajectory = model.simulate(sine_travel)
+    widths = {"residual": len(model.coordinates), "output": len(model.outputs)}
+    result = np.empty((len(trajectory.time), widths[kernel]))
+    loop = getattr(model.kernels, f"{kernel}_path")
+    benchmark(loop, trajectory.coordinates, trajectory.inputs, model.constants, result)
+    name = {"residual": "residual", "output": "outputs"}[kernel]
+    benchmark.extra_info["operations"] = model.operation_counts[name]["total"]
     assert np.isfinite(result).all()
 
 

@@ -187,19 +187,22 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
 
 
 class _progress:  # noqa: N801 - reads as a function
-    """Progress bar on a terminal, nothing elsewhere."""
+    """Progress bar on a terminal, a line for each study elsewhere."""
 
     def __enter__(self):  # noqa: ANN204
         from rich.console import Console
         from rich.progress import Progress
 
         console = Console(stderr=True)
+        self._quiet = not console.is_terminal
         self._bar = Progress(console=console, disable=not console.is_terminal)
         self._bar.start()
         self._tasks: dict[str, TaskID] = {}
         return self._update
 
     def _update(self, study: str, done: int, total: int) -> None:
+        if study not in self._tasks and self._quiet:
+            print(f"{study}: {total - done} of {total} cells to compute", file=sys.stderr)
         if study not in self._tasks:
             self._tasks[study] = self._bar.add_task(study, total=total)
         self._bar.update(self._tasks[study], completed=done)
