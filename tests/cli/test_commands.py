@@ -23,15 +23,22 @@ def test_list(capsys):
 
 def test_simulate_writes_what_the_interface_returns(tmp_path, capsys):
     out = tmp_path / "run.nc"
-    arguments = ["--method", "pod", "--set", "rank=2", "--frequency", "1.1", "--training", "nominal"]
+    arguments = [
+        "--method",
+        "pod",
+        "--set",
+        "rank=2",
+        "--frequency",
+        "1.1",
+        "--training",
+        "nominal",
+    ]
     assert main(["simulate", "double_wishbone", *arguments, "--out", str(out)]) == 0
     assert "second_euler_angle" in capsys.readouterr().out
     expected = vm.simulate("double_wishbone", "pod", rank=2, frequency=1.1, training="nominal")
     with xr.open_dataset(out) as written:
         np.testing.assert_array_equal(written["coordinates"], expected["coordinates"])
-        assert list(written["coordinate"].values) == list(
-            vm.model("double_wishbone").coordinates
-        )
+        assert list(written["coordinate"].values) == list(vm.model("double_wishbone").coordinates)
 
 
 def test_run_prints_statuses_and_resumes(tmp_path, capsys):

@@ -4,6 +4,7 @@ import os
 import shutil
 import stat
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -123,12 +124,14 @@ def test_wrong_arguments(fails, arguments, words, tmp_path, monkeypatch):
         ('model = "double_wishbone"', 'model = "macpherson"', ["macpherson"]),
         ('source = "chrono"', 'source = "memory"', ["'memory' is not listed"]),
         ('status = "published"', 'status = "certain"', ["status"]),
-        ('title = "', 'title = ', ["not a valid TOML file"]),
+        ('title = "', "title = ", ["not a valid TOML file"]),
     ],
 )
 def test_wrong_parameter_file(fails, parameters, old, new, words):
     path = parameters(old, new)
-    fails([*SIMULATE, "--parameters", path], str(path) if "coincide" not in words[-1] else "", *words)
+    fails(
+        [*SIMULATE, "--parameters", path], str(path) if "coincide" not in words[-1] else "", *words
+    )
 
 
 @pytest.mark.parametrize(
@@ -211,6 +214,6 @@ def test_read_only_output_folder(fails, study, tmp_path):
 
 def test_unwritable_output_folder_whoever_asks(fails, study):
     """A place where nobody can make folders, root neither."""
-    if not os.path.isdir("/proc/self"):
+    if not Path("/proc/self").is_dir():
         pytest.skip("needs /proc")
     fails(["run", study(), "--out", "/proc/self/results"], "can't be written")

@@ -8,10 +8,6 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.algebraic import AlgebraicModel, build
 from vehiclemor.simulation.trajectory import Trajectory
 
-JUMPS = pytest.mark.xfail(
-    strict=True, reason="the extrapolation leaves the branch: whole turns off"
-)
-
 
 def test_reach_is_that_of_the_specification(model: AlgebraicModel) -> None:
     assert model.reach() == pytest.approx((-0.2145, 0.2965), abs=1e-3)
@@ -48,13 +44,11 @@ def test_reach_depends_on_the_rack(model: AlgebraicModel) -> None:
         model.solve([between, -0.05])
 
 
-@pytest.mark.xfail(strict=True, reason="an unreachable rack counts as reachable at height 0")
 def test_rack_out_of_reach_is_unreachable(model: AlgebraicModel) -> None:
     with pytest.raises(UnreachableError):
         model.solve([0.0, 0.5])
 
 
-@pytest.mark.xfail(strict=True, reason="all heights are compared with the limits at extreme racks")
 def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: AlgebraicModel) -> None:
     low = (model.reach(0.0)[0] + model.reach(-0.05)[0]) / 2.0
     times = np.linspace(0.0, 1.0, 201)
@@ -68,7 +62,7 @@ def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: Algebrai
     [
         ("newton", 0.99),
         ("newton_dense", 0.99),
-        pytest.param("chord", 0.6, marks=JUMPS),
+        ("chord", 0.6),
     ],
 )
 def test_sudden_jumps_of_the_input_stay_on_the_branch(

@@ -33,8 +33,9 @@ class _Printer(PythonCodePrinter):
             return f"1.0/math.sqrt({self._print(base)})"
         if isinstance(exponent, sp.Integer) and 0 < abs(int(exponent)) <= 4:
             factor = self.parenthesize(base, 1000, strict=True)
-            product = "*".join([factor] * abs(int(exponent)))
-            return product if exponent.is_positive else f"1.0/({product})"
+            # In parentheses: the product may become the divisor of a quotient.
+            product = f"({'*'.join([factor] * abs(int(exponent)))})"
+            return product if exponent.is_positive else f"(1.0/{product})"
         return super()._print_Pow(expr, rational=rational)
 
     def _print_sin(self, expr: sp.Expr) -> str:
@@ -120,7 +121,7 @@ def _function_source(
     for index, expression in enumerate(function.results):
         place = _subscript(index, function.shape)
         lines.append(f"    result[{place}] = {printer.doprint(expression)}")
-    return "\n".join(lines)
+    return "\n".join(lines if len(lines) > 1 else [*lines, "    pass"])
 
 
 def tangent_source(program: Program) -> str:

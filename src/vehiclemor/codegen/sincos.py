@@ -5,7 +5,7 @@ Here both functions of an angle share one argument reduction, and the result doe
 version of the C library.
 """
 
-import math
+import numpy as np
 
 # Cody-Waite splitting of pi/2 and minimax polynomials on [-pi/4, pi/4]: S. L. Moshier, Methods and
 # Programs for Mathematical Functions (Ellis Horwood, 1989), the Cephes library's sin.c.
@@ -27,7 +27,7 @@ def sincos(angle):
     tuple of float
         Not a number where the angle is not finite.
     """
-    quadrant = math.floor(angle * TWO_OVER_PI + 0.5)
+    quadrant = np.floor(angle * TWO_OVER_PI + 0.5)
     y = ((angle - quadrant * HALF_PI_1) - quadrant * HALF_PI_2) - quadrant * HALF_PI_3
     z = y * y
     zz = z * z
@@ -41,11 +41,11 @@ def sincos(angle):
     c = (4.16666666666665929218e-2 - z * 1.38888888888730564116e-3) + zz * c
     c = (1.0 - 0.5 * z) + zz * c
     half = quadrant * 0.5
-    odd = half != math.floor(half)
-    quarter = math.floor(half) * 0.5
-    minus_sine = quarter != math.floor(quarter)
-    quarter = math.floor((quadrant + 1.0) * 0.5) * 0.5
-    minus_cosine = quarter != math.floor(quarter)
+    odd = half != np.floor(half)
+    quarter = np.floor(half) * 0.5
+    minus_sine = quarter != np.floor(quarter)
+    quarter = np.floor((quadrant + 1.0) * 0.5) * 0.5
+    minus_cosine = quarter != np.floor(quarter)
     sine = c if odd else s
     cosine = s if odd else c
     return (-sine if minus_sine else sine), (-cosine if minus_cosine else cosine)

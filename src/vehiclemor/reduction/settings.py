@@ -5,10 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 
 Value = int | float | str
+LARGEST_NUMBER = 1e300
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,12 @@ def _checked(where: str, setting: Setting, value: object) -> Value:
             allowed = ", ".join(setting.choices) or "text"
             raise InputError(f"{where} is {value!r}; allowed: {allowed}")
         return value
+    if isinstance(value, np.integer | np.floating):
+        value = value.item()
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{where} is {value!r}, not {_a(setting.kind)}")
+    if abs(value) > LARGEST_NUMBER and abs(value) != math.inf:
+        raise InputError(f"{where} is beyond +-{LARGEST_NUMBER:g}")
     if not math.isfinite(value):
         raise InputError(f"{where} is {value}, not finite")
     if setting.kind == "integer":

@@ -39,6 +39,8 @@ SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
+# Rack displacements at which the limits of the travel are found; between them they are interpolated.
+RACKS_OF_REACH = 9
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
 SMALLEST_SINGULAR_VALUE = 1e-8
 REASONS = {
@@ -296,18 +298,22 @@ class AlgebraicModel:
             raise InputError(
                 f"input {self.inputs[column]} is not finite at t = {times[sample]:.6g} s"
             )
-        racks = np.unique([inputs[:, 1].min(), inputs[:, 1].max()])
-        for rack in racks:
-            low, high = self.reach(float(rack))
-            outside = np.flatnonzero((inputs[:, 0] < low) | (inputs[:, 0] > high))
-            if len(outside):
-                sample = outside[0]
-                raise UnreachableError(
-                    f"{self.name}: height {inputs[sample, 0]:.5f} m at t = {times[sample]:.6g} s "
-                    f"is out of reach (heights up to {inputs[:, 0].max():.4f} m and down to "
-                    f"{inputs[:, 0].min():.4f} m are asked for); the reachable range is {low:.4f} "
-                    f"to {high:.4f} m (rack at {rack:g} m)"
-                )
+        heights, racks = inputs[:, 0], inputs[:, 1]
+        known = np.unique(racks)
+        if len(known) > RACKS_OF_REACH:
+            known = np.linspace(known[0], known[-1], RACKS_OF_REACH)
+        limits = np.array([self.reach(float(rack)) for rack in known])
+        low = np.interp(racks, known, limits[:, 0])
+        high = np.interp(racks, known, limits[:, 1])
+        outside = np.flatnonzero((heights < low) | (heights > high))
+        if len(outside):
+            sample = outside[0]
+            raise UnreachableError(
+                f"{self.name}: height {heights[sample]:.5f} m at t = {times[sample]:.6g} s is out of "
+                f"reach (heights up to {heights.max():.4f} m and down to {heights.min():.4f} m are "
+                f"asked for); the reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
+                f"(rack at {racks[sample]:g} m)"
+            )
 
     def _work(self) -> np.ndarray:
         return np.empty(self.kernels.WORK)

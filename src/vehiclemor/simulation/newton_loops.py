@@ -148,13 +148,14 @@ def chord_path(
     """
     q, phi, step, work = q_start.copy(), np.empty(N), np.empty(N), np.empty(WORK)
     u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
-    evaluations = 0
+    evaluations, smooth = 0, 0
     for sample in range(inputs.shape[0]):
         for i in range(INPUTS):
             target[i] = inputs[sample, i]
         substeps = increments(previous, target, largest)
-        if sample >= 3:
-            substeps = 1
+        # An extrapolation over a jump of the input could end on another branch.
+        smooth = smooth + 1 if substeps == 1 else 0
+        if smooth > 3:
             for i in range(N):
                 q[i] = 3.0 * (path[sample - 1, i] - path[sample - 2, i]) + path[sample - 3, i]
         for substep in range(1, substeps + 1):

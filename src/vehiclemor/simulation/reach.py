@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.errors import UnreachableError
+
 if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
 
@@ -34,15 +36,21 @@ def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[f
     Returns
     -------
     tuple of float
-        Both limits, to 1e-6 m, on the side that can be reached.  Both are 0 if not even the design
-        height can be reached at this rack displacement.
+        Both limits, to 1e-6 m, on the side that can be reached.
+
+    Raises
+    ------
+    UnreachableError
+        If not even the design height can be reached at this rack displacement.
     """
     q = model.design
     steps = max(1, int(np.ceil(abs(rack) / FIRST_STEP)))
     for step in range(1, steps + 1):
         moved = _solve(model, q, np.array([0.0, rack * step / steps]))
         if moved is None:
-            return 0.0, 0.0
+            raise UnreachableError(
+                f"{model.name}: rack displacement {rack:g} m is out of reach at the design height"
+            )
         q = moved
     return _limit(model, q, rack, -limit), _limit(model, q, rack, limit)
 
