@@ -201,7 +201,7 @@ class _progress:  # noqa: N801 - reads as a function
         return self._update
 
     def _update(self, study: str, done: int, total: int) -> None:
-        if study not in self._tasks and self._quiet:
+        if study not in self._tasks and self._quiet and done < total:
             print(f"{study}: {total - done} of {total} cells to compute", file=sys.stderr)
         if study not in self._tasks:
             self._tasks[study] = self._bar.add_task(study, total=total)

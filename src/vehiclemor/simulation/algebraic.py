@@ -39,7 +39,7 @@ SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
-# Rack displacements at which the limits of the travel are found; between them they are interpolated.
+# Rack displacements at which the limits of travel are found; between them they are interpolated.
 RACKS_OF_REACH = 9
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
 SMALLEST_SINGULAR_VALUE = 1e-8
@@ -309,9 +309,8 @@ class AlgebraicModel:
         if len(outside):
             sample = outside[0]
             raise UnreachableError(
-                f"{self.name}: height {heights[sample]:.5f} m at t = {times[sample]:.6g} s is out of "
-                f"reach (heights up to {heights.max():.4f} m and down to {heights.min():.4f} m are "
-                f"asked for); the reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
+                f"{self.name}: height {heights[sample]:.5f} m at t = {times[sample]:.6g} s is out "
+                f"of reach (from {heights.min():.4f} to {heights.max():.4f} m are asked for); the reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
                 f"(rack at {racks[sample]:g} m)"
             )
 

@@ -119,7 +119,8 @@ def _readable(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, RuntimeError, KeyError) as error:
-        detail = str(error).splitlines()[0][:80]
+        reason = error.strerror if isinstance(error, OSError) else None
+        detail = reason or str(error).splitlines()[0][:80]
         raise FileError(
             f"{path}: not a readable result file ({detail}); move it away and run again"
         ) from None
