@@ -310,7 +310,8 @@ class AlgebraicModel:
             sample = outside[0]
             raise UnreachableError(
                 f"{self.name}: height {heights[sample]:.5f} m at t = {times[sample]:.6g} s is out "
-                f"of reach (from {heights.min():.4f} to {heights.max():.4f} m are asked for); the reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
+                f"of reach (from {heights.min():.4f} to {heights.max():.4f} m are asked for); the "
+                f"reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
                 f"(rack at {racks[sample]:g} m)"
             )
 
