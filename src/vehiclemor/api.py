@@ -21,19 +21,28 @@ RESULTS = Path("results")
 
 def models() -> dict[str, str]:
     """Registered models: name -> one line."""
-    return {name: registry.component("model", name).SUMMARY for name in registry.names("model")}
+    return _summaries("model", "SUMMARY")
 
 
 def methods() -> dict[str, str]:
     """Registered reduction methods: name -> one line."""
-    return {name: registry.component("method", name).SUMMARY for name in registry.names("method")}
+    return _summaries("method", "SUMMARY")
 
 
 def maneuvers() -> dict[str, str]:
     """Registered maneuvers: name -> one line."""
-    return {
-        name: registry.component("maneuver", name).summary for name in registry.names("maneuver")
-    }
+    return _summaries("maneuver", "summary")
+
+
+def _summaries(kind: str, attribute: str) -> dict[str, str]:
+    """One line for each component; a broken plug-in is listed with what is wrong with it."""
+    lines = {}
+    for name in registry.names(kind):
+        try:
+            lines[name] = str(getattr(registry.component(kind, name), attribute))
+        except InputError as error:
+            lines[name] = f"broken: {error}"
+    return lines
 
 
 def studies() -> dict[str, str]:
@@ -137,9 +146,10 @@ def simulate(
         base = maneuver
     if rtol is not None:
         settings["tolerance"] = rtol
+    perturbed = base.perturbed(frequency, amplitude)
     cell = make_cell(
         ready,
-        base.perturbed(frequency, amplitude),
+        perturbed,
         start or ready.starts[0],
         method,
         settings,
@@ -147,7 +157,7 @@ def simulate(
         training,
         tuple((float(f), float(a)) for f, a in training_set),
     )
-    dataset = compute_cell(cell)
+    dataset = compute_cell(cell, ready, perturbed)
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from rich.progress import TaskID
 
-# Exit statuses: 0 done, 1 a published bound is missed, 2 wrong input, 130 interrupted.
-MISSED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
+# Exit statuses: 0 done, 1 a published bound is missed or a simulation failed, 2 wrong input,
+# 130 interrupted.
+MISSED, FAILED, WRONG_INPUT, INTERRUPTED = 1, 1, 2, 130
 
 app = App(
     name="vehiclemor",
@@ -105,6 +106,8 @@ def simulate(
         key, separator, value = setting.partition("=")
         if not separator or not key:
             raise InputError(f"--set {setting!r} is not key=value")
+        if key in chosen:
+            raise InputError(f"--set {key} is given twice")
         chosen[key] = parsed(value)
     if out is not None:
         _check_writable(out)
@@ -128,7 +131,7 @@ def simulate(
 
         write_dataset(dataset, out)
     _print_simulation(dataset, out)
-    return 0
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
 def _check_writable(out: Path) -> None:
@@ -273,6 +276,8 @@ def figures(
         Number of processes for missing studies.
     """
     chosen = [name.strip() for name in only.split(",") if name.strip()]
+    if only and not chosen:
+        raise InputError(f"--only {only!r} names no figure")
     for path in api.figures(chosen, out, results, jobs):
         print(path)
     return 0

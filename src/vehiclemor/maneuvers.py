@@ -70,11 +70,15 @@ class Maneuver:
                 raise InputError(f"{name} factor: {factor!r} is not a number")
             if not math.isfinite(factor):
                 raise InputError(f"{name} factor: {factor} is not finite")
+            if abs(factor) > LARGEST_FACTOR:
+                raise InputError(f"{name} factor: {factor:g} is above {LARGEST_FACTOR:g}")
         if frequency <= 0.0:
             raise InputError(f"frequency factor: {frequency:g} is not positive")
         return replace(self, frequency_factor=float(frequency), amplitude_factor=float(amplitude))
 
 
+# Far beyond anything that is meant.
+LARGEST_FACTOR = 1e6
 # Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.
 TRAVEL_AMPLITUDE = 0.1
 TRAVEL_FREQUENCY = 0.1

@@ -18,6 +18,13 @@ GROUPS = {
     "maneuver": "vehiclemor.maneuvers",
 }
 
+# What a component must have; see `reduction/interface.py` and the handbook.
+REQUIRED = {
+    "model": ("KIND", "SUMMARY", "MANEUVER", "PARAMETERS", "derive", "design_coordinates"),
+    "method": ("SUMMARY", "REFERENCE", "SETTINGS", "presets", "accepts", "check", "fit"),
+    "maneuver": ("summary", "signal", "inputs", "duration", "samples", "perturbed"),
+}
+
 
 def names(kind: str) -> list[str]:
     """Registered names of a kind (`model`, `method` or `maneuver`), sorted."""
@@ -37,11 +44,16 @@ def component(kind: str, name: str) -> Any:
     if name not in entries:
         raise unknown(kind, name, entries)
     try:
-        return entries[name].load()
-    except (ImportError, AttributeError) as error:
+        loaded = entries[name].load()
+    except Exception as error:
         raise InputError(
-            f"{kind} {name!r} ({entries[name].value}) can't be imported: {error}"
+            f"{kind} {name!r} ({entries[name].value}) can't be imported: "
+            f"{type(error).__name__}: {error}"
         ) from error
+    missing = [a for a in REQUIRED[kind] if not hasattr(loaded, a)]
+    if missing:
+        raise InputError(f"{kind} {name!r} ({entries[name].value}) has no {missing[0]}")
+    return loaded
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
@@ -54,4 +66,12 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
 
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUPS[kind])}
+    found: dict[str, EntryPoint] = {}
+    # Sorted so that a built-in comes last: no plug-in takes its name away.
+    for entry in sorted(entry_points(group=GROUPS[kind]), key=_is_built_in):
+        found[entry.name] = entry
+    return found
+
+
+def _is_built_in(entry: EntryPoint) -> bool:
+    return entry.value.startswith("vehiclemor.")

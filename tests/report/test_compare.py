@@ -57,6 +57,10 @@ def test_verdicts_follow_from_the_numbers(rows):
         assert row["floor"] > 0.0
         assert "nominal-only" in row["reason"]
         assert "never published" in row["reason"]
+    claims = [c for c in load_published().claims.values() if c.model == "double_wishbone"]
+    for claim in claims:
+        if claim.kind != "setup":
+            assert rows["item"].str.contains(claim.statement, regex=False).any()
     absent = rows[rows["model"] != "double_wishbone"]
     assert (absent["verdict"] == "not_comparable").all()
 

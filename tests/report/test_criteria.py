@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vehiclemor.report import criteria
 from vehiclemor.report.criteria import ANGLE, CRITERIA, DISPLACEMENT, VISIBLE
 from vehiclemor.report.published import load_published
 
@@ -97,8 +98,27 @@ def test_a_criterion_fails_on_a_counterexample(results, claim, study, change):
 
 
 def test_every_criterion_has_a_counterexample_and_a_claim():
-    assert set(CRITERIA) == {claim for claim, _, _ in COUNTEREXAMPLES}
+    with_counterexample = {claim for claim, _, _ in COUNTEREXAMPLES}
+    assert set(CRITERIA) == with_counterexample | {"dw_fig12_basis_insensitive_to_amplitude"}
     assert set(CRITERIA) <= set(load_published().claims)
+
+
+def test_subspaces_are_compared_by_their_principal_angles(results, monkeypatch):
+    criterion = CRITERIA["dw_fig12_basis_insensitive_to_amplitude"]
+    finding = criterion(results, "pod")
+    assert 0.0 < finding.measured < np.pi / 2.0
+    monkeypatch.setattr(criteria, "SIMILAR_SUBSPACES", finding.measured / 2.0)
+    assert not criterion(results, "pod").met
+
+
+def test_a_fall_too_small_to_matter_is_no_fall(results):
+    def almost_flat(dataset):
+        rising("frequency_factor")(dataset)
+        place = {"frequency_factor": 2.0}
+        dataset["rms_error"].loc[place] = 0.995 * dataset["rms_error"].sel(frequency_factor=1.95)
+
+    mutated = changed(results, "figure-13-frequency", almost_flat)
+    assert not CRITERIA["dw_fig13_not_monotone_frequency"](mutated, "pod").met
 
 
 def test_an_exact_model_meets_the_claims_of_agreement(results):

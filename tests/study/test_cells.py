@@ -2,8 +2,10 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 
+import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError, UnreachableError
 from vehiclemor.maneuvers import sine_travel
 from vehiclemor.simulation.algebraic import build
@@ -26,6 +28,7 @@ def cell():
         ("amplitude_factor", 0.9),
         ("kernel", "another"),
         ("code", "another"),
+        ("inputs", "another"),
         ("training", "nominal"),
         ("settings", {"rank": 4}),
         ("parameters", {}),
@@ -34,6 +37,15 @@ def cell():
 )
 def test_key_changes_with_all_that_determines_the_result(cell, field, value):
     assert dataclasses.replace(cell, **{field: value}).key != cell.key
+
+
+def test_a_maneuver_of_ones_own_is_simulated_and_has_a_key_of_its_own(cell):
+    half = dataclasses.replace(sine_travel, duration=5.0, samples=101)
+    model = build("double_wishbone")
+    assert make_cell(model, half, "equilibrium", "pod", {"rank": 3}).key != cell.key
+    data = vm.simulate(model, "full_order", maneuver=half)
+    np.testing.assert_array_equal(data["time"], np.linspace(0.0, 5.0, 101))
+    np.testing.assert_array_equal(data["inputs"], half.at(half.times))
 
 
 def test_key_is_the_same_for_the_same_cell(cell):
@@ -104,7 +116,7 @@ def test_unreachable_training_set_is_named(cell):
 def test_collection_as_rows(tmp_path):
     results = run_studies("figures-6-7", tmp_path) | run_studies("equation-order", tmp_path)
     rows = flattened(results)
-    assert rows.sizes["cell"] == 2 * 6 + 25 * 3
+    assert rows.sizes["cell"] == 2 * 6 + 25 * 2
     assert set(rows["study"].values) == {"figures-6-7", "equation-order"}
 
 

@@ -101,7 +101,24 @@ def test_cache_folder_that_cannot_be_written_is_replaced(
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "file" / "below"))
-    monkeypatch.setattr(cache.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
     folder = cache.cache_folder()
     assert folder.is_dir()
-    assert folder.is_relative_to(tmp_path / "temporary")
+    assert folder.parent == tmp_path
+    # Code is imported from it: nobody else may write there.
+    assert folder.stat().st_mode & 0o077 == 0
+
+
+def test_damaged_kernel_file_is_written_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path))
+    source = "ANSWER = 42\n"
+    digest = cache.kernel_hash(source)
+    path = tmp_path / "kernels" / digest / f"vehiclemor_kernels_damaged_{digest}.py"
+    path.parent.mkdir(parents=True)
+    for damaged in ("", "ANSWER = 41\n"):
+        path.write_text(damaged)
+        assert cache.load_module("damaged", source).ANSWER == 42
+        del sys.modules[path.stem]
+    assert path.read_text() == source

@@ -23,7 +23,7 @@ def kernel_hash(source: str) -> str:
 def cache_folder() -> Path:
     """Folder of the kernel cache: $VEHICLEMOR_CACHE, or the user's cache folder.
 
-    Falls back to a folder for temporary files where neither can be written.
+    Where it can't be written, a temporary folder: then every process compiles for itself.
     """
     import platformdirs
 
@@ -34,11 +34,8 @@ def cache_folder() -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError:
-        folder = (
-            Path(tempfile.gettempdir())
-            / f"vehiclemor-{os.getuid() if os.name == 'posix' else 'cache'}"
-        )
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # Nothing that others can write is imported from: a folder of this process alone.
+        folder = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
     return folder
 
 
@@ -46,7 +43,7 @@ def load_module(name: str, source: str) -> ModuleType:
     """Import a linked source from the cache, written there first if it is new.
 
     The folder's name is the hash of the source and of the compiler's versions, and a file in it is
-    never written twice; the compiler keeps its machine code beside it.  So a second process
+    not written twice; the compiler keeps its machine code beside it.  So a second process
     compiles nothing, and a changed source can't meet old machine code.
     """
     digest = kernel_hash(source)
@@ -55,7 +52,8 @@ def load_module(name: str, source: str) -> ModuleType:
         return sys.modules[module_name]
     folder = cache_folder() / "kernels" / digest
     path = folder / f"{module_name}.py"
-    if not path.exists():
+    # A damaged file is written again: what runs is always the source at hand.
+    if not path.exists() or path.read_text(encoding="utf-8", errors="replace") != source:
         folder.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=folder, suffix=".tmp")
         with os.fdopen(handle, "w", encoding="utf-8") as file:

@@ -67,9 +67,6 @@ PARAMETERS = {
     "tie_rod_outer": "m",
     "wheel_centre": "m",
 }
-# Within this travel of the wheel centre (m) no suspension of a road car is looked at: the search
-# for the limits of reach ends there.
-TRAVEL_LIMIT = 0.5
 
 
 def derive() -> AlgebraicEquations:

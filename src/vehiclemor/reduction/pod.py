@@ -6,6 +6,7 @@ the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (20
 
 from collections.abc import Mapping, Sequence
 
+from vehiclemor.errors import InputError
 from vehiclemor.reduction.projected import (
     SUBSPACE_SETTINGS,
     ProjectedModel,
@@ -17,6 +18,8 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.windows import window_edges
 from vehiclemor.simulation.algebraic import AlgebraicModel
 
+# A window of less than a millisecond holds no motion of a vehicle.
+SHORTEST_PERIOD = 1e-3
 SUMMARY = "POD with its own mean and basis in each control period (the paper's method)"
 REFERENCE = "10.1115/1.4029390"
 SETTINGS = {
@@ -48,6 +51,8 @@ def accepts(model: AlgebraicModel) -> tuple[bool, str]:
 def check(model: AlgebraicModel, settings: Mapping[str, Value]) -> None:
     """Raise `InputError` if the settings don't fit the model."""
     check_subspace(model, dict(settings))
+    if float(settings["control_period"]) < SHORTEST_PERIOD:
+        raise InputError(f"control_period is below {SHORTEST_PERIOD:g} s")
 
 
 def fit(

@@ -21,6 +21,7 @@ from vehiclemor.simulation.trajectory import COUNTS, Trajectory
 
 ITERATION_LIMIT = 50
 
+MOST_SNAPSHOTS = 100_000
 # Settings that every method on POD subspaces of algebraic equations shares.
 SUBSPACE_SETTINGS = {
     "rank": Setting("integer", 3, "number of reduced coordinates", minimum=1),
@@ -171,6 +172,8 @@ def check_subspace(model: AlgebraicModel, settings: dict[str, Value]) -> None:
     states = len(model.coordinates)
     if rank > states:
         raise InputError(f"rank {rank} is above the {states} coordinates of {model.name}")
+    if snapshots > MOST_SNAPSHOTS:
+        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
     if rank > snapshots:
         raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
     _reversed(model, settings)

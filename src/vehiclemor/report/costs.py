@@ -10,6 +10,9 @@ from vehiclemor.report.timing import BASELINE, STRONGEST, timing
 if TYPE_CHECKING:
     import pandas as pd
 
+# Per model: the error that is printed beside the times.
+ERROR_COLUMN = {"double_wishbone": "rms_second_euler_angle"}
+
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
     """Cost of every contestant of a model on its nominal maneuver.
@@ -38,10 +41,13 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
             "iterations": int(row["iterations"]),
             "residual_evaluations": int(row["residual_evaluations"]),
             "jacobian_evaluations": int(row["jacobian_evaluations"]),
+            "tolerance": float(row["tolerance"]),
+            "quartile_spread": _share(float(row["seconds_upper"] - row["seconds_lower"]), own),
         }
-        for name, baseline in (("speed_up", BASELINE), ("speed_up_strongest", STRONGEST)):
-            other = float(seconds.sel(contestant=baseline))
-            entry[name] = other / own if own > 0.0 else float("nan")
+        for name in ("speed_up", "speed_up_strongest"):
+            entry[name] = float(row[name])
+        for output in data["output"].values:
+            entry[f"rms_{output}"] = float(row["rms_error"].sel(output=output))
         entry["offline_us"] = offline * 1e6
         for name, baseline in (("break_even", BASELINE), ("break_even_strongest", STRONGEST)):
             saved = float(seconds.sel(contestant=baseline)) - own
@@ -62,28 +68,37 @@ def printed_costs(folder: Path) -> str:
         lines = [
             f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})",
             (
-                "speed-up x1: against Newton with fresh Jacobians; x2: against the strongest "
-                "full-order solver"
+                "speed-up x1: against Newton with fresh Jacobians at 1e-12; x2: against the "
+                "strongest full-order solver; break-even in runs; +-%: half the quartile spread"
             ),
             (
-                f"{'':<22}{'rank':>5}{'us/run':>9}{'ns/point':>10}{'iterations':>12}"
-                f"{'residuals':>11}{'Jacobians':>11}{'x1':>7}{'x2':>7}{'offline us':>12}"
-                f"{'break-even x1/x2 (runs)':>26}"
+                f"{'':<25}{'rank':>5}{'tol.':>7}{'us/run':>8}{'+-%':>5}{'ns/point':>9}"
+                f"{'iterations':>11}{'residuals':>10}{'Jacobians':>10}{'x1':>6}{'x2':>6}"
+                f"{'RMS angle':>10}{'offline us':>11}{'break-even x1/x2':>17}"
             ),
         ]
         for row in table.to_dict("records"):
-            speed = f"{_cell(row['speed_up'], 2):>7}{_cell(row['speed_up_strongest'], 2):>7}"
+            speed = f"{_cell(row['speed_up'], 2):>6}{_cell(row['speed_up_strongest'], 2):>6}"
             even = f"{_even(row['break_even'])} / {_even(row['break_even_strongest'])}"
             if row["offline_us"] == 0.0:
                 even = "-"
             lines.append(
-                f"{row['contestant']:<22}{row['rank']:>5}{row['us_per_run']:>9.1f}"
-                f"{row['ns_per_sample']:>10.1f}{row['iterations']:>12}"
-                f"{row['residual_evaluations']:>11}{row['jacobian_evaluations']:>11}"
-                f"{speed}{row['offline_us']:>12.1f}{even:>26}"
+                f"{row['contestant']:<25}{row['rank']:>5}{_power(row['tolerance']):>7}"
+                f"{row['us_per_run']:>8.1f}{50.0 * row['quartile_spread']:>5.0f}"
+                f"{row['ns_per_sample']:>9.1f}{row['iterations']:>11}"
+                f"{row['residual_evaluations']:>10}{row['jacobian_evaluations']:>10}"
+                f"{speed}{row[ERROR_COLUMN[model]]:>10.1e}{row['offline_us']:>11.1f}{even:>17}"
             )
         parts.append("\n".join(lines))
     return "\n\n".join(parts)
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else 0.0
+
+
+def _power(value: float) -> str:
+    return "-" if value != value else f"{value:.0e}"
 
 
 def _cell(value: float, digits: int) -> str:

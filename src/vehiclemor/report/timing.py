@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Value, validated
 from vehiclemor.reduction.training import training_runs
@@ -48,8 +49,10 @@ CONTESTANTS = {
         Contestant(BASELINE, "full_order"),
         Contestant(STRONGEST, "full_order", "strongest"),
         Contestant("full order, dense", "full_order", settings={"solver": "newton_dense"}),
+        Contestant("full order, Newton, 1e-6", "full_order", settings={"tolerance": 1e-6}),
         Contestant("replay", "replay"),
         Contestant("pod r=3", "pod", settings={"rank": 3}),
+        Contestant("pod r=3, 1e-6", "pod", settings={"rank": 3, "tolerance": 1e-6}),
         Contestant("pod literal r=3", "pod", "literal", {"rank": 3}),
         Contestant("pod r=4", "pod", settings={"rank": 4}),
         Contestant("pod literal r=6", "pod", "literal", {"rank": 6}),
@@ -84,7 +87,7 @@ def timing(model_name: str, folder: Path) -> xr.Dataset:
 
 def _identity(model: AlgebraicModel) -> str:
     contestants = [repr(contestant) for contestant in CONTESTANTS[model.name]]
-    digests = [code_digest(model.name, c.method, "sine_travel") for c in CONTESTANTS[model.name]]
+    digests = [code_digest(model.name, c.method) for c in CONTESTANTS[model.name]]
     content = json.dumps([contestants, digests, model.kernel_hash, machine(), ROUNDS])
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
@@ -97,6 +100,7 @@ def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Da
     start = model.starts[0]
     fits: list[list[float]] = [[] for _ in contestants]
     reduced: list[ReducedModel] = []
+    tolerances: list[float] = []
     for index, contestant in enumerate(contestants):
         method: Method = component("method", contestant.method)
         preset = method.presets(model.name)[contestant.preset]
@@ -106,19 +110,32 @@ def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Da
         candidates = [method.fit(model, runs, settings) for _ in range(FIT_ROUNDS + 1)]
         fits[index] = [candidate.offline.seconds for candidate in candidates[1:]]
         reduced.append(candidates[-1])
+        tolerances.append(float(settings.get("tolerance", np.nan)))
     seconds = np.empty((ROUNDS + 1, len(contestants)))
     counts: list[dict[str, int]] = [{} for _ in contestants]
+    errors = np.empty((len(contestants), len(model.outputs)))
+    reference = model.simulate(maneuver).outputs
     for turn in range(ROUNDS + 1):
         for index, candidate in enumerate(reduced):
             trajectory = candidate.simulate(maneuver, start)
             seconds[turn, index] = trajectory.seconds
             counts[index] = trajectory.counts
+            errors[index] = rms(trajectory.outputs - reference)
     seconds = seconds[1:]
+
+    def speed_up(baseline: int) -> np.ndarray:
+        # Round by round, so that a burst of other load on the machine hits both alike.
+        own = np.where(seconds > 0.0, seconds, np.nan)
+        return np.median(seconds[:, [baseline]] / own, axis=0)
+
     samples = maneuver.samples
     columns: dict[str, tuple] = {
         "seconds": (np.median(seconds, axis=0), "s", "median time of a run in the compiled loop"),
         "seconds_lower": (np.quantile(seconds, 0.25, axis=0), "s", "lower quartile"),
         "seconds_upper": (np.quantile(seconds, 0.75, axis=0), "s", "upper quartile"),
+        "speed_up": (speed_up(0), "1", "against the paper's kind of baseline, median of rounds"),
+        "speed_up_strongest": (speed_up(1), "1", "against the strongest full order, median"),
+        "tolerance": (tolerances, "1", "largest step of the last iteration"),
         "seconds_per_sample": (np.median(seconds, axis=0) / samples, "s", "for one time point"),
         "offline_seconds": ([float(np.median(f)) for f in fits], "s", "training and fit, median"),
         "offline_residual_evaluations": (
@@ -130,13 +147,17 @@ def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Da
     }
     for name in COUNTS:
         columns[name] = ([count[name] for count in counts], "1", name.replace("_", " "))
-    dataset = xr.Dataset(
-        {
-            name: ("contestant", values, {"units": unit, "long_name": text})
-            for name, (values, unit, text) in columns.items()
-        },
-        {"contestant": [contestant.label for contestant in contestants]},
+    variables: dict[str, tuple] = {
+        name: ("contestant", values, {"units": unit, "long_name": text})
+        for name, (values, unit, text) in columns.items()
+    }
+    variables["rms_error"] = (
+        ("contestant", "output"),
+        errors,
+        {"units": "see outputs", "long_name": "RMS error on the run that is timed"},
     )
+    labels = [contestant.label for contestant in contestants]
+    dataset = xr.Dataset(variables, {"contestant": labels, "output": list(model.outputs)})
     dataset.attrs = {
         "title": f"timing of {model.name}, interleaved, {ROUNDS} rounds, {samples} time points",
         "source": "vehiclemor",

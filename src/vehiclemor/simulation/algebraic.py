@@ -39,7 +39,9 @@ SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
-# Rack displacements at which the limits of travel are found; between them they are interpolated.
+# Within this travel of the wheel centre (m) the limits of reach are looked for, by default.
+TRAVEL_LIMIT = 0.5
+# Rack displacements at which the limits of travel are found; between them the tighter ones count.
 RACKS_OF_REACH = 9
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
 SMALLEST_SINGULAR_VALUE = 1e-8
@@ -303,14 +305,17 @@ class AlgebraicModel:
         if len(known) > RACKS_OF_REACH:
             known = np.linspace(known[0], known[-1], RACKS_OF_REACH)
         limits = np.array([self.reach(float(rack)) for rack in known])
-        low = np.interp(racks, known, limits[:, 0])
-        high = np.interp(racks, known, limits[:, 1])
+        # Between two racks the tighter limits count: as functions of the rack they can jump.
+        after = np.searchsorted(known, racks)
+        before = np.where(known[after] == racks, after, after - 1)
+        low = np.maximum(limits[after, 0], limits[before, 0])
+        high = np.minimum(limits[after, 1], limits[before, 1])
         outside = np.flatnonzero((heights < low) | (heights > high))
         if len(outside):
             sample = outside[0]
             raise UnreachableError(
-                f"{self.name}: height {heights[sample]:.5f} m at t = {times[sample]:.6g} s is out "
-                f"of reach (from {heights.min():.4f} to {heights.max():.4f} m are asked for); the "
+                f"{self.name}: height {heights[sample]:.5g} m at t = {times[sample]:.6g} s is out "
+                f"of reach (from {heights.min():.4g} to {heights.max():.4g} m are asked for); the "
                 f"reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
                 f"(rack at {racks[sample]:g} m)"
             )
@@ -356,7 +361,9 @@ def build(
         If the mechanism can't be assembled, or is locked at its design position.
     """
     definition = component("model", name)
-    parameters = load_parameters(name, definition.PARAMETERS, parameter_file, overrides)
+    # A plug-in brings its own parameter file.
+    path = parameter_file or getattr(definition, "PARAMETER_FILE", None)
+    parameters = load_parameters(name, definition.PARAMETERS, path, overrides)
     design = definition.design_coordinates(parameters.values())
     equations, kernels, digest = _compiled(name)
     constants = np.empty(len(equations.program.constant_symbols))
@@ -371,7 +378,7 @@ def build(
         digest,
         constants,
         design,
-        definition.TRAVEL_LIMIT,
+        getattr(definition, "TRAVEL_LIMIT", TRAVEL_LIMIT),
     )
     nothing = np.zeros(len(model.inputs))
     gap = float(np.abs(model.residual(design, nothing)).max())

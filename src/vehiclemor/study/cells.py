@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
@@ -26,6 +28,8 @@ class Cell:
     ----------
     kernel, code
         Hash of the compiled kernels, and of the source of everything that computes results.
+    inputs
+        Hash of the output times and the inputs at these times.
     parameters
         Name -> value of the model's parameters, SI units.
     training_set
@@ -39,6 +43,7 @@ class Cell:
     code: str
     parameters: dict[str, Any]
     maneuver: str
+    inputs: str
     frequency_factor: float
     amplitude_factor: float
     start: str
@@ -114,14 +119,17 @@ def make_cell(
         method.check(model, complete)
     for pair in training_set:
         maneuver.perturbed(*pair)
-    if training == "set" and not training_set:
-        raise InputError("the training policy 'set' needs training_set: pairs of factors")
+    if (training == "set") != bool(training_set):
+        raise InputError(
+            "the training policy 'set', and no other, needs training_set: factor pairs"
+        )
     return Cell(
         model.name,
         model.kernel_hash,
-        code_digest(model.name, method_name, maneuver.name),
+        code_digest(model.name, method_name),
         {name: entry.value for name, entry in model.parameters.entries.items()},
         maneuver.name,
+        _input_hash(maneuver),
         maneuver.frequency_factor,
         maneuver.amplitude_factor,
         start,
@@ -131,6 +139,12 @@ def make_cell(
         complete,
         keep,
     )
+
+
+def _input_hash(maneuver: Maneuver) -> str:
+    times = maneuver.times
+    content = times.tobytes() + np.ascontiguousarray(maneuver.at(times)).tobytes()
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def expand(name: str, study: StudyFile) -> Grid:
@@ -160,6 +174,8 @@ def _expand(name: str, study: StudyFile) -> Grid:
             amplitude = value if factor == "amplitude_factor" else 1.0
             maneuver.perturbed(frequency, amplitude)
     dimensions["start"] = list(study.start or [model.starts[0]])
+    if len(set(dimensions["start"])) != len(dimensions["start"]):
+        raise InputError("start has the same value twice")
     known_settings = {
         setting
         for entry in methods.values()

@@ -23,8 +23,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def compute_cell(cell: Cell) -> xr.Dataset:
+def compute_cell(
+    cell: Cell, model: AlgebraicModel | None = None, maneuver: Maneuver | None = None
+) -> xr.Dataset:
     """Labelled result of a cell, whatever becomes of it.
+
+    Parameters
+    ----------
+    cell
+        What to compute.
+    model, maneuver
+        The model and the perturbed maneuver that the cell was made of; from the registry by
+        default.
 
     Returns
     -------
@@ -33,9 +43,10 @@ def compute_cell(cell: Cell) -> xr.Dataset:
         cell keeps trajectories.  Where nothing could be computed the values are missing and
         `status` and `message` tell why.
     """
-    model = _model(cell.model, json.dumps(cell.parameters, sort_keys=True))
-    base: Maneuver = component("maneuver", cell.maneuver)
-    maneuver = base.perturbed(cell.frequency_factor, cell.amplitude_factor)
+    model = model or _model(cell.model, json.dumps(cell.parameters, sort_keys=True))
+    if maneuver is None:
+        base: Maneuver = component("maneuver", cell.maneuver)
+        maneuver = base.perturbed(cell.frequency_factor, cell.amplitude_factor)
     method: Method = component("method", cell.method)
     accepted, reason = method.accepts(model)
     if not accepted:

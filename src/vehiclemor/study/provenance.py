@@ -4,10 +4,11 @@ import hashlib
 import inspect
 import os
 import platform
+import sys
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 from vehiclemor.registry import component
 
@@ -44,10 +45,11 @@ def machine() -> str:
 
 
 @cache
-def code_digest(model: str, method: str, maneuver: str) -> str:
-    """Hash of the source that computes a cell: these layers, the model's, method's and maneuver's.
+def code_digest(model: str, method: str) -> str:
+    """Hash of the source that computes a cell.
 
-    Results computed by other source are never taken for finished cells.
+    These are the layers of this package and, for a plug-in, all of its top-level package and its
+    version.  Results computed by other source are never taken for finished cells.
     """
     package = Path(__file__).resolve().parents[1]
     paths = [path for layer in LAYERS for path in sorted((package / layer).rglob("*.py"))]
@@ -57,15 +59,22 @@ def code_digest(model: str, method: str, maneuver: str) -> str:
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(path.read_bytes())
     for kind, name in (("model", model), ("method", method)):
-        digest.update(_source(component(kind, name)))
-    digest.update(_source(component("maneuver", maneuver).signal))
+        for text in _plug_in_source(component(kind, name)):
+            digest.update(text)
     return digest.hexdigest()[:16]
 
 
-def _source(thing: Any) -> bytes:
-    """Text of the file that defines a component; its name where there is no file."""
-    try:
-        path = inspect.getsourcefile(thing)
-    except TypeError:
-        path = inspect.getsourcefile(type(thing))
-    return Path(path).read_bytes() if path else repr(thing).encode()
+def _plug_in_source(thing: object) -> list[bytes]:
+    """Source texts of the package, or single file, that a component comes from."""
+    module = thing if isinstance(thing, ModuleType) else inspect.getmodule(thing)
+    if module is None:
+        module = inspect.getmodule(type(thing))
+    if module is None or module.__file__ is None:
+        return [repr(thing).encode()]
+    top = module.__name__.split(".")[0]
+    if top == "vehiclemor":
+        return []
+    origin = getattr(sys.modules.get(top), "__file__", None)
+    if origin is None or Path(origin).name != "__init__.py":
+        return [Path(module.__file__).read_bytes()]
+    return [path.read_bytes() for path in sorted(Path(origin).parent.rglob("*.py"))]

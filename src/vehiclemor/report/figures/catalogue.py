@@ -53,7 +53,9 @@ FIGURES: dict[str, Entry] = {
         ("figures-6-7",),
         histories.figure_7,
         "Errors of figure 6 against the full-order solution, for the default (least squares) and "
-        "the paper's literal procedure (Galerkin), beside the projection floor.",
+        "the paper's literal procedure (Galerkin), beside the RMS error of the "
+        "best approximation of the coordinates, "
+        "which one output can undercut.",
     ),
     "11": Entry(
         ("figure-11",),
@@ -88,9 +90,10 @@ FIGURES: dict[str, Entry] = {
         "directions, so r = 6 is shown for 21 roundings of the snapshots.",
     ),
     "equation-order": Entry(
-        ("equation-order",),
+        ("equation-order", "figures-6-7"),
         order.figure_equation_order,
         "Nominal RMS errors of Galerkin, U^T Phi = 0, when the same equations are written in 24 "
-        "other orders and with other signs; r = 3. Least squares does not depend on them.",
+        "other orders and with other signs; r = 3. Least squares sums the squares of "
+        "all equations and can't depend on their order.",
     ),
 }

@@ -50,12 +50,15 @@ def _control_periods(axis: Axes) -> None:
 
 def _comparison(dataset: xr.Dataset, replay: bool) -> Figure:
     figure, axes = _panels()
-    full, reduced = point(dataset, "full_order", rank=3), point(dataset, "pod", rank=3)
+    full = point(dataset, "full_order", rank=3)
     for axis, output in zip(axes, LABELS, strict=True):
         axis.plot(full.time, full["outputs"].sel(output=output), label="full order", **FULL)
-        axis.plot(
-            reduced.time, reduced["outputs"].sel(output=output), label="POD, r = 3", **DEFAULT
-        )
+        for label, text, style in (
+            ("pod", "POD, r = 3 (least squares)", DEFAULT),
+            ("pod_literal", "POD, r = 3 (literal)", LITERAL),
+        ):
+            reduced = point(dataset, label, rank=3)["outputs"].sel(output=output)
+            axis.plot(full.time, reduced, label=text, **style)
         if replay:
             recorded = point(dataset, "replay", rank=3)["outputs"].sel(output=output)
             axis.plot(full.time, recorded, label="replay", **REPLAY)
@@ -82,7 +85,9 @@ def figure_7(results: Results) -> Figure:
             error = reduced["outputs"] - reduced["reference_outputs"]
             axis.plot(reduced.time, error.sel(output=output), label=text, **style)
         floor = float(point(dataset, "pod", rank=3)["floor_rms_error"].sel(output=output))
-        axis.axhspan(-floor, floor, color="#BBBBBB", alpha=0.5, label="projection floor (RMS)")
+        axis.axhspan(
+            -floor, floor, color="#BBBBBB", alpha=0.5, label="RMS of the best approximation"
+        )
         _control_periods(axis)
     axes[0].set_ylabel("error of y (m)")
     axes[1].set_ylabel(r"error of $\eta$ (rad)")
@@ -121,7 +126,9 @@ def figure_14(results: Results) -> Figure:
     six = six.transpose("rounding_seed", "time").values
     lowest, highest = np.nanmin(six, axis=0), np.nanmax(six, axis=0)
     span: dict[str, Any] = {"color": "#D55E00", "alpha": 0.3, "linewidth": 0.0}
-    axes[1].fill_between(full.time, lowest, highest, label="POD, r = 6 (literal), spread", **span)
+    axes[1].fill_between(
+        full.time, lowest, highest, label="POD, r = 6 (literal), spread (leaves the axes)", **span
+    )
     uncut = point(spread, "pod_uncut", rank=6)["outputs"].sel(output="second_euler_angle")
     uncut = uncut.transpose("rounding_seed", "time").values
     axes[1].fill_between(

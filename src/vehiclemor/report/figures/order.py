@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VARIANTS = {
-    "pod_literal": ("Galerkin, other orders and signs", "#D55E00", "o"),
-    "pod_literal_reversed_arms": ("the same, arm angles counted the other way", "#CC79A7", "^"),
-    "pod": ("least squares", "#0072B2", "s"),
+    "pod_literal": ("Galerkin", "#D55E00", "o", -0.15),
+    "pod_literal_reversed_arms": ("Galerkin, arm angles reversed", "#CC79A7", "^", 0.15),
 }
 
 
@@ -28,24 +27,37 @@ def figure_equation_order(results: Mapping[str, xr.Dataset]) -> Figure:
     figure, axes = plt.subplots(1, 2, figsize=(6.7, 3.4))
     published = load_published().numbers
     for axis, (output, label), letter in zip(axes, OUTPUTS.items(), "ab", strict=True):
-        for method, (text, color, marker) in VARIANTS.items():
-            values = dataset["rms_error"].sel({"method": method, "output": output})
-            values = np.sort(values.squeeze(drop=True).values)
-            finite = values[np.isfinite(values)]
+        for method, (text, color, marker, shift) in VARIANTS.items():
+            chosen = dataset["rms_error"].sel({"method": method, "output": output})
+            values = chosen.squeeze(drop=True).values
+            order = np.argsort(values)
+            finite = int(np.isfinite(values).sum())
+            places = np.arange(1, len(values) + 1) + shift
             style = {"color": color, "marker": marker, "markersize": 4, "linestyle": "none"}
-            axis.semilogy(np.arange(1, len(finite) + 1), finite, label=text, **style)
-            diverged = len(values) - len(finite)
-            if diverged:
-                places = np.arange(len(finite) + 1, len(values) + 1)
-                top = np.full(diverged, 0.06)
-                axis.semilogy(places, top, color=color, marker="x", linestyle="none")
+            axis.semilogy(places[:finite], values[order[:finite]], label=text, **style)
+            natural = int(np.flatnonzero(order == 0)[0])
+            axis.semilogy(
+                places[natural],
+                values[0],
+                label="natural order" if shift < 0.0 else None,
+                marker="o",
+                markersize=10,
+                markerfacecolor="none",
+                color="black",
+                linestyle="none",
+            )
+            style["marker"] = "x"
+            axis.semilogy(places[finite:], np.full(len(values) - finite, 0.06), **style)
+        nominal = results["figures-6-7"].sel({"method": "pod", "rank": 3, "output": output})
+        least_squares = float(nominal["rms_error"].squeeze())
+        axis.axhline(least_squares, color="#0072B2", linestyle="--", label="least squares")
         axis.axhline(published[NUMBERS[output]].value, color="black", linewidth=0.8)
         axis.text(0.6, published[NUMBERS[output]].value * 1.2, "published", fontsize=7)
         axis.set_ylim(1e-7, 0.2)
-        axis.text(25.5, 0.085, "x: diverged", fontsize=7, ha="right")
+        axis.text(25.5, 0.085, "x: diverged, no error", fontsize=7, ha="right")
         axis.set_ylabel(label)
         axis.set_xlabel("variant, sorted by error")
         axis.set_title(f"({letter})")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure

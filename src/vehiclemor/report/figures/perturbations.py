@@ -21,6 +21,7 @@ OUTPUTS = {
     "spindle_y": "RMS error of y (m)",
     "second_euler_angle": r"RMS error of $\eta$ (rad)",
 }
+MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
 ONE_BASIS: dict[str, Any] = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
 FLOOR: dict[str, Any] = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
 NUMBERS = {"spindle_y": "dw_rms_spindle_y", "second_euler_angle": "dw_rms_second_euler_angle"}
@@ -47,9 +48,11 @@ def figure_13(results: Results) -> Figure:
                 errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
                 # Replay is exact at the nominal input: no point on a logarithmic axis.
                 errors = np.where(errors > 0.0, errors, np.nan)
-                axis.semilogy(percent, errors, label=text, marker=".", markersize=4, **style)
+                axis.semilogy(
+                    percent, errors, label=text, marker=MARKERS[method], markersize=3, **style
+                )
             floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
-            axis.semilogy(percent, floor, label="floor of the control periods", **FLOOR)
+            axis.semilogy(percent, floor, label="best approximation, control periods", **FLOOR)
             axis.axhline(
                 published[NUMBERS[output]].value,
                 color="black",
