@@ -135,7 +135,7 @@ def figure_14(results: Results) -> Figure:
         full.time,
         np.nanmin(uncut, axis=0),
         np.nanmax(uncut, axis=0),
-        label="POD, r = 6 (least squares), spread",
+        label="POD, r = 6 (least squares), spread (thinner than a line)",
         color="#0072B2",
         alpha=0.6,
         linewidth=0.0,
