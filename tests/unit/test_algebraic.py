@@ -25,7 +25,7 @@ def test_height_out_of_reach_names_both_limits(model: AlgebraicModel, height: fl
         model.solve([height, 0.0])
     message = str(error.value)
     assert "\n" not in message
-    assert f"{height:.4f}" in message
+    assert f"height {height:.5g} m" in message
     assert "-0.2146 to 0.2966 m" in message
 
 

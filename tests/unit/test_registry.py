@@ -47,7 +47,8 @@ def test_nearest_names_come_best_first() -> None:
 @pytest.fixture
 def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     found = {
-        ("vehiclemor.methods", "mine"): "json",
+        ("vehiclemor.methods", "mine"): "vehiclemor.reduction.replay",
+        ("vehiclemor.methods", "empty"): "json",
         ("vehiclemor.methods", "gone"): "no_such_package.method",
         ("vehiclemor.maneuvers", "nothing"): "json:no_such_object",
     }
@@ -62,10 +63,16 @@ def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("plugins")
 def test_plugins_register_as_built_ins_do() -> None:
-    import json
+    from vehiclemor.reduction import replay
 
-    assert names("method") == ["gone", "mine"]
-    assert component("method", "mine") is json
+    assert names("method") == ["empty", "gone", "mine"]
+    assert component("method", "mine") is replay
+
+
+@pytest.mark.usefixtures("plugins")
+def test_plugin_that_is_no_method_is_one_line() -> None:
+    with pytest.raises(InputError, match=r"method 'empty' \(json\) has no SUMMARY"):
+        component("method", "empty")
 
 
 @pytest.mark.usefixtures("plugins")
