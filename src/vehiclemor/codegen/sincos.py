@@ -16,7 +16,7 @@ TWO_OVER_PI = 0.63661977236758134308
 
 
 def sincos(angle):
-    """Sine and cosine of an angle in rad; within 1.2e-16 for |angle| < 1e4.
+    """Sine and cosine of an angle in rad; within 2e-16 for |angle| < 1e4.
 
     Parameters
     ----------

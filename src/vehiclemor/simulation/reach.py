@@ -36,7 +36,7 @@ def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[f
     Returns
     -------
     tuple of float
-        Both limits, to 1e-6 m, on the side that can be reached.
+        Both limits, to 2e-6 m, on the side that can be reached.
 
     Raises
     ------
