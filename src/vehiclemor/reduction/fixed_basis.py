@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from vehiclemor.reduction.projected import (
+    SUBSPACE_PRESETS,
     SUBSPACE_SETTINGS,
     ProjectedModel,
     check_subspace,
@@ -22,10 +23,7 @@ SUMMARY = "POD with one mean and basis for the whole run"
 REFERENCE = "10.1090/qam/910462"
 # As many snapshots as two control periods of the paper have together.
 SETTINGS = {**SUBSPACE_SETTINGS, "snapshots": replace(SUBSPACE_SETTINGS["snapshots"], default=20)}
-PRESETS: dict[str, dict[str, Value]] = {
-    "recommended": {},
-    "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},
-}
+PRESETS = SUBSPACE_PRESETS
 
 
 def presets(model: str) -> dict[str, dict[str, Value]]:

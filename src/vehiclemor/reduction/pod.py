@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.projected import (
+    SUBSPACE_PRESETS,
     SUBSPACE_SETTINGS,
     ProjectedModel,
     check_subspace,
@@ -28,13 +29,7 @@ SETTINGS = {
         "number", 5.0, "length of a control period in s", minimum=0.0, above=True
     ),
 }
-# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on
-# the order and signs in which the equations are written (galerkin does, by orders of magnitude),
-# and the rank cut keeps directions out that rounding chooses.
-PRESETS: dict[str, dict[str, Value]] = {
-    "recommended": {},
-    "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},
-}
+PRESETS = SUBSPACE_PRESETS
 
 
 def presets(model: str) -> dict[str, dict[str, Value]]:

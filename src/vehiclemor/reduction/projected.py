@@ -54,6 +54,13 @@ SUBSPACE_SETTINGS = {
         "integer", 0, "seed of a relative noise of 2^-52 on the snapshots; 0: none", minimum=0
     ),
 }
+# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on
+# the order and signs in which the equations are written (galerkin does, by orders of magnitude),
+# and the rank cut keeps directions out that rounding chooses.
+SUBSPACE_PRESETS: dict[str, dict[str, Value]] = {
+    "recommended": {},
+    "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},
+}
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,6 @@ CONVERGED = 0
 TOO_MANY_ITERATIONS = 1
 NOT_FINITE = 2
 SINGULAR = 3
-# Columns of the counts array.
-ITERATIONS = 0
-RESIDUALS = 1
-JACOBIANS = 2
-SOLVES = 3
 
 
 def increments(u, target, largest):
