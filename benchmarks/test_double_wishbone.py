@@ -81,7 +81,8 @@ def test_method(benchmark, model, label):
     benchmark.group = "methods, 1001 time points"
     name, preset, chosen = METHODS[label]
     method = component("method", name)
-    settings = validated(name, method.SETTINGS, chosen, method.presets(model.name)[preset])
+    declared = method.settings(model.kind)
+    settings = validated(name, declared, chosen, method.presets(model)[preset])
     start = model.starts[0]
     reduced = method.fit(model, training_runs(model, sine_travel, start, "matched"), settings)
     trajectory = benchmark(reduced.simulate, sine_travel, start)

@@ -23,8 +23,8 @@ def fitted(
 ) -> ReducedModel:
     """Reduced model by a registered method, its recommended preset and these settings."""
     definition = component("method", method)
-    preset = definition.presets(model.name)["recommended"]
-    complete = validated(method, definition.SETTINGS, settings, preset)
+    preset = definition.presets(model)["recommended"]
+    complete = validated(method, definition.settings(model.kind), settings, preset)
     definition.check(model, complete)
     runs = training_runs(model, maneuver, model.starts[0], policy)
     return definition.fit(model, runs, complete)
@@ -38,7 +38,7 @@ def figure_errors(model: AlgebraicModel, outputs: np.ndarray, reference: Traject
 
 def floor_errors(model: AlgebraicModel, reduced: ReducedModel, reference: Trajectory) -> np.ndarray:
     """The same of the best approximation in the reduced model's subspaces."""
-    best = reduced.best_approximation(reference.coordinates)
+    best = reduced.best_approximation(reference.states)
     assert best is not None
     return figure_errors(model, model.outputs_at(best, reference.inputs), reference)
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from vehiclemor.maneuvers import Maneuver
-    from vehiclemor.simulation.algebraic import AlgebraicModel
+    from vehiclemor.simulation.model import Model
 
 RESULTS = Path("results")
 
@@ -58,7 +58,7 @@ def model(
     name: str,
     parameters: Mapping[str, object] | None = None,
     parameter_file: str | Path | None = None,
-) -> AlgebraicModel:
+) -> Model:
     """A model ready to run: derived, compiled (or fetched from the kernel cache), parametrised.
 
     Parameters
@@ -75,7 +75,7 @@ def model(
     VehiclemorError
         If a name or value is wrong, or the mechanism can't be assembled.
     """
-    from vehiclemor.simulation.algebraic import build
+    from vehiclemor.simulation.model import build
 
     registry.component("model", name)
     return build(name, Path(parameter_file) if parameter_file else None, parameters)
@@ -85,7 +85,7 @@ _model = model
 
 
 def simulate(
-    model: str | AlgebraicModel,
+    model: str | Model,
     method: str = "full_order",
     *,
     maneuver: str | Maneuver | None = None,
@@ -134,11 +134,10 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    from vehiclemor.simulation.algebraic import AlgebraicModel
     from vehiclemor.study.cells import make_cell
     from vehiclemor.study.execution import compute_cell
 
-    ready = model if isinstance(model, AlgebraicModel) else _model(model)
+    ready = _model(model) if isinstance(model, str) else model
     if isinstance(maneuver, str) or maneuver is None:
         default = registry.component("model", ready.name).MANEUVER
         base: Maneuver = registry.component("maneuver", maneuver or default)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -130,7 +130,7 @@ def simulate(
         from vehiclemor.study.store import write_dataset
 
         write_dataset(dataset, out)
-    _print_simulation(dataset, out)
+    _print_simulation(dataset, ready.counts, out)
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
@@ -145,7 +145,7 @@ def _check_writable(out: Path) -> None:
         read_dataset(out, "source", "vehiclemor")
 
 
-def _print_simulation(dataset: xr.Dataset, out: Path | None) -> None:
+def _print_simulation(dataset: xr.Dataset, counts: Iterable[str], out: Path | None) -> None:
     status = dataset["status"].item()
     print(f"{dataset.attrs['title']}: {status} {dataset['message'].item()}".rstrip())
     print(f"{'output':<20} {'RMS error':>12} {'floor':>12} {'largest':>12} {'range':>12}")
@@ -154,8 +154,7 @@ def _print_simulation(dataset: xr.Dataset, out: Path | None) -> None:
         columns = ("rms_error", "floor_rms_error", "max_error", "signal_range")
         numbers = " ".join(f"{row[name].item():12.3e}" for name in columns)
         print(f"{output:<20} {numbers} {row['output_unit'].item()}")
-    names = ("iterations", "residual_evaluations", "jacobian_evaluations", "linear_solves")
-    print(", ".join(f"{name.replace('_', ' ')} {dataset[name].item()}" for name in names))
+    print(", ".join(f"{name.replace('_', ' ')} {dataset[name].item()}" for name in counts))
     print(f"seconds in the compiled loop {dataset['seconds'].item():.3e}")
     if out is not None:
         print(f"written: {out}")

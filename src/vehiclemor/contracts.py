@@ -5,6 +5,8 @@ Each function raises `AssertionError` with what is broken.  Call them from a tes
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
@@ -12,24 +14,42 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
-from vehiclemor.simulation.trajectory import COUNTS
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.model import Model, build
 
 
-def _nominal(model: AlgebraicModel) -> Maneuver:
+def _nominal(model: Model) -> Maneuver:
     return component("maneuver", component("model", model.name).MANEUVER)
 
 
 def check_model(name: str) -> None:
-    """A model has named quantities with units, consistent derivatives, and closes its loops."""
+    """A model has named quantities with units, and its nominal run can be simulated.
+
+    A kinematic model closes its loops along that run, and its Jacobian is that of its residual; a
+    dynamic model has finite derivatives.
+    """
     model = build(name)
     equations = model.equations
-    for quantities in (equations.coordinates, equations.inputs, equations.outputs):
+    for quantities in (
+        equations.coordinates,
+        getattr(equations, "speeds", ()),
+        equations.inputs,
+        equations.outputs,
+    ):
         labels = [quantity.name for quantity in quantities]
         assert len(set(labels)) == len(labels), f"{name}: a name occurs twice in {labels}"
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
+    assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
     maneuver = _nominal(model)
     assert maneuver.inputs == model.inputs, f"{name}: its maneuver gives other inputs"
+    if isinstance(model, AlgebraicModel):
+        _check_algebraic(model, maneuver)
+    else:
+        _check_dynamic(model, maneuver)
+
+
+def _check_algebraic(model: AlgebraicModel, maneuver: Maneuver) -> None:
+    name = model.name
     trajectory = model.simulate(maneuver)
     assert np.isfinite(trajectory.coordinates).all(), f"{name}: coordinates are not finite"
     largest = np.abs(model.residual_at(trajectory.coordinates, trajectory.inputs)).max()
@@ -46,6 +66,21 @@ def check_model(name: str) -> None:
     assert error < 1e-8, f"{name}: the Jacobian differs from differences by {error:.1e}"
 
 
+def _check_dynamic(model: Any, maneuver: Maneuver) -> None:
+    name = model.name
+    size = len(model.coordinates) + len(model.speeds)
+    u = maneuver.at(maneuver.times)[0]
+    for start in model.starts:
+        derivative = model.derivative(model.start(start), u)
+        assert derivative.shape == (size,), f"{name}: the derivative has a wrong shape"
+        assert np.isfinite(derivative).all(), f"{name}: derivative at {start!r} is not finite"
+    trajectory = model.simulate(maneuver)
+    assert trajectory.status == "ok", f"{name}: the nominal run is {trajectory.status}"
+    assert trajectory.states.shape == (len(trajectory.time), size), f"{name}: wrong shape of states"
+    for history in (trajectory.states, trajectory.outputs):
+        assert np.isfinite(history).all(), f"{name}: the nominal run is not finite"
+
+
 def check_method(name: str, model_name: str) -> None:
     """A method declares its settings, and gives complete, repeatable trajectories.
 
@@ -58,13 +93,13 @@ def check_method(name: str, model_name: str) -> None:
     if not accepted:
         assert reason, f"{name}: refuses {model_name} without a reason"
         return
-    presets = method.presets(model_name)
+    presets, declared = method.presets(model), method.settings(model.kind)
     assert "recommended" in presets, f"{name}: no preset 'recommended'"
-    for setting in method.SETTINGS.values():
+    for setting in declared.values():
         assert setting.doc, f"{name}: a setting is not described"
     maneuver = _nominal(model)
     for preset, values in presets.items():
-        settings = validated(name, method.SETTINGS, {}, values)
+        settings = validated(name, declared, {}, values)
         method.check(model, settings)
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)
@@ -73,14 +108,19 @@ def check_method(name: str, model_name: str) -> None:
             first = reduced.simulate(test, model.starts[0])
             again = reduced.simulate(test, model.starts[0])
             where = f"{name} ({preset}, {policy}) on {model_name}"
-            shape = (len(test.times), len(model.coordinates))
-            assert first.coordinates.shape == shape, f"{where}: coordinates have a wrong shape"
-            assert first.outputs.shape == (shape[0], len(model.outputs)), f"{where}: wrong outputs"
+            samples = len(test.times)
+            for history, names in (
+                (first.coordinates, model.coordinates),
+                (first.speeds, model.speeds),
+                (first.outputs, model.outputs),
+            ):
+                shape = (samples, len(names))
+                assert history.shape == shape, f"{where}: a history has a wrong shape"
             assert first.status in ("ok", "diverged"), f"{where}: status {first.status!r}"
             if first.status == "ok":
-                assert np.isfinite(first.coordinates).all(), f"{where}: ok, but not finite"
-            assert set(first.counts) == set(COUNTS), f"{where}: counts are incomplete"
-            same = np.array_equal(first.coordinates, again.coordinates, equal_nan=True)
+                assert np.isfinite(first.states).all(), f"{where}: ok, but not finite"
+            assert set(first.counts) == set(model.counts), f"{where}: counts are incomplete"
+            same = np.array_equal(first.states, again.states, equal_nan=True)
             assert same, f"{where}: two runs differ"
             assert first.counts == again.counts, f"{where}: the counts of two runs differ"
             assert reduced.effective_rank >= 0, f"{where}: negative rank"

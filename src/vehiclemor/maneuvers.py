@@ -83,6 +83,13 @@ LARGEST_FACTOR = 1e6
 TRAVEL_AMPLITUDE = 0.1
 TRAVEL_FREQUENCY = 0.1
 CHIRP_LAST_FREQUENCY = 0.4
+# Single lane change, a steering pulse that is smooth to its second derivative.  The amplitude is
+# calibrated on the 14-DOF vehicle: 3.5 m to the left after 25 s at 20 m/s.
+LANE_CHANGE_START = 1.0
+LANE_CHANGE_LENGTH = 2.5
+LANE_CHANGE_AMPLITUDE = 0.0300768
+LANE_CHANGE_DURATION = 25.0
+LANE_CHANGE_SAMPLES = 1251
 
 
 def _sine_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
@@ -118,5 +125,43 @@ chirp_travel = Maneuver(
     ("z", "s0"),
     duration=10.0,
     samples=1001,
+    corners=_smooth,
+)
+
+
+def _lane_change(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    part = (times - LANE_CHANGE_START) * frequency / LANE_CHANGE_LENGTH
+    angle = 2.0 * np.pi * np.clip(part, 0.0, 1.0)
+    pulse = np.sin(angle) - 0.5 * np.sin(2.0 * angle)
+    inside = (part > 0.0) & (part < 1.0)
+    return amplitude * LANE_CHANGE_AMPLITUDE * np.where(inside, pulse, 0.0)[:, None]
+
+
+def _lane_change_corners(frequency: float) -> tuple[float, ...]:
+    return LANE_CHANGE_START, LANE_CHANGE_START + LANE_CHANGE_LENGTH / frequency
+
+
+def _straight_ahead(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    del frequency, amplitude
+    return np.zeros((len(times), 1))
+
+
+lane_change = Maneuver(
+    "lane_change",
+    "single lane change of 3.5 m at 20 m/s, a steering pulse of 2.5 s from 1 s on, 25 s",
+    _lane_change,
+    ("delta",),
+    duration=LANE_CHANGE_DURATION,
+    samples=LANE_CHANGE_SAMPLES,
+    corners=_lane_change_corners,
+)
+
+straight_ahead = Maneuver(
+    "straight_ahead",
+    "no steering, 25 s",
+    _straight_ahead,
+    ("delta",),
+    duration=LANE_CHANGE_DURATION,
+    samples=LANE_CHANGE_SAMPLES,
     corners=_smooth,
 )

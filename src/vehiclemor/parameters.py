@@ -17,6 +17,32 @@ from vehiclemor.toml_files import FileSchema, read_toml
 LARGEST_LENGTH = 20.0
 
 
+@dataclass(frozen=True)
+class Declared:
+    """What a model says about one of its parameters.
+
+    Attributes
+    ----------
+    unit
+        SI unit; `1` for a pure number.
+    size
+        1: a scalar, given as a number; 3: a point, given as a list.
+    above, at_least, at_most
+        Bounds of every component, in the unit; no bound where None.
+    """
+
+    unit: str
+    size: int = 1
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+
+
+def point() -> Declared:
+    """Declaration of a point of a vehicle, in m."""
+    return Declared("m", size=3, at_least=-LARGEST_LENGTH, at_most=LARGEST_LENGTH)
+
+
 class Source(FileSchema):
     """Where values come from, and under which licence they are used."""
 
@@ -82,7 +108,7 @@ class ParameterSet:
 
 def load_parameters(
     model: str,
-    expected: Mapping[str, str],
+    expected: Mapping[str, Declared],
     path: Path | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> ParameterSet:
@@ -93,7 +119,7 @@ def load_parameters(
     model
         Name of the model.
     expected
-        Parameter name -> unit that the model needs.
+        Parameter name -> unit, size and bounds that the model needs.
     path
         Parameter file; the model's own public data by default.
     overrides
@@ -117,46 +143,67 @@ def load_parameters(
     if unknown:
         raise FileError(f"{path}: parameters.{unknown[0]} is not a parameter of {model}")
     entries = {name: content.parameters[name] for name in expected}
-    for name, unit in expected.items():
+    for name, declared in expected.items():
         entry = entries[name]
         where = f"{path}: parameters.{name}"
-        if entry.unit != unit:
-            raise FileError(f"{where}.unit: {entry.unit!r} is not the SI unit {unit!r}")
+        if entry.unit != declared.unit:
+            raise FileError(f"{where}.unit: {entry.unit!r} is not the SI unit {declared.unit!r}")
         if entry.source not in content.sources:
             raise FileError(f"{where}.source: {entry.source!r} is not listed under sources")
-        _check_point(entry.value, where, FileError)
+        _check_value(entry.value, declared, where, FileError)
     for name, value in (overrides or {}).items():
         if name not in entries:
             raise InputError(
                 f"{name!r} is not a parameter of {model}; it has {', '.join(expected)}"
             )
-        components = _components(value, name)
-        _check_point(components, f"parameter {name}", InputError)
+        number = _number_or_list(value, name)
+        _check_value(number, expected[name], f"parameter {name}", InputError)
         entries[name] = entries[name].model_copy(
-            update={"value": components, "status": "assumed", "source": "override"}
+            update={"value": number, "status": "assumed", "source": "override"}
         )
     return ParameterSet(model, entries)
 
 
-def _components(value: object, name: str) -> list[float]:
+def _number_or_list(value: object, name: str) -> float | list[float]:
     try:
-        return [float(component) for component in np.atleast_1d(np.array(value, dtype=float))]
-    except (TypeError, ValueError):
+        array = np.array(value, dtype=float)
+        return [float(component) for component in array] if array.ndim else float(array)
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"parameter {name}: {value!r} is not a number or list of numbers"
         ) from None
 
 
-def _check_point(
-    value: float | list[float], where: str, error: type[FileError] | type[InputError]
+def _check_value(
+    value: float | list[float],
+    declared: Declared,
+    where: str,
+    error: type[FileError] | type[InputError],
 ) -> None:
     components = value if isinstance(value, list) else [value]
-    if len(components) != 3:
+    if declared.size == 1 and isinstance(value, list):
+        raise error(f"{where}: a number is needed, not a list of {len(value)}")
+    if len(components) != declared.size:
         raise error(f"{where}: a point has 3 components (x, y, z), not {len(components)}")
     for component in components:
         if not math.isfinite(component):
             raise error(f"{where}: {component} is not finite")
-        if abs(component) > LARGEST_LENGTH:
-            raise error(
-                f"{where}: {component} m is outside +-{LARGEST_LENGTH:g} m (is it in millimetres?)"
-            )
+        complaint = _outside(component, declared)
+        if complaint:
+            raise error(f"{where}: {complaint}")
+
+
+def _outside(value: float, declared: Declared) -> str:
+    """What is wrong with a component that breaks a bound; empty if it keeps all of them."""
+    if declared == point():
+        if abs(value) <= LARGEST_LENGTH:
+            return ""
+        return f"{value} m is outside +-{LARGEST_LENGTH:g} m (is it in millimetres?)"
+    unit = "" if declared.unit == "1" else f" {declared.unit}"
+    if declared.above is not None and not value > declared.above:
+        return f"{value:g}{unit} is not above {declared.above:g}"
+    if declared.at_least is not None and value < declared.at_least:
+        return f"{value:g}{unit} is below the smallest allowed {declared.at_least:g}{unit}"
+    if declared.at_most is not None and value > declared.at_most:
+        return f"{value:g}{unit} is above the largest allowed {declared.at_most:g}{unit}"
+    return ""

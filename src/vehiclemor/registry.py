@@ -20,9 +20,15 @@ GROUPS = {
 
 # What a component must have; see `reduction/interface.py` and the handbook.
 REQUIRED = {
-    "model": ("KIND", "SUMMARY", "MANEUVER", "PARAMETERS", "derive", "design_coordinates"),
-    "method": ("SUMMARY", "REFERENCE", "SETTINGS", "presets", "accepts", "check", "fit"),
+    "model": ("KIND", "SUMMARY", "MANEUVER", "PARAMETERS", "derive"),
+    "method": ("SUMMARY", "REFERENCE", "settings", "presets", "accepts", "check", "fit"),
     "maneuver": ("summary", "signal", "inputs", "duration", "samples", "perturbed"),
+}
+# What a model of a kind must have besides.
+REQUIRED_OF_KIND = {
+    "ae": ("design_coordinates",),
+    "ode": ("starts", "check", "CYCLIC"),
+    "dae": ("starts", "check", "CYCLIC"),
 }
 
 
@@ -50,7 +56,8 @@ def component(kind: str, name: str) -> Any:
             f"{kind} {name!r} ({entries[name].value}) can't be imported: "
             f"{type(error).__name__}: {error}"
         ) from error
-    missing = [a for a in REQUIRED[kind] if not hasattr(loaded, a)]
+    required = REQUIRED[kind] + REQUIRED_OF_KIND.get(getattr(loaded, "KIND", ""), ())
+    missing = [a for a in required if not hasattr(loaded, a)]
     if missing:
         raise InputError(f"{kind} {name!r} ({entries[name].value}) has no {missing[0]}")
     return loaded

@@ -11,25 +11,24 @@ from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Setting, validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component, names
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
-from vehiclemor.simulation.trajectory import COUNTS, STATUSES, Trajectory, trajectory_dataset
+from vehiclemor.simulation.model import KINDS, Model, build
+from vehiclemor.simulation.trajectory import STATUSES, Trajectory, trajectory_dataset
 
 METHODS = names("method")
-KINEMATIC = [name for name in names("model") if component("model", name).KIND == "ae"]
-PAIRS = [(model, method) for model in KINEMATIC for method in METHODS]
+PAIRS = [(model, method) for model in names("model") for method in METHODS]
 
 
 class Pair:
     """A method on a model: fits and runs it."""
 
     def __init__(self, model: str, method: str) -> None:
-        self.model: AlgebraicModel = build(model)
+        self.model: Model = build(model)
         self.name, self.method = method, component("method", method)
         self.maneuver: Maneuver = component("maneuver", component("model", model).MANEUVER)
 
     def fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:
-        differing = self.method.presets(self.model.name)[preset]
-        settings = validated(self.name, self.method.SETTINGS, {}, differing)
+        differing = self.method.presets(self.model)[preset]
+        settings = validated(self.name, self.method.settings(self.model.kind), {}, differing)
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)
         start = self.model.starts[0]
@@ -61,49 +60,50 @@ def test_method_describes_itself(name: str) -> None:
     assert isinstance(method.REFERENCE, str)
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", METHODS)
-def test_settings_are_documented_and_their_defaults_allowed(name: str) -> None:
-    method: Method = component("method", name)
-    for key, setting in method.SETTINGS.items():
+def test_settings_are_documented_and_their_defaults_allowed(name: str, kind: str) -> None:
+    declared = component("method", name).settings(kind)
+    for key, setting in declared.items():
         assert key.isidentifier()
         assert isinstance(setting, Setting)
         assert setting.doc
         assert "\n" not in setting.doc
         assert setting.kind != "text" or not setting.choices or setting.default in setting.choices
-    defaults = validated(name, method.SETTINGS, {})
-    assert defaults == {key: setting.default for key, setting in method.SETTINGS.items()}
+    defaults = validated(name, declared, {})
+    assert defaults == {key: setting.default for key, setting in declared.items()}
 
 
-@pytest.mark.parametrize(("model", "name"), PAIRS)
-def test_presets_are_valid(model: str, name: str) -> None:
-    method: Method = component("method", name)
-    presets = method.presets(model)
+def test_presets_are_valid(pair: Pair) -> None:
+    presets = pair.method.presets(pair.model)
+    declared = pair.method.settings(pair.model.kind)
     assert "recommended" in presets
     for settings in presets.values():
-        complete = validated(name, method.SETTINGS, settings)
-        assert set(complete) == set(method.SETTINGS)
+        complete = validated(pair.name, declared, settings)
+        assert set(complete) == set(declared)
 
 
 def test_unknown_setting_is_refused(pair: Pair) -> None:
     with pytest.raises(InputError, match="unknown setting"):
-        validated(pair.name, pair.method.SETTINGS, {"no_such_setting": 1})
+        validated(pair.name, pair.method.settings(pair.model.kind), {"no_such_setting": 1})
 
 
 def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
-    for preset in pair.method.presets(pair.model.name):
+    for preset in pair.method.presets(pair.model):
         run = pair.run(pair.fit(preset))
         assert (run.status, run.message) == ("ok", "")
-        shape = (pair.maneuver.samples, len(pair.model.coordinates))
-        assert run.coordinates.shape == shape
-        assert run.outputs.shape == (shape[0], len(pair.model.outputs))
+        samples = pair.maneuver.samples
+        assert run.coordinates.shape == (samples, len(pair.model.coordinates))
+        assert run.speeds.shape == (samples, len(pair.model.speeds))
+        assert run.outputs.shape == (samples, len(pair.model.outputs))
         np.testing.assert_array_equal(run.time, pair.maneuver.times)
         np.testing.assert_array_equal(run.inputs, pair.maneuver.at(pair.maneuver.times))
-        assert np.isfinite(run.coordinates).all()
+        assert np.isfinite(run.states).all()
         assert np.isfinite(run.outputs).all()
-        # Outputs are those of the coordinates.
-        outputs = pair.model.outputs_at(run.coordinates, run.inputs)
+        # Outputs are those of the states.
+        outputs = pair.model.outputs_at(run.states, run.inputs)
         np.testing.assert_array_equal(run.outputs, outputs)
-        assert set(run.counts) == set(COUNTS)
+        assert set(run.counts) == set(pair.model.counts)
         assert all(type(count) is int and count >= 0 for count in run.counts.values())
         assert run.seconds >= 0.0
 
@@ -133,7 +133,7 @@ def test_results_are_deterministic(pair: Pair) -> None:
         pair.run(pair.fit()),
     )
     for run in (again, refitted):
-        np.testing.assert_array_equal(run.coordinates, first.coordinates)
+        np.testing.assert_array_equal(run.states, first.states)
         np.testing.assert_array_equal(run.outputs, first.outputs)
         assert (run.counts, run.status, run.message) == (first.counts, first.status, first.message)
 
@@ -154,10 +154,10 @@ def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
     reduced, full = pair.fit(), pair.model.simulate(pair.maneuver)
     assert 0 <= reduced.effective_rank <= len(pair.model.coordinates)
     assert reduced.offline.seconds >= 0.0
-    assert reduced.offline.residual_evaluations >= 0
-    best = reduced.best_approximation(full.coordinates)
+    assert reduced.offline.evaluations >= 0
+    best = reduced.best_approximation(full.states)
     if best is not None:
-        assert best.shape == full.coordinates.shape
+        assert best.shape == full.states.shape
         # A projection: what it gives is its own best approximation.
         again = reduced.best_approximation(best)
         np.testing.assert_allclose(again, best, rtol=0, atol=1e-12)

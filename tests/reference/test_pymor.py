@@ -36,6 +36,6 @@ def test_same_subspace_in_each_control_period(
     for maneuver in (nominal, two_way_travel()):
         for k, basis in enumerate(fitted(model, maneuver, "pod", rank=rank).bases):
             times = np.linspace(5.0 * k, 5.0 * k + 5.0, 10)
-            modes, _ = by_pymor(model.simulate(maneuver, times).coordinates.T, rank)
+            modes, _ = by_pymor(model.simulate(maneuver, times=times).coordinates.T, rank)
             difference = basis.vectors @ basis.vectors.T - modes @ modes.T
             assert np.abs(difference).max() < accuracy

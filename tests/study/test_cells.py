@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError, UnreachableError
@@ -118,6 +119,42 @@ def test_collection_as_rows(tmp_path):
     rows = flattened(results)
     assert rows.sizes["cell"] == 2 * 6 + 25 * 2
     assert set(rows["study"].values) == {"figures-6-7", "equation-order"}
+
+
+def test_rows_of_different_models_keep_their_units_and_counts():
+    def results(outputs, unit, count, speeds=()):
+        variables = {"rms_error": (("method", "output"), np.ones((1, len(outputs))))}
+        variables[count] = ("method", [7])
+        labels = {"method": ["m"], "output": outputs, "output_unit": ("output", [unit] * 2)}
+        if speeds:
+            variables["rms_speed_error"] = (("method", "speed"), np.ones((1, len(speeds))))
+            labels |= {"speed": speeds, "speed_unit": ("speed", ["m/s"] * len(speeds))}
+        return xr.Dataset(variables, labels)
+
+    rows = flattened(
+        {
+            "one": results(["toe", "rack"], "m", "iterations"),
+            "two": results(["yaw", "roll"], "rad", "rhs_calls", ["forward"]),
+        }
+    )
+    assert str(rows["output_unit"].sel(output="yaw").item()) == "rad"
+    assert str(rows["output_unit"].sel(output="toe").item()) == "m"
+    assert str(rows["speed_unit"].sel(speed="forward").item()) == "m/s"
+    assert rows["iterations"].values == pytest.approx([7, np.nan], nan_ok=True)
+    assert rows["rhs_calls"].values == pytest.approx([np.nan, 7], nan_ok=True)
+    assert np.isnan(rows["rms_speed_error"].values[..., 0]).all()
+
+
+def test_settings_of_a_method_that_refuses_the_model_are_not_judged(monkeypatch):
+    from vehiclemor.reduction import pod
+
+    monkeypatch.setattr(pod, "accepts", lambda model: (False, f"pod can't reduce {model.name}"))
+    cell = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rnk": 3}, "x")
+    assert cell.settings == {}
+    dataset = compute_cell(cell)
+    assert dataset["status"].item() == "rejected"
+    assert dataset["message"].item() == "pod can't reduce double_wishbone"
+    assert np.isnan(dataset["coordinates"]).all()
 
 
 def test_every_shipped_study_expands():

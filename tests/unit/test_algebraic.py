@@ -81,7 +81,7 @@ def test_sudden_jumps_of_the_input_stay_on_the_branch(
 def test_result_does_not_depend_on_the_sampling(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory
 ) -> None:
-    coarse = model.simulate(nominal, nominal.times[::50])
+    coarse = model.simulate(nominal, times=nominal.times[::50])
     np.testing.assert_allclose(coarse.coordinates, full.coordinates[::50], rtol=0, atol=1e-13)
     np.testing.assert_allclose(coarse.outputs, full.outputs[::50], rtol=0, atol=1e-13)
 

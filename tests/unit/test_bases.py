@@ -99,7 +99,7 @@ def test_snapshots_that_do_not_move_have_no_mode_above_a_tolerance() -> None:
 
 def test_half_a_sine_has_four_directions(model: AlgebraicModel) -> None:
     # Ten equidistant snapshots of half a sine hold five heights: four directions about their mean.
-    run = model.simulate(component("maneuver", "sine_travel"), np.linspace(0.0, 5.0, 10))
+    run = model.simulate(component("maneuver", "sine_travel"), times=np.linspace(0.0, 5.0, 10))
     values = pod_basis(run.coordinates.T, 8).singular_values
     assert values[3] > 1e-6 * values[0]
     assert values[4] < 1e-14 * values[0]

@@ -36,7 +36,7 @@ def test_least_squares_is_near_the_projection_floor(
     floor = floor_errors(model, reduced, full)
     assert np.all(figure_errors(model, run.outputs, full) < 1.5 * floor)
     # No trajectory in the subspaces is nearer in the coordinates' own norm than the projection.
-    best = reduced.best_approximation(full.coordinates) - full.coordinates
+    best = reduced.best_approximation(full.states) - full.coordinates
     assert np.sum(best**2) <= np.sum((run.coordinates - full.coordinates) ** 2)
 
 
@@ -94,7 +94,7 @@ def test_snapshots_are_hit_where_they_span_the_subspace(
     reduced = fitted(model, nominal, "pod", rank=4)
     for k, basis in enumerate(reduced.bases):
         times = np.linspace(5.0 * k, 5.0 * k + 5.0, 10)
-        exact = model.simulate(nominal, times).coordinates
+        exact = model.simulate(nominal, times=times).coordinates
         at = basis.mean + (exact - basis.mean) @ basis.vectors @ basis.vectors.T
         np.testing.assert_allclose(at, exact, rtol=0, atol=1e-14)
         # Both ends of the window are snapshots.
@@ -140,18 +140,16 @@ def test_replay_returns_its_training_run(
         assert run.seconds == 0.0
         np.testing.assert_array_equal(run.inputs, maneuver.at(maneuver.times))
     assert replay.effective_rank == 0
-    assert replay.best_approximation(full.coordinates) is None
+    assert replay.best_approximation(full.states) is None
 
 
 def test_offline_cost_counts_the_training_simulations(
     model: AlgebraicModel, nominal: Maneuver
 ) -> None:
-    few, many = (
-        fitted(model, nominal, "pod", snapshots=n).offline.residual_evaluations for n in (5, 50)
-    )
+    few, many = (fitted(model, nominal, "pod", snapshots=n).offline.evaluations for n in (5, 50))
     # Every snapshot but the two at the design position takes at least two Newton iterations.
     assert 2 * 8 <= few < many
-    assert fitted(model, nominal, "full_order").offline.residual_evaluations == 0
+    assert fitted(model, nominal, "full_order").offline.evaluations == 0
 
 
 @pytest.mark.parametrize(

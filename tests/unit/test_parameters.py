@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.parameters import load_parameters
+from vehiclemor.parameters import Declared, load_parameters, point
 from vehiclemor.resources import data_folder
 from vehiclemor.simulation.algebraic import build
 
-EXPECTED = {"pivot": "m", "joint": "m"}
+EXPECTED = {"pivot": point(), "joint": point()}
 VALID = """
 model = "toy"
 title = "A toy"
@@ -86,7 +86,7 @@ def test_wrong_file_is_one_line(tmp_path: Path, old: str, new: str, message: str
 def test_parameter_that_the_model_does_not_have_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path, VALID)
     with pytest.raises(FileError, match=r"parameters\.joint is not a parameter of toy"):
-        load_parameters("toy", {"pivot": "m"}, path)
+        load_parameters("toy", {"pivot": point()}, path)
 
 
 def test_missing_and_unreadable_files(tmp_path: Path) -> None:
@@ -129,6 +129,70 @@ def test_wrong_override_is_one_line(tmp_path: Path, name: str, value: object, me
     with pytest.raises(InputError, match=message) as error:
         load_parameters("toy", EXPECTED, written(tmp_path, VALID), {name: value})
     assert "\n" not in str(error.value)
+
+
+SCALARS = {
+    "mass": Declared("kg", above=0.0),
+    "speed": Declared("m/s", at_least=10.0, at_most=50.0),
+    "friction": Declared("1", at_least=0.0),
+    "pivot": point(),
+}
+WITH_SCALARS = (
+    VALID[: VALID.index("[parameters.joint]")]
+    + "".join(
+        f"""
+[parameters.{name}]
+symbol = "x"
+description = "a number"
+value = {value}
+unit = "{unit}"
+source = "book"
+status = "assumed"
+"""
+        for name, value, unit in (("mass", 2, "kg"), ("speed", 20.0, "m/s"), ("friction", 0, "1"))
+    )
+    + VALID[VALID.index("[parameters.pivot]") :]
+)
+
+
+def test_scalars_and_points_have_their_shapes(tmp_path: Path) -> None:
+    parameters = load_parameters("toy", SCALARS, written(tmp_path, WITH_SCALARS), {"speed": 10})
+    assert parameters["mass"].shape == parameters["speed"].shape == ()
+    assert parameters["pivot"].shape == (3,)
+    np.testing.assert_array_equal(parameters.flat(), [2.0, 10.0, 0.0, 1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("mass", -3, "parameter mass: -3 kg is not above 0"),
+        ("mass", 0, "parameter mass: 0 kg is not above 0"),
+        ("mass", np.inf, "parameter mass: inf is not finite"),
+        ("mass", [2.0], "parameter mass: a number is needed, not a list of 1"),
+        ("mass", [1.0, 2.0, 3.0], "parameter mass: a number is needed, not a list of 3"),
+        ("mass", 10**400, f"parameter mass: {10**400} is not a number or list of numbers"),
+        ("speed", 5, "parameter speed: 5 m/s is below the smallest allowed 10 m/s"),
+        ("speed", 60.5, "parameter speed: 60.5 m/s is above the largest allowed 50 m/s"),
+        ("friction", -0.1, "parameter friction: -0.1 is below the smallest allowed 0"),
+        ("pivot", 1.0, "parameter pivot: a point has 3 components (x, y, z), not 1"),
+    ],
+)
+def test_wrong_scalar_is_one_line(tmp_path: Path, name: str, value: object, message: str) -> None:
+    with pytest.raises(InputError) as error:
+        load_parameters("toy", SCALARS, written(tmp_path, WITH_SCALARS), {name: value})
+    assert str(error.value) == message
+
+
+def test_wrong_scalar_in_a_file_is_one_line(tmp_path: Path) -> None:
+    for old, new, message in (
+        ("value = 20.0", "value = 5.0", "parameters.speed: 5 m/s is below the smallest allowed 10"),
+        ("value = 2\n", "value = [2]\n", "parameters.mass: a number is needed, not a list of 1"),
+        ('unit = "kg"', 'unit = "t"', "parameters.mass.unit: 't' is not the SI unit 'kg'"),
+    ):
+        path = written(tmp_path, WITH_SCALARS.replace(old, new, 1))
+        with pytest.raises(FileError) as error:
+            load_parameters("toy", SCALARS, path)
+        assert str(error.value).startswith(f"{path}: {message}")
 
 
 def test_files_of_the_package_name_a_source_for_every_value() -> None:

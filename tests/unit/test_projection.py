@@ -122,7 +122,7 @@ def test_reversed_coordinates_equal_a_model_in_these_coordinates(
     # The same model in coordinates p = S q: other snapshots and bases, U^T Phi(S p) = 0.
     bases = []
     for begin in (0.0, 5.0):
-        snapshots = model.simulate(nominal, np.linspace(begin, begin + 5.0, 10)).coordinates
+        snapshots = model.simulate(nominal, times=np.linspace(begin, begin + 5.0, 10)).coordinates
         bases.append(pod_basis(signs @ snapshots.T, 3))
     path, _ = reduced_path(
         lambda p, u: model.residual(signs @ p, u),

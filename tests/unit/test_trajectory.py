@@ -1,11 +1,20 @@
 """Trajectories become labelled datasets with units, and errors are measured as named."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from vehiclemor.metrics import largest, rms, signal_range
+from vehiclemor.models.equations import Quantity
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.trajectory import COUNTS, Trajectory, trajectory_dataset
+from vehiclemor.simulation.trajectory import (
+    ALGEBRAIC_COUNTS,
+    DYNAMIC_COUNTS,
+    Trajectory,
+    trajectory_dataset,
+)
 
 
 def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: Trajectory) -> None:
@@ -23,17 +32,43 @@ def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: T
         "input": 2,
     }
     np.testing.assert_array_equal(dataset["inputs"].sel(input="z"), full.inputs[:, 0])
-    for name in COUNTS:
+    for name in ALGEBRAIC_COUNTS:
         assert int(dataset[name]) == full.counts[name]
     for variable in dataset.variables.values():
         assert variable.attrs.get("long_name")
-    for name in ("coordinates", "outputs", "inputs", "seconds", "time", *COUNTS):
+    for name in ("coordinates", "outputs", "inputs", "seconds", "time", *ALGEBRAIC_COUNTS):
         assert dataset[name].attrs["units"]
 
 
 def test_further_variables_are_added(model: AlgebraicModel, full: Trajectory) -> None:
     dataset = trajectory_dataset(model, full, {"extra": ("output", np.arange(6.0), {"units": "1"})})
     assert list(dataset["extra"].values) == [0, 1, 2, 3, 4, 5]
+
+
+def test_states_of_a_kinematic_model_are_its_coordinates(full: Trajectory) -> None:
+    assert full.speeds.shape == (1001, 0)
+    np.testing.assert_array_equal(full.states, full.coordinates)
+
+
+def test_speeds_and_counts_of_a_dynamic_model_are_written(
+    model: AlgebraicModel, full: Trajectory
+) -> None:
+    equations = SimpleNamespace(
+        coordinates=model.equations.coordinates,
+        speeds=(Quantity("forward", "m/s", "speed to the front"),),
+        inputs=model.equations.inputs,
+        outputs=model.equations.outputs,
+    )
+    dynamic = SimpleNamespace(equations=equations, speeds=("forward",), counts=DYNAMIC_COUNTS)
+    speeds = np.linspace(0.0, 1.0, 1001)[:, None]
+    run = replace(full, speeds=speeds, counts=dict.fromkeys(DYNAMIC_COUNTS, 7))
+    np.testing.assert_array_equal(run.states, np.hstack((full.coordinates, speeds)))
+    dataset = trajectory_dataset(dynamic, run)
+    forward = dataset["speeds"].sel(speed="forward")
+    np.testing.assert_array_equal(forward, speeds[:, 0])
+    assert str(forward["speed_unit"].item()) == "m/s"
+    assert int(dataset["rhs_calls"]) == 7
+    assert not set(dataset.variables) & (set(ALGEBRAIC_COUNTS) - set(DYNAMIC_COUNTS))
 
 
 def test_measures_of_an_error() -> None:

@@ -10,20 +10,25 @@ import ast
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
+from vehiclemor.codegen.schedule import Batch, schedule
 from vehiclemor.symbolic.program import Function, Program
 
 OPERATIONS = ("add", "multiply", "divide", "negate", "sqrt", "trigonometric", "power")
-# Sines and cosines of the arguments are evaluated this many at a time, so that the compiler makes
-# one vector loop of them.
+# Elementary functions are evaluated this many at a time, so that the compiler makes one vector loop
+# of them; fewer than the smallest batch one by one.
 LANES = 8
+SMALLEST_BATCH = 3
+# Batched function -> prefixes of its results; its block in the scratch space has one part for the
+# arguments and one for each result.
+RESULTS = {"sincos": ("_sin", "_cos"), "atan": ("_atan",)}
 
 
 class _Printer(PythonCodePrinter):
-    """Prints small integer powers as products, and sines and cosines as variables if asked."""
+    """Prints small integer powers as products, and batched functions as variables if asked."""
 
-    def __init__(self, pairs: bool) -> None:
+    def __init__(self, batched: bool) -> None:
         super().__init__({"fully_qualified_modules": True})
-        self._pairs = pairs
+        self._batched = batched
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
         base, exponent = expr.args
@@ -40,11 +45,15 @@ class _Printer(PythonCodePrinter):
 
     def _print_sin(self, expr: sp.Expr) -> str:
         inner = self._print(expr.args[0])
-        return f"sin_{inner}" if self._pairs else f"math.sin({inner})"
+        return f"_sin_{inner}" if self._batched else f"math.sin({inner})"
 
     def _print_cos(self, expr: sp.Expr) -> str:
         inner = self._print(expr.args[0])
-        return f"cos_{inner}" if self._pairs else f"math.cos({inner})"
+        return f"_cos_{inner}" if self._batched else f"math.cos({inner})"
+
+    def _print_atan(self, expr: sp.Expr) -> str:
+        inner = self._print(expr.args[0])
+        return f"_atan_{inner}" if self._batched else f"math.atan({inner})"
 
     def _print_Integer(self, expr: sp.Integer) -> str:
         return f"{int(expr)}.0"
@@ -58,35 +67,48 @@ class _Printer(PythonCodePrinter):
 
 
 def reference_source(program: Program) -> str:
-    """Plain Python source with the `math` module's sines and cosines: to read, count and check."""
-    return _source(program, pairs=False)
+    """Plain Python source with the `math` module's functions: to read, count and check."""
+    return _source(program, batched=False)
 
 
 def kernel_source(program: Program) -> str:
-    """Source for the compiler: sine and cosine of an angle are evaluated together.
+    """Source for the compiler: elementary functions in batches, sine and cosine together.
 
-    It calls `sincos(angle)` and `sincos_batch(work, first)`, which the linker provides.
+    It calls `sincos_one`, `sincos_batch`, `atan` and `atan_batch`, which the linker provides.
     """
-    return _source(program, pairs=True)
+    return _source(program, batched=True)
 
 
 def work_size(program: Program) -> int:
     """Number of floats of scratch space that the functions of the program need."""
-    widest = max(len(_leaf_angles(function, program)) for function in program.functions.values())
-    return 3 * _padded(widest)
+    functions = [program.constants, *program.functions.values()]
+    return max(3 * LANES, *(_scratch(_batches(function)) for function in functions))
 
 
-def _source(program: Program, pairs: bool) -> str:
+def _batches(function: Function) -> list[Batch]:
+    return [step for step in schedule(function) if isinstance(step, Batch)]
+
+
+def _scratch(batches: list[Batch]) -> int:
+    return sum(_block(b) * _blocks(b) for b in batches if len(b.arguments) >= SMALLEST_BATCH)
+
+
+def _block(batch: Batch) -> int:
+    return LANES * (1 + len(RESULTS[batch.name]))
+
+
+def _blocks(batch: Batch) -> int:
+    return -(-len(batch.arguments) // LANES)
+
+
+def _source(program: Program, batched: bool) -> str:
     hoisted = _function_source(
-        "constants", {"parameters": program.parameters}, (), program.constants, [], pairs
+        "constants", {"parameters": program.parameters}, (), program.constants, batched
     )
     parts = [hoisted]
     for name, function in program.functions.items():
-        angles = _leaf_angles(function, program) if pairs else []
         parts.append(
-            _function_source(
-                name, program.arguments, program.constant_symbols, function, angles, pairs
-            )
+            _function_source(name, program.arguments, program.constant_symbols, function, batched)
         )
     return "\n\n\n".join(parts) + "\n"
 
@@ -96,32 +118,61 @@ def _function_source(
     arguments: dict[str, tuple[sp.Symbol, ...]],
     constants: tuple[sp.Symbol, ...],
     function: Function,
-    angles: list[sp.Symbol],
-    pairs: bool,
+    batched: bool,
 ) -> str:
-    printer = _Printer(pairs)
-    expressions = _expressions(function)
+    printer = _Printer(batched)
+    expressions = [e for _, e in function.assignments] + list(function.results)
     used = set().union(*(e.free_symbols for e in expressions))
     signature = [*arguments, *(["constants"] if name != "constants" else []), "work", "result"]
-    lines = [f"def {name}({', '.join(signature)}):"]
+    # With an underscore: a model's own names never begin with one, and may be `q` or `work`.
+    lines = [f"def {name}({', '.join(f'_{argument}' for argument in signature)}):"]
     for argument, symbols in [*arguments.items(), ("constants", constants)]:
         lines += [
-            f"    {symbol} = {argument}[{index}]"
+            f"    {symbol} = _{argument}[{index}]"
             for index, symbol in enumerate(symbols)
             if symbol in used
         ]
-    lines += _batch(angles)
-    known = set(angles)
-    for symbol, expression in function.assignments:
-        if pairs:
-            lines += _scalar_pairs([expression], known)
-        lines.append(f"    {symbol} = {printer.doprint(expression)}")
-    if pairs:
-        lines += _scalar_pairs(function.results, known)
+    first = 0
+    for step in schedule(function) if batched else function.assignments:
+        if isinstance(step, Batch):
+            lines += _evaluation(step, first)
+            first += _scratch([step])
+        else:
+            lines.append(f"    {step[0]} = {printer.doprint(step[1])}")
     for index, expression in enumerate(function.results):
         place = _subscript(index, function.shape)
-        lines.append(f"    result[{place}] = {printer.doprint(expression)}")
+        lines.append(f"    _result[{place}] = {printer.doprint(expression)}")
     return "\n".join(lines if len(lines) > 1 else [*lines, "    pass"])
+
+
+def _evaluation(batch: Batch, first: int) -> list[str]:
+    """Lines that evaluate a batch with its scratch space from place `first` on.
+
+    Arguments and results lie in one array at constant distances, so that the compiler knows that
+    they don't overlap and makes vector code.
+    """
+    prefixes = RESULTS[batch.name]
+    if len(batch.arguments) < SMALLEST_BATCH:
+        one = "sincos_one" if batch.name == "sincos" else batch.name
+        return [
+            f"    {', '.join(f'{prefix}_{a}' for prefix in prefixes)} = {one}({a})"
+            for a in batch.arguments
+        ]
+    given, taken, block = [], [], _block(batch)
+    for index in range(LANES * _blocks(batch)):
+        place = first + block * (index // LANES) + index % LANES
+        argument = batch.arguments[index] if index < len(batch.arguments) else "0.0"
+        given.append(f"    _work[{place}] = {argument}")
+        if index < len(batch.arguments):
+            taken += [
+                f"    {prefix}_{argument} = _work[{place + LANES * (part + 1)}]"
+                for part, prefix in enumerate(prefixes)
+            ]
+    evaluated = [
+        f"    {batch.name}_batch(_work, {first + block * number})"
+        for number in range(_blocks(batch))
+    ]
+    return given + evaluated + taken
 
 
 def tangent_source(program: Program) -> str:
@@ -132,14 +183,13 @@ def tangent_source(program: Program) -> str:
     """
     function = program.functions["residual_jacobian"]
     rows, columns = function.shape
-    angles = _leaf_angles(function, program)
     text = _function_source(
-        "residual_tangent", program.arguments, program.constant_symbols, function, angles, True
+        "residual_tangent", program.arguments, program.constant_symbols, function, True
     )
     lines = text.splitlines()
-    lines[0] = lines[0].replace("result):", "basis, r, result):")
+    lines[0] = lines[0].replace("_result):", "_basis, _r, _result):")
     body = lines[: len(lines) - rows * columns]
-    printer = _Printer(pairs=True)
+    printer = _Printer(batched=True)
     products: list[str] = []
     for i in range(rows):
         terms = []
@@ -148,70 +198,14 @@ def tangent_source(program: Program) -> str:
             if entry == 0:
                 continue
             if entry in (1, -1):
-                terms.append(f"{'' if entry == 1 else '-'}basis[{j}, k]")
+                terms.append(f"{'' if entry == 1 else '-'}_basis[{j}, _k]")
                 continue
-            body.append(f"    j_{i}_{j} = {printer.doprint(entry)}")
-            terms.append(f"j_{i}_{j}*basis[{j}, k]")
-        products.append(f"        result[{i}, k] = {' + '.join(terms) or '0.0'}")
+            body.append(f"    _j_{i}_{j} = {printer.doprint(entry)}")
+            terms.append(f"_j_{i}_{j}*_basis[{j}, _k]")
+        products.append(f"        _result[{i}, _k] = {' + '.join(terms) or '0.0'}")
         residual = printer.doprint(function.results[i * columns + columns - 1])
-        body.append(f"    result[{i}, {columns - 1}] = {residual}")
-    return "\n".join([*body, "    for k in range(r):", *products]) + "\n"
-
-
-def _expressions(function: Function) -> list[sp.Expr]:
-    return [e for _, e in function.assignments] + list(function.results)
-
-
-def _trigonometric(expressions: list[sp.Expr] | tuple[sp.Expr, ...]) -> list[sp.Symbol]:
-    """Arguments of all sines and cosines, each once, in order of appearance."""
-    found: dict[sp.Symbol, None] = {}
-    for expression in expressions:
-        for call in sorted(expression.atoms(sp.sin, sp.cos), key=str):
-            angle = call.args[0]
-            if not isinstance(angle, sp.Symbol):
-                raise ValueError(f"{call}: name the angle on the tape first")
-            found[angle] = None
-    return list(found)
-
-
-def _leaf_angles(function: Function, program: Program) -> list[sp.Symbol]:
-    """Angles that are arguments of the function, so that they are known from the start."""
-    leaves = {symbol for symbols in program.arguments.values() for symbol in symbols}
-    return [angle for angle in _trigonometric(_expressions(function)) if angle in leaves]
-
-
-def _batch(angles: list[sp.Symbol]) -> list[str]:
-    """Blocks of 8 angles, their 8 sines and their 8 cosines in the scratch space.
-
-    The three lie in one array at constant distances, so that the compiler knows that they don't
-    overlap and makes vector code.
-    """
-    lines, names = [], []
-    for index in range(_padded(len(angles))):
-        first, lane = 3 * LANES * (index // LANES), index % LANES
-        angle = angles[index] if index < len(angles) else "0.0"
-        lines.append(f"    work[{first + lane}] = {angle}")
-        if index < len(angles):
-            names.append(f"    sin_{angle} = work[{first + lane + LANES}]")
-            names.append(f"    cos_{angle} = work[{first + lane + 2 * LANES}]")
-    blocks = range(_padded(len(angles)) // LANES) if angles else ()
-    calls = [f"    sincos_batch(work, {3 * LANES * block})" for block in blocks]
-    return lines + calls + names if angles else []
-
-
-def _padded(count: int) -> int:
-    return LANES * max(1, -(-count // LANES))
-
-
-def _scalar_pairs(
-    expressions: list[sp.Expr] | tuple[sp.Expr, ...], known: set[sp.Symbol]
-) -> list[str]:
-    lines = []
-    for angle in _trigonometric(expressions):
-        if angle not in known:
-            known.add(angle)
-            lines.append(f"    sin_{angle}, cos_{angle} = sincos({angle})")
-    return lines
+        body.append(f"    _result[{i}, {columns - 1}] = {residual}")
+    return "\n".join([*body, "    for _k in range(_r):", *products]) + "\n"
 
 
 def _subscript(index: int, shape: tuple[int, ...]) -> str:

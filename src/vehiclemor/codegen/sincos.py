@@ -56,3 +56,8 @@ def sincos_batch(work, first):
     for lane in range(8):
         i = first + lane
         work[i + 8], work[i + 16] = sincos(work[i])
+
+
+def sincos_one(angle):
+    """Sine and cosine of a single angle, for kernels: compiled once, not at every place."""
+    return sincos(angle)

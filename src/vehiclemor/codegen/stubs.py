@@ -39,3 +39,18 @@ def residual_tangent(
 ) -> None:
     """Jacobian times basis[:, :r] into result[:, :r], residual into result[:, N]."""
     raise NotImplementedError("runs only in a linked module")
+
+
+def derivative(x: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
+    """State derivative f(x, u) into result (2 N,)."""
+    raise NotImplementedError("runs only in a linked module")
+
+
+def second_order(x: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
+    """Mass matrix into result[:, :N] and forces into result[:, N]; result is (N, N + 1)."""
+    raise NotImplementedError("runs only in a linked module")
+
+
+def speeds(x: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
+    """Speeds into result (N,), where x holds rates of the coordinates in place of speeds."""
+    raise NotImplementedError("runs only in a linked module")

@@ -14,6 +14,7 @@ import sympy as sp
 
 from vehiclemor.errors import GeometryError
 from vehiclemor.models.equations import AlgebraicEquations, Quantity
+from vehiclemor.parameters import point
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.program import assemble
@@ -57,15 +58,15 @@ EQUATIONS = (
     Quantity("rack_displacement", "m", "prescribed rack displacement"),
 )
 PARAMETERS = {
-    "upper_arm_front_pivot": "m",
-    "upper_arm_rear_pivot": "m",
-    "upper_ball_joint": "m",
-    "lower_arm_front_pivot": "m",
-    "lower_arm_rear_pivot": "m",
-    "lower_ball_joint": "m",
-    "tie_rod_inner": "m",
-    "tie_rod_outer": "m",
-    "wheel_centre": "m",
+    "upper_arm_front_pivot": point(),
+    "upper_arm_rear_pivot": point(),
+    "upper_ball_joint": point(),
+    "lower_arm_front_pivot": point(),
+    "lower_arm_rear_pivot": point(),
+    "lower_ball_joint": point(),
+    "tie_rod_inner": point(),
+    "tie_rod_outer": point(),
+    "wheel_centre": point(),
 }
 
 

@@ -38,3 +38,27 @@ class AlgebraicEquations:
     equations: tuple[Quantity, ...]
     joints: tuple[str, ...]
     program: Program
+
+
+@dataclass(frozen=True)
+class DynamicEquations:
+    """First-order equations dx/dt = f(x, u) of a vehicle, x = (coordinates, speeds).
+
+    Constrained models (kind `dae`) have this form once their constraints are stabilised.
+
+    Attributes
+    ----------
+    coordinates, speeds, inputs, outputs
+        Quantities in the order of the model's specification.
+    program
+        Functions over the arguments `x` (2 n) and `u`: `derivative` (2 n) and `outputs`; for
+        mechanical models also `second_order` (n x (n + 1): mass matrix M and forces F of
+        M q'' = F in the coordinates), and `speeds` (n: the speeds where x holds the rates of the
+        coordinates in their place).
+    """
+
+    coordinates: tuple[Quantity, ...]
+    speeds: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    program: Program

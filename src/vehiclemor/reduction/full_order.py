@@ -11,27 +11,35 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.simulation.algebraic import SOLVERS, AlgebraicModel
+from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, SOLVERS
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "no reduction: the full-order model, the baseline"
 REFERENCE = ""
-SETTINGS = {
-    "solver": Setting(
-        "text",
-        "newton",
-        "newton: fresh Jacobians; newton_dense: without the generated elimination; chord: constant "
-        "inverse and predictor",
-        choices=SOLVERS,
-    ),
-    "tolerance": Setting(
-        "number", 1e-12, "largest step of the last iteration", minimum=0.0, above=True
-    ),
+# Kind of model -> settings; a model of another kind is solved as it comes.
+SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
+    "ae": {
+        "solver": Setting(
+            "text",
+            "newton",
+            "newton: fresh Jacobians; newton_dense: without the generated elimination; "
+            "chord: constant inverse and predictor",
+            choices=SOLVERS,
+        ),
+        "tolerance": Setting(
+            "number",
+            NEWTON_TOLERANCE,
+            "largest step of the last iteration",
+            minimum=0.0,
+            above=True,
+        ),
+    },
 }
-# The paper's kind of baseline is Newton's method; the strongest solver found stands beside it.
-PRESETS: dict[str, dict[str, Value]] = {
-    "recommended": {},
-    "strongest": {"solver": "chord", "tolerance": 1e-6},
+# Kind of model -> presets.  The paper's kind of baseline is Newton's method; the strongest solver
+# found stands beside it.
+PRESETS_BY_KIND: dict[str, dict[str, dict[str, Value]]] = {
+    "ae": {"recommended": {}, "strongest": {"solver": "chord", "tolerance": 1e-6}},
 }
 
 
@@ -39,9 +47,9 @@ PRESETS: dict[str, dict[str, Value]] = {
 class FullOrderModel:
     """The full-order model behind the interface of a reduced model."""
 
-    model: AlgebraicModel
-    solver: str
-    tolerance: float
+    model: Model
+    solver: str | None
+    tolerance: float | None
     offline: Offline = field(default_factory=Offline)
 
     @property
@@ -51,34 +59,42 @@ class FullOrderModel:
 
     def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
         """Full-order trajectory at the maneuver's output times."""
-        self.model.start(start)
-        return self.model.simulate(maneuver, solver=self.solver, tolerance=self.tolerance)
+        return self.model.simulate(maneuver, start, solver=self.solver, tolerance=self.tolerance)
 
-    def best_approximation(self, coordinates: np.ndarray) -> np.ndarray:
-        """The coordinates themselves: the full space holds them."""
-        return coordinates
-
-
-def presets(model: str) -> dict[str, dict[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return PRESETS
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+        """The states themselves: the full space holds them."""
+        return states
 
 
-def accepts(model: AlgebraicModel) -> tuple[bool, str]:
+def settings(kind: str) -> Mapping[str, Setting]:
+    """Settings of the solver of models of that kind."""
+    return SETTINGS_BY_KIND.get(kind, {})
+
+
+def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
+    """Presets of the solver of the model's kind."""
+    return PRESETS_BY_KIND.get(model.kind, {"recommended": {}})
+
+
+def accepts(model: Model) -> tuple[bool, str]:
     """Every model is accepted."""
     del model
     return True, ""
 
 
-def check(model: AlgebraicModel, settings: Mapping[str, Value]) -> None:
+def check(model: Model, settings: Mapping[str, Value]) -> None:
     """All validated settings fit every model."""
     del model, settings
 
 
 def fit(
-    model: AlgebraicModel, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
 ) -> FullOrderModel:
     """Nothing is fitted, and no training run is looked at."""
     del training
-    return FullOrderModel(model, str(settings["solver"]), float(settings["tolerance"]))
+    solver, tolerance = settings.get("solver"), settings.get("tolerance")
+    return FullOrderModel(
+        model,
+        None if solver is None else str(solver),
+        None if tolerance is None else float(tolerance),
+    )

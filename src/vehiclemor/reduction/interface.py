@@ -15,7 +15,7 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 
@@ -27,12 +27,12 @@ class Offline:
     ----------
     seconds
         Training simulations and fit.
-    residual_evaluations
-        Evaluations of the full residual in training simulations.
+    evaluations
+        Evaluations of the full model's equations in training simulations.
     """
 
     seconds: float = 0.0
-    residual_evaluations: int = 0
+    evaluations: int = 0
 
 
 class ReducedModel(Protocol):
@@ -52,8 +52,8 @@ class ReducedModel(Protocol):
         """Trajectory at the maneuver's output times."""
         ...
 
-    def best_approximation(self, coordinates: np.ndarray) -> np.ndarray | None:
-        """Projection of full-order coordinates (samples, n) onto the same subspaces, if any."""
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Projection of full-order states (samples, n) onto the same subspaces, if any."""
         ...
 
 
@@ -62,23 +62,26 @@ class Method(Protocol):
 
     SUMMARY: str
     REFERENCE: str
-    SETTINGS: Mapping[str, Setting]
 
-    def accepts(self, model: AlgebraicModel) -> tuple[bool, str]:
+    def settings(self, kind: str) -> Mapping[str, Setting]:
+        """Settings for models of that kind; none for a kind that it doesn't accept."""
+        ...
+
+    def accepts(self, model: Model) -> tuple[bool, str]:
         """Whether the method can reduce the model, and why not."""
         ...
 
-    def presets(self, model: str) -> Mapping[str, Mapping[str, Value]]:
+    def presets(self, model: Model) -> Mapping[str, Mapping[str, Value]]:
         """Preset name -> settings that differ from the declared defaults."""
         ...
 
-    def check(self, model: AlgebraicModel, settings: Mapping[str, Value]) -> None:
+    def check(self, model: Model, settings: Mapping[str, Value]) -> None:
         """Raise `InputError` if the settings don't fit the model."""
         ...
 
     def fit(
         self,
-        model: AlgebraicModel,
+        model: Model,
         training: Sequence[TrainingRun],
         settings: Mapping[str, Value],
     ) -> ReducedModel:

@@ -17,7 +17,8 @@ from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.windows import first_samples
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.trajectory import COUNTS, Trajectory
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
 
 ITERATION_LIMIT = 50
 
@@ -104,7 +105,7 @@ class ProjectedModel:
         means = np.array([basis.mean for basis in self.bases])
         ranks = np.array([basis.rank for basis in self.bases])
         path = np.full((len(times), n), np.nan)
-        counts = np.zeros(len(COUNTS), dtype=np.int64)
+        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
         arguments = (
             model.start(start),
             first_samples(times, self.edges),
@@ -126,13 +127,12 @@ class ProjectedModel:
         failure = None if status == 0 else (status, sample)
         return model.trajectory(times, inputs, path, counts, seconds, failure)
 
-    def best_approximation(self, coordinates: np.ndarray) -> np.ndarray:
-        """Projection of coordinates (samples of equidistant times, n) onto the subspaces."""
-        times = np.linspace(self.edges[0], self.edges[-1], len(coordinates))
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+        """Projection of states (samples of equidistant times, n) onto the subspaces."""
+        times = np.linspace(self.edges[0], self.edges[-1], len(states))
         first = first_samples(times, self.edges)
         parts = [
-            project(coordinates[first[k] : first[k + 1]], basis)
-            for k, basis in enumerate(self.bases)
+            project(states[first[k] : first[k + 1]], basis) for k, basis in enumerate(self.bases)
         ]
         return np.concatenate(parts)
 
@@ -168,12 +168,12 @@ def fit_windows(
     if settings["test_space"] == "galerkin":
         pairing = _pairing(model, settings)
         tests = tuple(pairing @ basis.vectors for basis in bases)
-    evaluations = sum(history.counts["residual_evaluations"] for history in histories)
+    evaluations = sum(history.counts[model.evaluations] for history in histories)
     offline = Offline(time.perf_counter() - began, evaluations)
     return ProjectedModel(model, edges, tuple(bases), tests, offline, float(settings["tolerance"]))
 
 
-def check_subspace(model: AlgebraicModel, settings: dict[str, Value]) -> None:
+def check_subspace(model: Model, settings: dict[str, Value]) -> None:
     """Raise `InputError` if rank, snapshots or coordinate names don't fit the model."""
     rank, snapshots = int(settings["rank"]), int(settings["snapshots"])
     states = len(model.coordinates)
@@ -186,7 +186,7 @@ def check_subspace(model: AlgebraicModel, settings: dict[str, Value]) -> None:
     _reversed(model, settings)
 
 
-def _reversed(model: AlgebraicModel, settings: dict[str, Value]) -> list[int]:
+def _reversed(model: Model, settings: dict[str, Value]) -> list[int]:
     names = [name for name in str(settings["reversed_coordinates"]).split(",") if name]
     for name in names:
         if name not in model.coordinates:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +16,11 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.trajectory import COUNTS, Trajectory
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "returns the training trajectory, whatever the input: the null hypothesis"
 REFERENCE = ""
-SETTINGS: dict[str, Setting] = {}
 PRESETS: dict[str, dict[str, Value]] = {"recommended": {}}
 
 
@@ -29,7 +28,7 @@ PRESETS: dict[str, dict[str, Value]] = {"recommended": {}}
 class ReplayModel:
     """Stored training trajectories."""
 
-    model: AlgebraicModel
+    model: Model
     recorded: tuple[Trajectory, ...]
     offline: Offline
 
@@ -43,37 +42,49 @@ class ReplayModel:
         self.model.start(start)
         inputs = maneuver.at(maneuver.times)
         nearest = min(self.recorded, key=lambda run: float(np.sum((run.inputs - inputs) ** 2)))
-        counts = np.zeros(len(COUNTS), dtype=np.int64)
-        return self.model.trajectory(maneuver.times, inputs, nearest.coordinates, counts, 0.0)
+        return replace(
+            nearest,
+            time=maneuver.times,
+            inputs=inputs,
+            outputs=self.model.outputs_at(nearest.states, inputs),
+            counts=dict.fromkeys(self.model.counts, 0),
+            seconds=0.0,
+        )
 
-    def best_approximation(self, coordinates: np.ndarray) -> None:
+    def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
-        del coordinates
+        del states
 
 
-def presets(model: str) -> dict[str, dict[str, Value]]:
+def settings(kind: str) -> dict[str, Setting]:
+    """There are no settings."""
+    del kind
+    return {}
+
+
+def presets(model: Model) -> dict[str, dict[str, Value]]:
     """Presets; the same for every model."""
     del model
     return PRESETS
 
 
-def accepts(model: AlgebraicModel) -> tuple[bool, str]:
+def accepts(model: Model) -> tuple[bool, str]:
     """Every model is accepted."""
     del model
     return True, ""
 
 
-def check(model: AlgebraicModel, settings: Mapping[str, Value]) -> None:
+def check(model: Model, settings: Mapping[str, Value]) -> None:
     """There are no settings."""
     del model, settings
 
 
 def fit(
-    model: AlgebraicModel, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
 ) -> ReplayModel:
     """Record the training runs at the output times."""
     del settings
     began = time.perf_counter()
     recorded = tuple(run.at(run.maneuver.times) for run in training)
-    evaluations = sum(run.counts["residual_evaluations"] for run in recorded)
+    evaluations = sum(run.counts[model.evaluations] for run in recorded)
     return ReplayModel(model, recorded, Offline(time.perf_counter() - began, evaluations))

@@ -8,7 +8,7 @@ import numpy as np
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import unknown
-from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 POLICIES = {
@@ -22,17 +22,17 @@ POLICIES = {
 class TrainingRun:
     """One maneuver of the full-order model, solved wherever a method asks."""
 
-    model: AlgebraicModel
+    model: Model
     maneuver: Maneuver
     start: str
 
     def at(self, times: np.ndarray) -> Trajectory:
         """Full-order trajectory, solved exactly at the given increasing times (samples,) in s."""
-        return self.model.simulate(self.maneuver, times)
+        return self.model.simulate(self.maneuver, self.start, times)
 
 
 def training_runs(
-    model: AlgebraicModel,
+    model: Model,
     maneuver: Maneuver,
     start: str,
     policy: str,

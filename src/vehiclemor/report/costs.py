@@ -12,6 +12,16 @@ if TYPE_CHECKING:
 
 # Per model: the error that is printed beside the times.
 ERROR_COLUMN = {"double_wishbone": "rms_second_euler_angle"}
+# Columns of the table, of which a model has those that its solvers count.
+COUNTS = (
+    "iterations",
+    "residual_evaluations",
+    "rhs_calls",
+    "steps",
+    "rejected_steps",
+    "jacobian_evaluations",
+    "factorisations",
+)
 
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
@@ -38,9 +48,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
             "rank": int(row["effective_rank"]),
             "us_per_run": own * 1e6,
             "ns_per_sample": float(row["seconds_per_sample"]) * 1e9,
-            "iterations": int(row["iterations"]),
-            "residual_evaluations": int(row["residual_evaluations"]),
-            "jacobian_evaluations": int(row["jacobian_evaluations"]),
+            **{name: int(row[name]) for name in COUNTS if name in data},
             "tolerance": float(row["tolerance"]),
             "quartile_spread": _share(float(row["seconds_upper"] - row["seconds_lower"]), own),
         }

@@ -18,7 +18,7 @@ from vehiclemor.reduction import pod
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import build
+from vehiclemor.simulation.model import build
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -144,7 +144,7 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     del results, label
     model = build("double_wishbone")
     maneuver = component("maneuver", component("model", model.name).MANEUVER)
-    settings = validated("pod", pod.SETTINGS, {"rank": 3})
+    settings = validated("pod", pod.settings(model.kind), {"rank": 3})
     bases = {}
     for name, factors in {"nominal": (1, 1), "amplitude": (1, 1.2), "frequency": (1.2, 1)}.items():
         runs = training_runs(model, maneuver.perturbed(*factors), model.starts[0], "matched")

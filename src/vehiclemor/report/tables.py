@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from vehiclemor.report.compare import comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.regenerate import write_text
-from vehiclemor.simulation.algebraic import build
+from vehiclemor.simulation.model import build
 from vehiclemor.study.run import run_studies
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Value, validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.model import Model, build
 from vehiclemor.study.provenance import code_digest, machine, versions
 from vehiclemor.study.store import prepare_folder, read_dataset, write_dataset
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 ROUNDS = 41
 FIT_ROUNDS = 9
-COUNTS = ("iterations", "residual_evaluations", "jacobian_evaluations", "linear_solves")
 
 
 @dataclass(frozen=True)
@@ -85,14 +84,14 @@ def timing(model_name: str, folder: Path) -> xr.Dataset:
     return dataset
 
 
-def _identity(model: AlgebraicModel) -> str:
+def _identity(model: Model) -> str:
     contestants = [repr(contestant) for contestant in CONTESTANTS[model.name]]
     digests = [code_digest(model.name, c.method) for c in CONTESTANTS[model.name]]
     content = json.dumps([contestants, digests, model.kernel_hash, machine(), ROUNDS])
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
-def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Dataset:
+def measure(model: Model, contestants: tuple[Contestant, ...]) -> xr.Dataset:
     """Time the contestants on the model's nominal maneuver."""
     import xarray as xr
 
@@ -103,8 +102,9 @@ def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Da
     tolerances: list[float] = []
     for index, contestant in enumerate(contestants):
         method: Method = component("method", contestant.method)
-        preset = method.presets(model.name)[contestant.preset]
-        settings = validated(contestant.method, method.SETTINGS, contestant.settings, preset)
+        preset = method.presets(model)[contestant.preset]
+        declared = method.settings(model.kind)
+        settings = validated(contestant.method, declared, contestant.settings, preset)
         runs = training_runs(model, maneuver, start, "nominal")
         # The first fit loads machine code and is not counted.
         candidates = [method.fit(model, runs, settings) for _ in range(FIT_ROUNDS + 1)]
@@ -114,7 +114,7 @@ def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Da
     seconds = np.empty((ROUNDS + 1, len(contestants)))
     counts: list[dict[str, int]] = [{} for _ in contestants]
     errors = np.empty((len(contestants), len(model.outputs)))
-    reference = model.simulate(maneuver).outputs
+    reference = model.simulate(maneuver, start).outputs
     for turn in range(ROUNDS + 1):
         for index, candidate in enumerate(reduced):
             trajectory = candidate.simulate(maneuver, start)
@@ -138,14 +138,14 @@ def measure(model: AlgebraicModel, contestants: tuple[Contestant, ...]) -> xr.Da
         "tolerance": (tolerances, "1", "largest step of the last iteration"),
         "seconds_per_sample": (np.median(seconds, axis=0) / samples, "s", "for one time point"),
         "offline_seconds": ([float(np.median(f)) for f in fits], "s", "training and fit, median"),
-        "offline_residual_evaluations": (
-            [candidate.offline.residual_evaluations for candidate in reduced],
+        "offline_evaluations": (
+            [candidate.offline.evaluations for candidate in reduced],
             "1",
-            "full residual evaluations in training",
+            "evaluations of the full model's equations in training",
         ),
         "effective_rank": ([candidate.effective_rank for candidate in reduced], "1", "rank"),
     }
-    for name in COUNTS:
+    for name in model.counts:
         columns[name] = ([count[name] for count in counts], "1", name.replace("_", " "))
     variables: dict[str, tuple] = {
         name: ("contestant", values, {"units": unit, "long_name": text})

@@ -28,7 +28,7 @@ from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import newton_loops, projected_loops
 from vehiclemor.simulation.reach import reachable_range
-from vehiclemor.simulation.trajectory import COUNTS, Trajectory
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
 
 # Input increment (m) above which a step of the input is cut into substeps.  Beside a fold, Newton's
 # method jumps to the other branch from farther away than this.
@@ -110,6 +110,16 @@ class AlgebraicModel:
         """Names of the initial conditions: where the iteration starts."""
         return STARTS
 
+    @property
+    def counts(self) -> Mapping[str, str]:
+        """What the solvers count: name -> meaning."""
+        return ALGEBRAIC_COUNTS
+
+    @property
+    def evaluations(self) -> str:
+        """Name of the count of evaluations of the equations."""
+        return "residual_evaluations"
+
     @cached_property
     def operation_counts(self) -> dict[str, dict[str, int]]:
         """Operations of each generated function, by kind and in total."""
@@ -142,11 +152,11 @@ class AlgebraicModel:
         self.kernels.newton_step(q, u, self.constants, self._work(), result)
         return result
 
-    def outputs_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of coordinates and inputs."""
-        result = np.empty((len(coordinates), len(self.outputs)))
+        result = np.empty((len(states), len(self.outputs)))
         self.kernels.output_path(
-            np.ascontiguousarray(coordinates), np.ascontiguousarray(inputs), self.constants, result
+            np.ascontiguousarray(states), np.ascontiguousarray(inputs), self.constants, result
         )
         return result
 
@@ -178,9 +188,10 @@ class AlgebraicModel:
     def simulate(
         self,
         maneuver: Maneuver,
+        start: str | None = None,
         times: np.ndarray | None = None,
-        solver: str = "newton",
-        tolerance: float = NEWTON_TOLERANCE,
+        solver: str | None = None,
+        tolerance: float | None = None,
     ) -> Trajectory:
         """Full-order solution at the given times (the maneuver's output times by default).
 
@@ -188,14 +199,16 @@ class AlgebraicModel:
         ----------
         maneuver
             Its inputs are the model's.
+        start
+            One of `starts`.
         times
             Increasing times (samples,) in s.
         solver
-            `newton`: fresh Jacobians, generated elimination, started at the previous sample.
-            `newton_dense`: the same with dense elimination and partial pivoting.  `chord`: constant
-            inverse of the design position, started at a quadratic extrapolation.
+            `newton`, the default: fresh Jacobians, generated elimination, started at the previous
+            sample.  `newton_dense`: the same with dense elimination and partial pivoting.
+            `chord`: constant inverse of the design position, started at a quadratic extrapolation.
         tolerance
-            Largest component of the last step of an iteration (rad or m).
+            Largest component of the last step of an iteration (rad or m), 1e-12 by default.
 
         Raises
         ------
@@ -209,8 +222,14 @@ class AlgebraicModel:
                 f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
                 f"{self.name} needs {', '.join(self.inputs)}"
             )
+        self.start(STARTS[0] if start is None else start)
         times = maneuver.times if times is None else np.asarray(times, dtype=float)
-        return self.solve_path(times, maneuver.at(times), solver, tolerance)
+        return self.solve_path(
+            times,
+            maneuver.at(times),
+            "newton" if solver is None else solver,
+            NEWTON_TOLERANCE if tolerance is None else tolerance,
+        )
 
     def solve_path(
         self,
@@ -223,7 +242,7 @@ class AlgebraicModel:
         inputs = np.ascontiguousarray(inputs, dtype=float)
         self.check_reach(times, inputs)
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
-        counts = np.zeros(len(COUNTS), dtype=np.int64)
+        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
         u_start = np.zeros(len(self.inputs))
         settings = (tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
         if solver in ("newton", "newton_dense"):
@@ -269,8 +288,9 @@ class AlgebraicModel:
             times,
             inputs,
             path,
+            np.empty((len(path), 0)),
             self.outputs_at(path, inputs),
-            {name: int(count) for name, count in zip(COUNTS, counts, strict=True)},
+            {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=True)},
             seconds,
             status,
             message,

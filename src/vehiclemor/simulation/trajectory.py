@@ -10,14 +10,23 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-    from vehiclemor.simulation.algebraic import AlgebraicModel
+    from vehiclemor.simulation.model import Model
 
 STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
-COUNTS = {
+# What the solvers of a kind of model count: name -> meaning.
+ALGEBRAIC_COUNTS = {
     "iterations": "solver iterations",
     "residual_evaluations": "evaluations of the residual equations",
     "jacobian_evaluations": "evaluations of the Jacobian",
     "linear_solves": "solutions of a linear system, or products with a constant inverse",
+}
+DYNAMIC_COUNTS = {
+    "rhs_calls": "evaluations of the right-hand side",
+    "steps": "accepted steps",
+    "rejected_steps": "rejected steps",
+    "jacobian_evaluations": "Jacobians, by differences of the right-hand side",
+    "factorisations": "LU factorisations of an iteration matrix",
+    "linear_solves": "solutions of a linear system, or products with a stored inverse",
 }
 
 
@@ -29,10 +38,10 @@ class Trajectory:
     ----------
     time
         Output times (samples,) in s.
-    inputs, coordinates, outputs
-        Histories (samples, number of quantities), SI units.
+    inputs, coordinates, speeds, outputs
+        Histories (samples, number of quantities), SI units; a kinematic model has 0 speeds.
     counts
-        Solver counts by name.
+        Solver counts by name, those of `Model.counts`.
     seconds
         Time spent in the compiled loop; 0 where nothing was computed.
     status
@@ -44,15 +53,21 @@ class Trajectory:
     time: np.ndarray
     inputs: np.ndarray
     coordinates: np.ndarray
+    speeds: np.ndarray
     outputs: np.ndarray
     counts: dict[str, int]
     seconds: float
     status: str = "ok"
     message: str = ""
 
+    @property
+    def states(self) -> np.ndarray:
+        """Coordinates and speeds side by side (samples, n)."""
+        return np.hstack((self.coordinates, self.speeds))
+
 
 def trajectory_dataset(
-    model: AlgebraicModel, trajectory: Trajectory, further: dict[str, tuple] | None = None
+    model: Model, trajectory: Trajectory, further: dict[str, tuple] | None = None
 ) -> xr.Dataset:
     """Labelled dataset of a trajectory: histories, counts, seconds and status, with units.
 
@@ -69,6 +84,8 @@ def trajectory_dataset(
         "outputs": ("output", trajectory.outputs, equations.outputs),
         "inputs": ("input", trajectory.inputs, equations.inputs),
     }
+    if model.speeds:
+        histories["speeds"] = ("speed", trajectory.speeds, equations.speeds)
     variables: dict[str, tuple] = {}
     coordinates: dict[str, tuple] = {
         "time": ("time", trajectory.time, {"units": "s", "long_name": "time"})
@@ -89,7 +106,7 @@ def trajectory_dataset(
             [quantity.unit for quantity in quantities],
             {"long_name": f"SI unit of the {label}"},
         )
-    for name, long_name in COUNTS.items():
+    for name, long_name in model.counts.items():
         attributes = {"units": "1", "long_name": long_name}
         variables[name] = ((), trajectory.counts.get(name, 0), attributes)
     variables["seconds"] = (

@@ -3,6 +3,7 @@
 import hashlib
 import itertools
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,10 +13,10 @@ import numpy as np
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.settings import Setting, Value, validated
 from vehiclemor.reduction.training import POLICIES
 from vehiclemor.registry import component, unknown
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.model import Model, build
 from vehiclemor.study.definition import FACTORS, StudyFile, values
 from vehiclemor.study.provenance import code_digest
 
@@ -89,7 +90,7 @@ class Grid:
 
 
 def make_cell(
-    model: AlgebraicModel,
+    model: Model,
     maneuver: Maneuver,
     start: str,
     method_name: str,
@@ -107,14 +108,17 @@ def make_cell(
         If a name, setting or factor is wrong, or does not fit the model.
     """
     method: Method = component("method", method_name)
-    presets = method.presets(model.name)
-    if preset not in presets:
-        raise unknown(f"preset of {method_name}", preset, presets)
-    complete = validated(method_name, method.SETTINGS, settings, presets[preset])
+    complete: dict[str, Value] = {}
+    accepted, _ = method.accepts(model)
+    # A refusal is a result: what was set for a model of another kind can't be judged here.
+    if accepted:
+        presets = method.presets(model)
+        if preset not in presets:
+            raise unknown(f"preset of {method_name}", preset, presets)
+        complete = validated(method_name, method.settings(model.kind), settings, presets[preset])
     model.start(start)
     if training not in POLICIES:
         raise unknown("training policy", training, POLICIES)
-    accepted, _ = method.accepts(model)
     if accepted:
         method.check(model, complete)
     for pair in training_set:
@@ -176,11 +180,11 @@ def _expand(name: str, study: StudyFile) -> Grid:
     dimensions["start"] = list(study.start or [model.starts[0]])
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
-    known_settings = {
-        setting
-        for entry in methods.values()
-        for setting in component("method", entry.method).SETTINGS
+    declared: dict[str, Mapping[str, Setting]] = {
+        label: component("method", entry.method).settings(model.kind)
+        for label, entry in methods.items()
     }
+    known_settings = set().union(*declared.values())
     for dimension in study.grid:
         if dimension not in known_settings and dimension not in FACTORS:
             raise unknown("grid dimension", dimension, known_settings | set(FACTORS))
@@ -191,8 +195,7 @@ def _expand(name: str, study: StudyFile) -> Grid:
         point = {d: dimensions[d][i] for d, i in zip(dimensions, place, strict=True)}
         entry = methods[point["method"]]
         settings: dict[str, object] = dict(entry.settings)
-        declared = component("method", entry.method).SETTINGS
-        settings |= {d: point[d] for d in study.grid if d in declared}
+        settings |= {d: point[d] for d in study.grid if d in declared[point["method"]]}
         identity = (
             point["method"],
             point["start"],

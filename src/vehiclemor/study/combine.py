@@ -27,6 +27,9 @@ LONG_NAMES = {
     "rounding_seed": "seed of rounding noise on the snapshots; 0 is none",
 }
 
+# Dimensions of a cell's errors; each has the units of its labels beside it.
+QUANTITIES = ("output", "coordinate", "speed")
+
 
 def cells_digest(grid: Grid) -> str:
     """Hash of all cells of a grid at their places: tells whether a combined dataset is current."""
@@ -105,10 +108,15 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
     import xarray as xr
 
     parts: list[xr.Dataset] = []
+    units: dict[str, dict[str, str]] = {name: {} for name in QUANTITIES}
     for name, dataset in results.items():
         rows = dataset.drop_dims([d for d in ("time", "input") if d in dataset.dims])
-        kept = ("output", "coordinate")
-        rows = rows.stack(cell=[d for d in rows.dims if d not in kept]).reset_index("cell")
+        for quantity in QUANTITIES:
+            if quantity in rows.dims:
+                pairs = zip(rows[quantity].values, rows[f"{quantity}_unit"].values, strict=True)
+                units[quantity] |= {str(label): str(unit) for label, unit in pairs}
+                rows = rows.drop_vars(f"{quantity}_unit")
+        rows = rows.stack(cell=[d for d in rows.dims if d not in QUANTITIES]).reset_index("cell")
         parts.append(rows.assign_coords(study=("cell", [name] * rows.sizes["cell"])))
     labels = sorted({str(c) for part in parts for c in part.coords if part[c].dims == ("cell",)})
     complete = [
@@ -121,6 +129,12 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
         )
         for part in parts
     ]
-    dataset = xr.concat(complete, dim="cell", coords="minimal", compat="override")
+    # Models differ in their quantities and counts: what a row does not have is missing in it.
+    dataset = xr.concat(complete, dim="cell", coords="minimal", compat="override", join="outer")
+    for quantity in QUANTITIES:
+        if quantity in dataset.dims:
+            column = [units[quantity][str(label)] for label in dataset[quantity].values]
+            attributes = {"long_name": f"SI unit of the {quantity}"}
+            dataset = dataset.assign_coords({f"{quantity}_unit": (quantity, column, attributes)})
     dataset.attrs = {"source": "vehiclemor", "studies": ", ".join(results), "versions": versions()}
     return dataset

@@ -14,7 +14,7 @@ from vehiclemor.metrics import largest, rms, signal_range
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.model import Model, build
 from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset
 from vehiclemor.study.cells import Cell
 from vehiclemor.study.provenance import machine, versions
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def compute_cell(
-    cell: Cell, model: AlgebraicModel | None = None, maneuver: Maneuver | None = None
+    cell: Cell, model: Model | None = None, maneuver: Maneuver | None = None
 ) -> xr.Dataset:
     """Labelled result of a cell, whatever becomes of it.
 
@@ -39,8 +39,8 @@ def compute_cell(
     Returns
     -------
     xarray.Dataset
-        Errors by output and coordinate, floors, counts, seconds and status; histories too if the
-        cell keeps trajectories.  Where nothing could be computed the values are missing and
+        Errors by output, coordinate and speed, floors, counts, seconds and status; histories too if
+        the cell keeps trajectories.  Where nothing could be computed the values are missing and
         `status` and `message` tell why.
     """
     model = model or _model(cell.model, json.dumps(cell.parameters, sort_keys=True))
@@ -52,13 +52,13 @@ def compute_cell(
     if not accepted:
         return _failed(model, maneuver, cell, "rejected", reason)
     try:
-        reference = model.simulate(maneuver)
+        reference = model.simulate(maneuver, cell.start)
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
         reduced = method.fit(model, runs, cell.settings)
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(maneuver, cell.start)
         trajectory = reduced.simulate(maneuver, cell.start)
-        approximation = reduced.best_approximation(reference.coordinates)
+        approximation = reduced.best_approximation(reference.states)
     except UnreachableError as error:
         return _failed(model, maneuver, cell, "unreachable", str(error))
     except ConvergenceError as error:
@@ -73,19 +73,18 @@ def compute_cell(
 
 
 @lru_cache(maxsize=16)
-def _model(name: str, parameters: str) -> AlgebraicModel:
+def _model(name: str, parameters: str) -> Model:
     """Model with the parameters of a cell; kept, since all cells of a study share it."""
     return build(name, overrides=json.loads(parameters))
 
 
-def _failed(
-    model: AlgebraicModel, maneuver: Maneuver, cell: Cell, status: str, message: str
-) -> xr.Dataset:
+def _failed(model: Model, maneuver: Maneuver, cell: Cell, status: str, message: str) -> xr.Dataset:
     times = maneuver.times
     missing = Trajectory(
         times,
         maneuver.at(times),
         np.full((len(times), len(model.coordinates)), np.nan),
+        np.full((len(times), len(model.speeds)), np.nan),
         np.full((len(times), len(model.outputs)), np.nan),
         {},
         np.nan,
@@ -96,7 +95,7 @@ def _failed(
 
 
 def _result(
-    model: AlgebraicModel,
+    model: Model,
     cell: Cell,
     trajectory: Trajectory,
     reference: Trajectory,
@@ -108,7 +107,6 @@ def _result(
     floor = np.full(len(model.outputs), np.nan)
     if approximation is not None:
         floor = rms(model.outputs_at(approximation, reference.inputs) - reference.outputs)
-    residual = model.residual_at(trajectory.coordinates, trajectory.inputs)
     by_output = {
         "rms_error": (rms(error), "RMS error of the output against the full-order solution"),
         "max_error": (largest(error), "largest absolute error of the output"),
@@ -124,18 +122,28 @@ def _result(
         rms(trajectory.coordinates - reference.coordinates),
         {"units": "see coordinate_unit", "long_name": "RMS error of the coordinate"},
     )
-    scalars = {
-        "largest_residual": (float(np.abs(residual).max()), "m", "largest residual of an equation"),
+    if model.speeds:
+        further["rms_speed_error"] = (
+            "speed",
+            rms(trajectory.speeds - reference.speeds),
+            {"units": "see speed_unit", "long_name": "RMS error of the speed"},
+        )
+    scalars: dict[str, tuple[float, str, str]] = {}
+    residual_at = getattr(model, "residual_at", None)
+    if residual_at is not None:
+        residual = float(np.abs(residual_at(trajectory.coordinates, trajectory.inputs)).max())
+        scalars["largest_residual"] = (residual, "m", "largest residual of an equation")
+    scalars |= {
         "effective_rank": (
             effective_rank,
             "1",
             "largest number of reduced coordinates in a window",
         ),
         "offline_seconds": (offline.seconds, "s", "training simulations and fit"),
-        "offline_residual_evaluations": (
-            offline.residual_evaluations,
+        "offline_evaluations": (
+            offline.evaluations,
             "1",
-            "full residual evaluations in training",
+            "evaluations of the full model's equations in training",
         ),
     }
     for name, (value, units, text) in scalars.items():

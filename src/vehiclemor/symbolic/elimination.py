@@ -105,3 +105,52 @@ def eliminate(
         known = sp.Add(*[a[row][k] * x for k, x in solution.items() if a[row][k] != 0])
         solution[column] = tape.let(tape.let(b[row] - known) * inverses[row])
     return [solution[column] for column in range(len(a))]
+
+
+def eliminate_symmetric(
+    tape: Tape,
+    matrix: Sequence[Sequence[sp.Expr]],
+    right_side: Sequence[sp.Expr],
+    order: Sequence[int],
+) -> list[sp.Expr]:
+    """Solve matrix x = right_side for a symmetric positive definite matrix by sparse L D L^T.
+
+    Parameters
+    ----------
+    order
+        Order of elimination.  Unknowns that couple to few others come first: eliminating them
+        leaves the Schur complement of the rest.
+
+    Returns
+    -------
+    list of sympy.Expr
+        The n unknowns, all intermediate results named on the tape.
+
+    Notes
+    -----
+    No pivot can vanish, whatever the order: Golub and Van Loan, *Matrix Computations* (4th ed.,
+    Johns Hopkins 2013), section 4.2.
+    """
+    a = {
+        (j, k): sp.sympify(matrix[j][k])
+        for place, j in enumerate(order)
+        for k in order[: place + 1]
+        if matrix[j][k] != 0
+    }
+    b = [sp.sympify(e) for e in right_side]
+    factors: dict[int, dict[int, sp.Expr]] = {}
+    inverses: dict[int, sp.Expr] = {}
+    for place, pivot in enumerate(order):
+        inverse = inverses[pivot] = tape.let(1 / a[pivot, pivot])
+        below = [j for j in order[place + 1 :] if (j, pivot) in a]
+        factors[pivot] = {j: tape.let(a[j, pivot] * inverse) for j in below}
+        for index, j in enumerate(below):
+            for k in below[: index + 1]:
+                change = factors[pivot][j] * a[k, pivot]
+                a[j, k] = tape.let(a.get((j, k), sp.Integer(0)) - change)
+            b[j] = tape.let(b[j] - factors[pivot][j] * b[pivot])
+    solution: dict[int, sp.Expr] = {}
+    for pivot in reversed(order):
+        known = sp.Add(*[factor * solution[j] for j, factor in factors[pivot].items()])
+        solution[pivot] = tape.let(b[pivot] * inverses[pivot] - known)
+    return [solution[column] for column in range(len(b))]

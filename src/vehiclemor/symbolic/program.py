@@ -72,7 +72,15 @@ def assemble(
     Returns
     -------
     Program
+
+    Raises
+    ------
+    ValueError
+        If a name of the model begins with an underscore: those are the generated names.
     """
+    for symbol in [*parameters, *(s for group in arguments.values() for s in group)]:
+        if symbol.name.startswith("_"):
+            raise ValueError(f"{symbol.name}: names that begin with an underscore are reserved")
     parameter_set = frozenset(parameters)
     wanted = [expression for expressions, _ in results.values() for expression in expressions]
     definitions = tape.definitions
@@ -124,7 +132,7 @@ def _share(
     assignments: list[tuple[sp.Symbol, sp.Expr]], wanted: list[sp.Expr]
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
     """Common subexpression elimination over all definitions and results together."""
-    names = sp.numbered_symbols("w", real=True)
+    names = sp.numbered_symbols("_w", real=True)
     expressions = [expression for _, expression in assignments] + wanted
     shared, reduced = cast(
         "tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]",
@@ -148,7 +156,7 @@ class _Hoisting:
             return expression
         symbol = self._known.get(expression)
         if symbol is None:
-            symbol = sp.Symbol(f"h{len(self._known)}", real=True)
+            symbol = sp.Symbol(f"_h{len(self._known)}", real=True)
             self._known[expression] = symbol
             self._definitions[symbol] = expression
             self.constant.add(symbol)

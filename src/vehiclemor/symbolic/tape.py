@@ -52,7 +52,7 @@ class Tape:
         negated = self._symbols.get(-expression)
         if negated is not None:
             return -negated
-        symbol = sp.Symbol(f"v{len(self._definitions)}", real=True)
+        symbol = sp.Symbol(f"_v{len(self._definitions)}", real=True)
         self._definitions[symbol] = expression
         self._symbols[expression] = symbol
         return symbol
@@ -110,15 +110,19 @@ def dependencies(
 ) -> list[sp.Symbol]:
     """Symbols that the expressions depend on, each after those it depends on itself."""
     order: dict[sp.Symbol, None] = {}
-
-    def visit(symbol: sp.Symbol) -> None:
-        if symbol in order or symbol not in definitions:
-            return
-        for argument in free_symbols(definitions[symbol]):
-            visit(argument)
-        order[symbol] = None
-
+    # A stack of its own: chains of definitions are longer than Python's recursion goes.
+    pending: list[tuple[sp.Symbol, bool]] = []
     for expression in expressions:
-        for argument in free_symbols(sp.sympify(expression)):
-            visit(argument)
+        wanted = free_symbols(sp.sympify(expression))
+        pending += [(symbol, False) for symbol in reversed(wanted)]
+        while pending:
+            symbol, complete = pending.pop()
+            if symbol in order or symbol not in definitions:
+                continue
+            if complete:
+                order[symbol] = None
+                continue
+            pending.append((symbol, True))
+            inner = free_symbols(definitions[symbol])
+            pending += [(s, False) for s in reversed(inner)]
     return list(order)

@@ -1,0 +1,99 @@
+"""Tire forces as symbolic expressions, for any set of coefficients.
+
+Magic Formula in the form of PAC2002 without shifts, inclination and residual torque: H. B. Pacejka,
+Tire and Vehicle Dynamics (3rd ed., Butterworth-Heinemann 2012), chapter 4; MSC Adams/Tire manual,
+PAC2002.  Signs are those of ISO 8855 with a slip angle that is positive when the contact point
+slides to the left.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from vehiclemor.symbolic.tape import Tape
+
+# Coefficients that the Magic Formula below needs; all are dimensionless.
+MAGIC_FORMULA = (
+    *("PCX1", "PDX1", "PDX2", "PEX1", "PEX2", "PEX3", "PKX1", "PKX2", "PKX3"),
+    *("PCY1", "PDY1", "PDY2", "PEY1", "PEY2", "PKY1", "PKY2"),
+    *("QBZ1", "QBZ2", "QBZ3", "QCZ1", "QDZ1", "QDZ2", "QEZ1", "QEZ2", "QEZ3"),
+    *("RBX1", "RBX2", "RCX1", "REX1", "RBY1", "RBY2", "RCY1", "REY1"),
+)
+
+
+@dataclass(frozen=True)
+class TireForces:
+    """Longitudinal and lateral force (N) and aligning moment (N m) on the wheel."""
+
+    longitudinal: sp.Expr
+    lateral: sp.Expr
+    aligning: sp.Expr
+
+
+def magic_formula(
+    tape: Tape,
+    coefficients: Mapping[str, sp.Expr],
+    load: sp.Expr,
+    reference_load: sp.Expr,
+    radius: sp.Expr,
+    slip_ratio: sp.Expr,
+    slip_angle: sp.Expr,
+    cos_slip_angle: sp.Expr,
+) -> TireForces:
+    """Forces at combined slip; zero where the load is zero.
+
+    Parameters
+    ----------
+    coefficients
+        `MAGIC_FORMULA` name -> value.
+    load, reference_load
+        Vertical force and F_z0 in N.
+    radius
+        Unloaded radius in m.
+    slip_ratio, slip_angle, cos_slip_angle
+        kappa, alpha in rad, and cos alpha.
+    """
+    c, let = coefficients, tape.let
+    d = let((load - reference_load) / reference_load)
+    kappa, alpha = slip_ratio, slip_angle
+
+    # Longitudinal.  Stiffness and peak are per load, so that their quotient has no 0/0.
+    peak = let(c["PDX1"] + c["PDX2"] * d)
+    stiffness = let((c["PKX1"] + c["PKX2"] * d) * let(sp.exp(c["PKX3"] * d)))
+    curvature = let(c["PEX1"] + d * (c["PEX2"] + c["PEX3"] * d))
+    b = let(stiffness / (c["PCX1"] * peak))
+    bent = let(c["PCX1"] * _arc(tape, let(b * kappa), curvature))
+    longitudinal = let(let(load * peak) * let(sp.sin(bent)))
+
+    # Lateral: sin(2 arctan x) = 2 x / (1 + x^2).
+    peak = let(c["PDY1"] + c["PDY2"] * d)
+    curvature = let(c["PEY1"] + c["PEY2"] * d)
+    x = let(load / (c["PKY2"] * reference_load))
+    # K_y / F_z, finite at zero load.
+    stiffness = let(2 * c["PKY1"] / (c["PKY2"] * (1 + x * x)))
+    b = let(stiffness / (c["PCY1"] * peak))
+    bent = let(c["PCY1"] * _arc(tape, let(b * alpha), curvature))
+    lateral = let(let(load * peak) * let(sp.sin(bent)))
+
+    # Weights of combined slip: cos(arctan x) = 1 / sqrt(1 + x^2).
+    b = let(c["RBX1"] / sp.sqrt(let(1 + (c["RBX2"] * kappa) ** 2)))
+    bent = let(c["RCX1"] * _arc(tape, let(b * alpha), c["REX1"]))
+    longitudinal = let(longitudinal * sp.cos(bent))
+    b = let(c["RBY1"] / sp.sqrt(let(1 + (c["RBY2"] * alpha) ** 2)))
+    bent = let(c["RCY1"] * _arc(tape, let(b * kappa), c["REY1"]))
+    lateral = let(lateral * sp.cos(bent))
+
+    # Pneumatic trail.
+    b = let(c["QBZ1"] + d * (c["QBZ2"] + c["QBZ3"] * d))
+    curvature = let(c["QEZ1"] + d * (c["QEZ2"] + c["QEZ3"] * d))
+    longest = let(load * (radius / reference_load) * (c["QDZ1"] + c["QDZ2"] * d))
+    bent = let(c["QCZ1"] * _arc(tape, let(b * alpha), curvature))
+    trail = let(longest * let(sp.cos(bent)) * cos_slip_angle)
+    return TireForces(longitudinal, lateral, let(-trail * lateral))
+
+
+def _arc(tape: Tape, x: sp.Expr, curvature: sp.Expr) -> sp.Expr:
+    """Inner part of every formula: arctan(x - E (x - arctan x))."""
+    inner = tape.let(x - curvature * (x - sp.atan(x)))
+    return tape.let(sp.atan(inner))

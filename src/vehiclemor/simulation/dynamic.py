@@ -1,0 +1,414 @@
+"""Dynamic models (kinds `ode` and `dae`) ready to run: compiled kernels with one parameter set."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.codegen.cache import kernel_hash, load_module
+from vehiclemor.codegen.emit import kernel_source, operation_counts, reference_source, work_size
+from vehiclemor.codegen.link import linked_source
+from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.equations import DynamicEquations, Quantity
+from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.registry import component, unknown
+from vehiclemor.simulation import explicit_loops, rosenbrock_loops, run_loops, system_loops
+from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
+from vehiclemor.simulation.signals import signal_of
+from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Trajectory
+
+SOLVERS = ("explicit", "rodas4", "ros34pw2")
+# Tolerance of the full-order runs that others are measured against.
+REFERENCE_TOLERANCE = 1e-9
+# A run that needs more evaluations of its right-hand side than this is going nowhere.
+MOST_CALLS = 400_000
+# First step (s) of a frozen-Jacobian run after a break point of the inputs.
+RESTART = 0.05
+# Step sizes (s) for which inverses are stored.
+LADDER = 2.0 ** (0.5 * np.arange(-32, 7))
+REASONS = {
+    1: f"more than {MOST_CALLS} evaluations of the right-hand side",
+    2: "a state is not finite",
+    3: "the matrix of a linear system is singular",
+    4: "the step size has become too small",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicModel:
+    """Compiled first-order equations dx/dt = f(x, u), x = (coordinates, speeds).
+
+    Attributes
+    ----------
+    name, summary, kind
+        Registered name, one line, and `ode` or `dae`.
+    equations
+        Named quantities and symbolic program.
+    parameters
+        Validated parameter set.
+    kernels
+        Linked module of compiled kernels and loops.
+    kernel_hash
+        Hash of the kernels' source and of the compiler's versions.
+    constants
+        Hoisted constants of the parameter set.
+    initial
+        Start -> state (2 n,).
+    active
+        Numbers of the states that the right-hand side depends on, cyclic ones left out.
+    typical
+        Magnitude of each state (2 n,) below which errors are measured absolutely.
+    validity
+        Output -> (smallest, largest) value at which the model means anything.
+    loads
+        Outputs that are zero where a wheel has left the road.
+    """
+
+    name: str
+    summary: str
+    kind: str
+    equations: DynamicEquations
+    parameters: ParameterSet
+    kernels: ModuleType
+    kernel_hash: str
+    constants: np.ndarray
+    initial: Mapping[str, np.ndarray]
+    active: np.ndarray
+    typical: np.ndarray
+    validity: Mapping[str, tuple[float, float]]
+    loads: tuple[str, ...]
+
+    counts = DYNAMIC_COUNTS
+    evaluations = "rhs_calls"
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return _names(self.equations.coordinates)
+
+    @property
+    def speeds(self) -> tuple[str, ...]:
+        """Names of the speeds."""
+        return _names(self.equations.speeds)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return _names(self.equations.inputs)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return _names(self.equations.outputs)
+
+    @property
+    def starts(self) -> tuple[str, ...]:
+        """Names of the initial conditions."""
+        return tuple(self.initial)
+
+    @cached_property
+    def operation_counts(self) -> dict[str, dict[str, int]]:
+        """Operations of each generated function, by kind and in total."""
+        return operation_counts(reference_source(self.equations.program))
+
+    def start(self, name: str | None = None) -> np.ndarray:
+        """First-order state (2 n,) of a named initial condition; the first one by default."""
+        name = name or self.starts[0]
+        if name not in self.initial:
+            raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")
+        return self.initial[name].copy()
+
+    def derivative(self, x: Any, u: Any) -> np.ndarray:
+        """Time derivative (2 n,) of the state x at inputs u."""
+        return self._call("derivative", x, u)
+
+    def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Outputs (samples, number of outputs) along a path of states and inputs."""
+        result = np.empty((len(states), len(self.outputs)))
+        self.kernels.output_path(
+            np.ascontiguousarray(states), np.ascontiguousarray(inputs), self.constants, result
+        )
+        return result
+
+    def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """State derivatives (samples, 2 n) along a path of states and inputs."""
+        result = np.empty_like(states)
+        self.kernels.derivative_path(
+            np.ascontiguousarray(states), np.ascontiguousarray(inputs), self.constants, result
+        )
+        return result
+
+    def mass_matrix(self, x: Any) -> np.ndarray:
+        """Mass matrix (n, n) that belongs to the second derivatives of the coordinates."""
+        return self._call("second_order", x, np.zeros(len(self.inputs)))[:, :-1]
+
+    def jacobian(self, x: Any, u: Any) -> np.ndarray:
+        """df/dx (2 n, 2 n) by central differences; columns of cyclic states are zero."""
+        x, u = self._checked(x, 2 * len(self.coordinates), "x"), self._inputs(u)
+        result = np.empty((len(x), len(x)))
+        self.kernels.jacobian_at(x, u, self.constants, self.active, result)
+        return result
+
+    @cached_property
+    def frozen_inverses(self) -> np.ndarray:
+        """Transposed active columns of (I - gamma h J)^-1 on the ladder of step sizes.
+
+        J belongs to the first start with all inputs zero: straight running.
+        """
+        x = self.start()
+        jacobian = self.jacobian(x, np.zeros(len(self.inputs)))
+        identity = np.eye(len(x))
+        gamma = ROS34PW2.gamma
+        return np.stack(
+            [np.linalg.inv(identity - gamma * h * jacobian)[:, self.active].T for h in LADDER]
+        )
+
+    def simulate(
+        self,
+        maneuver: Maneuver,
+        start: str | None = None,
+        times: np.ndarray | None = None,
+        solver: str | None = None,
+        tolerance: float | None = None,
+        longest_step: float | None = None,
+    ) -> Trajectory:
+        """Full-order trajectory at the given times (the maneuver's output times by default).
+
+        Parameters
+        ----------
+        maneuver
+            Its inputs are the model's.
+        start
+            Named initial condition.
+        times
+            Increasing times (samples,) in s.
+        solver
+            `explicit`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
+            Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
+            straight running, for all steps and runs.
+        tolerance
+            Largest local error of a state relative to its typical size plus its own.
+        longest_step
+            In s; unlimited by default, but for the W-method.
+
+        Raises
+        ------
+        InputError
+            If an input isn't finite or a name is unknown.
+        ConvergenceError
+            If the integration fails or leaves the model's range of validity.
+        """
+        trajectory = self.integrate(
+            maneuver,
+            self.start(start),
+            full_space(len(self.coordinates)),
+            solver or "explicit",
+            REFERENCE_TOLERANCE if tolerance is None else tolerance,
+            times,
+            longest_step,
+        )
+        if trajectory.status != "ok":
+            raise ConvergenceError(f"{self.name}: {trajectory.message}")
+        return trajectory
+
+    def integrate(
+        self,
+        maneuver: Maneuver,
+        state: np.ndarray,
+        spaces: Spaces,
+        solver: str,
+        tolerance: float,
+        times: np.ndarray | None = None,
+        longest_step: float | None = None,
+    ) -> Trajectory:
+        """Trajectory of the full or a projected system; a divergence is recorded in it.
+
+        Parameters
+        ----------
+        state
+            Initial state (2 n,).
+        spaces
+            Form of the system and its subspaces by window.
+        """
+        if maneuver.inputs != self.inputs:
+            raise InputError(
+                f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
+                f"{self.name} needs {', '.join(self.inputs)}"
+            )
+        if solver not in SOLVERS:
+            raise unknown("solver", solver, SOLVERS)
+        frozen = solver == "ros34pw2"
+        if frozen and spaces.form != system_loops.FULL:
+            raise InputError("ros34pw2 freezes the full model's Jacobian: not for a reduced model")
+        tableau = ROS34PW2 if frozen else RODAS4
+        times = maneuver.times if times is None else np.asarray(times, dtype=float)
+        signal = signal_of(maneuver)
+        end = float(times[-1]) if len(times) else maneuver.duration
+        edges, segments, windows = spaces.spans(signal.edges, end)
+        path = np.full((len(times), len(state)), np.nan)
+        counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
+        full = spaces.form == system_loops.FULL
+        active = self.active if full else np.arange(spaces.ranks.max())
+        inverses = self.frozen_inverses if frozen else np.zeros((1, 1, 1))
+        arguments = (
+            spaces.form,
+            solver == "explicit",
+            np.ascontiguousarray(state, dtype=float),
+            edges,
+            segments,
+            windows,
+            *spaces.arrays,
+            signal.arrays,
+            self.constants,
+            self.typical,
+            (tolerance, longest_step or np.inf, MOST_CALLS),
+            RESTART,
+            tableau.arguments,
+            frozen,
+            active,
+            LADDER,
+            inverses,
+            times,
+            path,
+            counts,
+        )
+        began = time.perf_counter()
+        status, reached = self.kernels.run(*arguments)
+        seconds = time.perf_counter() - began
+        failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
+        return self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
+
+    def trajectory(
+        self,
+        times: np.ndarray,
+        inputs: np.ndarray,
+        states: np.ndarray,
+        counts: np.ndarray,
+        seconds: float,
+        failure: str = "",
+    ) -> Trajectory:
+        """Trajectory of a path of states; it has diverged where the model means nothing."""
+        outputs = self.outputs_at(states, inputs)
+        message = failure or self._left_validity(times, outputs)
+        status = "diverged" if message else "ok"
+        n = len(self.coordinates)
+        return Trajectory(
+            times,
+            inputs,
+            states[:, :n],
+            states[:, n:],
+            outputs,
+            {name: int(count) for name, count in zip(DYNAMIC_COUNTS, counts, strict=True)},
+            seconds,
+            status,
+            message or self._lifted_wheels(times, outputs),
+        )
+
+    def _left_validity(self, times: np.ndarray, outputs: np.ndarray) -> str:
+        for name, (low, high) in self.validity.items():
+            values = outputs[:, self.outputs.index(name)]
+            outside = np.flatnonzero(~((values >= low) & (values <= high)))
+            if len(outside):
+                sample = outside[0]
+                return (
+                    f"{name} is {values[sample]:.4g} at t = {times[sample]:.6g} s; the model holds "
+                    f"from {low:g} to {high:g}"
+                )
+        return ""
+
+    def _lifted_wheels(self, times: np.ndarray, outputs: np.ndarray) -> str:
+        off = {}
+        for name in self.loads:
+            lifted = np.flatnonzero(outputs[:, self.outputs.index(name)] <= 0.0)
+            if len(lifted):
+                off[name.removeprefix("Fz_")] = float(times[lifted[0]])
+        if not off:
+            return ""
+        wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
+        return f"off the ground for a time: {wheels}"
+
+    def _call(self, function: str, x: Any, u: Any) -> np.ndarray:
+        x, u = self._checked(x, 2 * len(self.coordinates), "x"), self._inputs(u)
+        result = np.empty(self.equations.program.functions[function].shape)
+        work = np.zeros(self.kernels.WORK)
+        getattr(self.kernels, function)(x, u, self.constants, work, result)
+        return result
+
+    def _inputs(self, u: Any) -> np.ndarray:
+        return self._checked(np.atleast_1d(u), len(self.inputs), "u")
+
+    def _checked(self, value: Any, size: int, name: str) -> np.ndarray:
+        array = np.ascontiguousarray(value, dtype=float)
+        if array.shape != (size,):
+            raise InputError(f"{name} has shape {array.shape}, {self.name} needs ({size},)")
+        if not np.isfinite(array).all():
+            index = int(np.flatnonzero(~np.isfinite(array))[0])
+            raise InputError(f"{name}[{index}] is not finite")
+        return array
+
+
+def _names(quantities: Sequence[Quantity]) -> tuple[str, ...]:
+    return tuple(quantity.name for quantity in quantities)
+
+
+@lru_cache(maxsize=8)
+def _compiled(name: str) -> tuple[DynamicEquations, ModuleType, str]:
+    """Equations and compiled kernels of a registered model; parameters play no part here."""
+    equations: DynamicEquations = component("model", name).derive()
+    sizes = {
+        "N": len(equations.coordinates),
+        "INPUTS": len(equations.inputs),
+        "OUTPUTS": len(equations.outputs),
+        "WORK": work_size(equations.program),
+    }
+    loops = [system_loops, explicit_loops, rosenbrock_loops, run_loops]
+    source = linked_source(kernel_source(equations.program), loops, sizes, f"model {name}", False)
+    return equations, load_module(name, source), kernel_hash(source)
+
+
+def build(
+    name: str,
+    parameter_file: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> DynamicModel:
+    """Derive (or fetch), compile and parametrise a registered dynamic model.
+
+    Raises
+    ------
+    VehiclemorError
+        If a parameter is wrong or the vehicle can't stand.
+    """
+    definition = component("model", name)
+    path = parameter_file or getattr(definition, "PARAMETER_FILE", None)
+    parameters = load_parameters(name, definition.PARAMETERS, path, overrides)
+    values = {key: float(parameters[key]) for key in parameters.entries}
+    definition.check(values)
+    equations, kernels, digest = _compiled(name)
+    constants = np.empty(len(equations.program.constant_symbols))
+    kernels.constants(parameters.flat(), np.empty(kernels.WORK), constants)
+    states = [q.name for q in (*equations.coordinates, *equations.speeds)]
+    typical = dict.fromkeys(states, 1.0) | dict(getattr(definition, "TYPICAL", {}))
+    return DynamicModel(
+        name,
+        definition.SUMMARY,
+        definition.KIND,
+        equations,
+        parameters,
+        kernels,
+        digest,
+        constants,
+        definition.starts(values),
+        np.array([i for i, state in enumerate(states) if state not in definition.CYCLIC]),
+        np.array([typical[state] for state in states]),
+        getattr(definition, "VALIDITY", {}),
+        tuple(getattr(definition, "LOADS", ())),
+    )

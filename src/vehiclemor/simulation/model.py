@@ -1,0 +1,142 @@
+"""What every model offers, whatever its kind, and how a registered model is built."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.parameters import ParameterSet
+from vehiclemor.registry import component
+from vehiclemor.simulation.trajectory import Trajectory
+
+# Algebraic equations; ordinary differential equations; those with constraints.
+KINDS = ("ae", "ode", "dae")
+
+
+class Model(Protocol):
+    """A model ready to run, as studies, methods and reports see it.
+
+    A state is the coordinates and, after them, the speeds; kinematic models have no speeds.
+    """
+
+    @property
+    def name(self) -> str:
+        """Registered name."""
+        ...
+
+    @property
+    def summary(self) -> str:
+        """One line."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        ...
+
+    @property
+    def equations(self) -> Any:
+        """Named quantities `coordinates`, `inputs`, `outputs` and, if there are any, `speeds`."""
+        ...
+
+    @property
+    def parameters(self) -> ParameterSet:
+        """Validated parameter set."""
+        ...
+
+    @property
+    def kernel_hash(self) -> str:
+        """Hash of the kernels' source and of the compiler's versions."""
+        ...
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        ...
+
+    @property
+    def speeds(self) -> tuple[str, ...]:
+        """Names of the speeds."""
+        ...
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        ...
+
+    @property
+    def starts(self) -> tuple[str, ...]:
+        """Names of the initial conditions, the default first."""
+        ...
+
+    @property
+    def counts(self) -> Mapping[str, str]:
+        """What its solvers count: name -> meaning."""
+        ...
+
+    @property
+    def evaluations(self) -> str:
+        """Name of the count that tells how often its equations were evaluated."""
+        ...
+
+    @cached_property
+    def operation_counts(self) -> dict[str, dict[str, int]]:
+        """Operations of each generated function, by kind and in total."""
+        ...
+
+    def start(self, name: str) -> np.ndarray:
+        """State (n,) of an initial condition; `InputError` if there is none of that name."""
+        ...
+
+    def simulate(
+        self,
+        maneuver: Maneuver,
+        start: str | None = None,
+        times: np.ndarray | None = None,
+        solver: str | None = None,
+        tolerance: float | None = None,
+    ) -> Trajectory:
+        """Full-order solution; where None, the model's first start, output times and defaults."""
+        ...
+
+    def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Outputs (samples, number of outputs) along a path of states and inputs."""
+        ...
+
+
+def build(
+    name: str,
+    parameter_file: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Model:
+    """Derive (or fetch), compile and parametrise a registered model of any kind.
+
+    Raises
+    ------
+    InputError
+        If the name, the model's kind or an override is wrong.
+    VehiclemorError
+        If the parameters can't be read or the model can't be assembled from them.
+    """
+    kind = component("model", name).KIND
+    # Imported here: a model of one kind needs nothing of the other.
+    if kind == "ae":
+        from vehiclemor.simulation import algebraic
+
+        return algebraic.build(name, parameter_file, overrides)
+    if kind in ("ode", "dae"):
+        from vehiclemor.simulation import dynamic
+
+        return dynamic.build(name, parameter_file, overrides)
+    raise InputError(f"model {name!r} is of kind {kind!r}; allowed: {', '.join(KINDS)}")

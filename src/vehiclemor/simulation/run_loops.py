@@ -1,0 +1,211 @@
+"""One run over all spans and windows: compiled, so that no Python stands in a time loop."""
+
+import math
+
+import numpy as np
+
+from vehiclemor.codegen.stubs import INPUTS, OUTPUTS, WORK, N, derivative, outputs
+from vehiclemor.simulation.explicit_loops import explicit_span
+from vehiclemor.simulation.rosenbrock_loops import rosenbrock_span
+from vehiclemor.simulation.system_loops import COORDINATES, FULL, input_at, lifted, projected, slope
+
+
+def run(
+    form,
+    explicit,
+    start,
+    span_edges,
+    span_segments,
+    span_windows,
+    means,
+    lifts,
+    drops,
+    ranks,
+    signal,
+    constants,
+    typical,
+    limits,
+    restart,
+    tableau,
+    frozen,
+    active,
+    ladder,
+    inverses,
+    samples,
+    path,
+    counts,
+):
+    """Integrate from the start over all spans; a new window projects the state onto its space.
+
+    Parameters
+    ----------
+    span_edges, span_segments, span_windows
+        Edges (spans + 1,) in s, and for each span its segment of the signal and its window.
+    means, lifts, drops, ranks
+        Windows' means (W, 2 N), bases (W, R, 2 N) by rows, projections (W, R, 2 N), dimensions (W).
+    restart
+        Longest first step (s) of a span that begins at a break point of the inputs.
+
+    Returns
+    -------
+    tuple
+        Status (0 if all went well) and the time that was reached.
+    """
+    x = np.empty(2 * N)
+    scratch = (
+        np.empty(2 * N),
+        np.zeros(INPUTS),
+        np.empty(2 * N),
+        np.zeros(WORK),
+        np.empty((N, N + 1)),
+        np.empty((N, N + 1)),
+    )
+    largest = 0
+    for w in range(len(ranks)):
+        if ranks[w] > largest:
+            largest = ranks[w]
+    vectors = np.empty((9, largest))
+    square = 1 if explicit or frozen else largest
+    matrices = (
+        np.empty((square, square)),
+        np.empty((square, square)),
+        np.empty((8, largest)),
+        np.empty(largest, dtype=np.int64),
+    )
+    y = np.empty(largest)
+    for i in range(2 * N):
+        x[i] = start[i]
+    sample, window, step, segment = 0, -1, 0.0, -1
+    t = span_edges[0]
+    for span in range(len(span_segments)):
+        if span_windows[span] != window:
+            window = span_windows[span]
+            space = (means[window], lifts[window], drops[window])
+            dim = ranks[window]
+            if form == COORDINATES:
+                input_at(t, span_segments[span], signal, scratch[1])
+                counts[0] += 1
+            projected(form, x, dim, space, constants, scratch, y)
+            if sample == 0:
+                while sample < len(samples) and samples[sample] <= t:
+                    lifted(form, y, dim, space, constants, scratch, scratch[0])
+                    for i in range(2 * N):
+                        path[sample, i] = scratch[0][i]
+                    sample += 1
+        if segment >= 0 and span_segments[span] != segment:
+            step = min(step, restart)
+        segment = span_segments[span]
+        times = (span_edges[span], span_edges[span + 1])
+        if explicit:
+            status, t, step, sample = explicit_span(
+                form,
+                times,
+                segment,
+                y,
+                dim,
+                step,
+                limits,
+                signal,
+                space,
+                constants,
+                scratch,
+                typical,
+                vectors,
+                samples,
+                sample,
+                path,
+                counts,
+            )
+        else:
+            status, t, step, sample = rosenbrock_span(
+                form,
+                times,
+                segment,
+                y,
+                dim,
+                step,
+                limits,
+                signal,
+                space,
+                constants,
+                scratch,
+                typical,
+                vectors,
+                matrices,
+                tableau,
+                frozen,
+                active,
+                ladder,
+                inverses,
+                samples,
+                sample,
+                path,
+                counts,
+            )
+        if status != 0:
+            return status, t
+        lifted(form, y, dim, space, constants, scratch, x)
+        for i in range(2 * N):
+            if not math.isfinite(x[i]):
+                return 2, t
+    return 0, t
+
+
+def output_path(path, inputs, constants, result):
+    """Outputs at every sample of a path of states into result (samples, OUTPUTS)."""
+    work = np.zeros(WORK)
+    for sample in range(len(path)):
+        x, u = path[sample], inputs[sample]
+        outputs(x, u, constants, work, result[sample])
+
+
+def derivative_path(path, inputs, constants, result):
+    """State derivatives at every sample of a path into result (samples, 2 N)."""
+    work = np.zeros(WORK)
+    for sample in range(len(path)):
+        derivative(path[sample], inputs[sample], constants, work, result[sample])
+
+
+def jacobian_at(x, u, constants, active, result):
+    """Columns of df/dx (2 N, 2 N) by central differences; inactive ones are zero."""
+    work, shifted = np.zeros(WORK), np.empty(2 * N)
+    above, below = np.empty(2 * N), np.empty(2 * N)
+    for i in range(2 * N):
+        for j in range(2 * N):
+            result[i, j] = 0.0
+    for column in active:
+        change = 6e-6 * max(abs(x[column]), 1.0)
+        for i in range(2 * N):
+            shifted[i] = x[i]
+        shifted[column] = x[column] + change
+        derivative(shifted, u, constants, work, above)
+        shifted[column] = x[column] - change
+        derivative(shifted, u, constants, work, below)
+        for i in range(2 * N):
+            result[i, column] = (above[i] - below[i]) / (2.0 * change)
+
+
+def reduced_slope(form, t, segment, y, dim, signal, mean, lift, drop, constants, dy):
+    """Right-hand side of one window's reduced system at reduced coordinates y (dim)."""
+    scratch = (
+        np.empty(2 * N),
+        np.zeros(INPUTS),
+        np.empty(2 * N),
+        np.zeros(WORK),
+        np.empty((N, N + 1)),
+        np.empty((N, N + 1)),
+    )
+    slope(form, t, segment, y, dim, signal, (mean, lift, drop), constants, scratch, dy)
+
+
+def reduced_coordinates(form, x, dim, u, mean, lift, drop, constants, y):
+    """Reduced coordinates y (dim) of a state x in one window."""
+    scratch = (
+        np.empty(2 * N),
+        u,
+        np.empty(2 * N),
+        np.zeros(WORK),
+        np.empty((N, N + 1)),
+        np.empty((N, N + 1)),
+    )
+    projected(form, x, dim, (mean, lift, drop), constants, scratch, y)

@@ -1,0 +1,100 @@
+"""Inputs as piecewise polynomials, so that compiled loops can evaluate them at any time.
+
+Between two break points of a maneuver an input is smooth: quintic splines on equidistant knots,
+doubled until the error at the midpoints is below `ACCURACY` times the input's largest value.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+
+ACCURACY = 1e-11
+MOST_PIECES = 1 << 15
+DEGREE = 5
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Piecewise polynomial inputs.
+
+    Attributes
+    ----------
+    edges
+        Ends of the smooth segments (segments + 1,) in s: start, break points, end.
+    first
+        Number of the first piece of each segment (segments + 1,).
+    coefficients
+        Polynomials (pieces, inputs, 6) in the part of the piece that has passed (0 to 1), lowest
+        power first.
+    """
+
+    edges: np.ndarray
+    first: np.ndarray
+    coefficients: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Arguments of the compiled loops."""
+        return self.edges, self.first, self.coefficients
+
+
+def signal_of(maneuver: Maneuver) -> Signal:
+    """Piecewise polynomial inputs of a maneuver.
+
+    Raises
+    ------
+    InputError
+        If an input isn't finite, or isn't smooth between the break points that the maneuver names.
+    """
+    inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
+    edges = np.array([0.0, *inner, maneuver.duration])
+    probe = np.linspace(0.0, maneuver.duration, 1001)
+    values = maneuver.at(probe)
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        sample, column = bad[0]
+        raise InputError(
+            f"input {maneuver.inputs[column]} is not finite at t = {probe[sample]:.6g} s"
+        )
+    largest = np.abs(values).max(axis=0) + 1e-300
+    parts = [_segment(maneuver, a, b, largest) for a, b in pairwise(edges)]
+    first = np.cumsum([0, *(len(part) for part in parts)])
+    return Signal(edges, first.astype(np.int64), np.concatenate(parts))
+
+
+def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.ndarray:
+    """Polynomials (pieces, inputs, 6) between two break points."""
+    # One-sided values at the ends, where the input may jump.
+    inside = 1e-12 * (b - a)
+    pieces = 8
+    while pieces <= MOST_PIECES:
+        knots = np.linspace(a, b, pieces + 1)
+        values = maneuver.at(np.clip(knots, a + inside, b - inside))
+        if not np.isfinite(values).all():
+            raise InputError(f"an input is not finite between t = {a:g} and {b:g} s")
+        if np.all(values == values[0]):
+            constant = np.zeros((1, values.shape[1], DEGREE + 1))
+            constant[0, :, 0] = values[0]
+            middle = maneuver.at(np.linspace(a, b, 64)[1:-1])
+            if np.all(middle == values[0]):
+                return constant
+        spline = make_interp_spline(knots, values, k=DEGREE)
+        middles = (knots[1:] + knots[:-1]) / 2.0
+        error = np.abs(spline(middles) - maneuver.at(middles)) / largest
+        if error.max() < ACCURACY:
+            # Taylor terms at the left end of each piece.
+            step, factorial, terms = (b - a) / pieces, 1.0, []
+            for k in range(DEGREE + 1):
+                factorial *= max(k, 1)
+                terms.append(spline.derivative(k)(knots[:-1]) * step**k / factorial)
+            return np.ascontiguousarray(np.stack(terms, axis=-1))
+        pieces *= 2
+    raise InputError(
+        f"maneuver {maneuver.name!r} is not smooth between t = {a:g} and {b:g} s; name the times of "
+        f"its corners as break points"
+    )

@@ -1,0 +1,214 @@
+"""The system that the integrators see: the full model, or its projection on a subspace.
+
+Three forms have one right-hand side, `slope`:
+
+FULL
+    y is the state x = (coordinates, speeds); dy = f(x, u).
+STATE
+    x = mean + lift y; dy = drop f(x, u), with drop the projection (paper, section 3).
+COORDINATES
+    y = (a, b): coordinates q = mean + V a, rates V b; V^T M V db/dt = V^T F with the model's own
+    mass matrix, V the first rows of `lift`.
+
+`signal` is (edges, first, coefficients) of the inputs, `space` (mean, lift, drop) of the window,
+`scratch` (x, u, dx, work, matrix, small).
+"""
+
+import math
+
+import numpy as np
+
+from vehiclemor.codegen.stubs import INPUTS, N, derivative, second_order, speeds
+
+FULL = 0
+STATE = 1
+COORDINATES = 2
+
+
+def input_at(t, segment, signal, u):
+    """Inputs at time t, by the polynomials of one segment also beyond its ends, into u."""
+    edges, first, coefficients = signal
+    pieces = first[segment + 1] - first[segment]
+    a = edges[segment]
+    place = (t - a) / (edges[segment + 1] - a) * pieces
+    i = int(np.floor(place))
+    if i < 0:
+        i = 0
+    if i > pieces - 1:
+        i = pieces - 1
+    z = place - i
+    row = first[segment] + i
+    for j in range(INPUTS):
+        value = coefficients[row, j, 5]
+        value = coefficients[row, j, 4] + z * value
+        value = coefficients[row, j, 3] + z * value
+        value = coefficients[row, j, 2] + z * value
+        value = coefficients[row, j, 1] + z * value
+        u[j] = coefficients[row, j, 0] + z * value
+
+
+def lifted(form, y, dim, space, constants, scratch, x):
+    """State x (2 N) of reduced coordinates y (dim)."""
+    mean, lift, _ = space
+    if form == FULL:
+        for i in range(dim):
+            x[i] = y[i]
+        return
+    if form == STATE:
+        for i in range(2 * N):
+            x[i] = mean[i]
+        for j in range(dim):
+            for i in range(2 * N):
+                x[i] += lift[j, i] * y[j]
+        return
+    positions_and_rates(y, dim, space, x)
+    _, u, dx, work, _, _ = scratch
+    speeds(x, u, constants, work, dx)
+    for i in range(N):
+        x[N + i] = dx[i]
+
+
+def positions_and_rates(y, dim, space, x):
+    """Coordinates and their rates, in place of the speeds, of y = (a, b) into x (2 N)."""
+    mean, lift, _ = space
+    r = dim // 2
+    for i in range(N):
+        x[i] = mean[i]
+        x[N + i] = 0.0
+    for j in range(r):
+        for i in range(N):
+            x[i] += lift[j, i] * y[j]
+            x[N + i] += lift[j, i] * y[r + j]
+
+
+def projected(form, x, dim, space, constants, scratch, y):
+    """Reduced coordinates y (dim) of a state x (2 N); one derivative in form COORDINATES."""
+    mean, _, drop = space
+    if form == FULL:
+        for i in range(dim):
+            y[i] = x[i]
+    elif form == STATE:
+        for j in range(dim):
+            total = 0.0
+            for i in range(2 * N):
+                total += drop[j, i] * (x[i] - mean[i])
+            y[j] = total
+    else:
+        r = dim // 2
+        _, u, dx, work, _, _ = scratch
+        derivative(x, u, constants, work, dx)
+        for j in range(r):
+            total, rate = 0.0, 0.0
+            for i in range(N):
+                total += drop[j, i] * (x[i] - mean[i])
+                rate += drop[j, i] * dx[i]
+            y[j] = total
+            y[r + j] = rate
+
+
+def slope(form, t, segment, y, dim, signal, space, constants, scratch, dy):
+    """Right-hand side of the system at time t into dy (dim)."""
+    x, u, dx, work, matrix, small = scratch
+    input_at(t, segment, signal, u)
+    if form == FULL:
+        derivative(y, u, constants, work, dy)
+    elif form == STATE:
+        lifted(form, y, dim, space, constants, scratch, x)
+        derivative(x, u, constants, work, dx)
+        drop = space[2]
+        for j in range(dim):
+            total = 0.0
+            for i in range(2 * N):
+                total += drop[j, i] * dx[i]
+            dy[j] = total
+    else:
+        lifted(form, y, dim, space, constants, scratch, x)
+        second_order(x, u, constants, work, matrix)
+        galerkin(dim // 2, space[1], matrix, dx, small)
+        r = dim // 2
+        for j in range(r):
+            dy[j] = y[r + j]
+            dy[r + j] = small[j, r]
+
+
+def galerkin(r, lift, matrix, image, small):
+    """Solve (V^T M V) a = V^T F; V^T are the rows of lift; a replaces column r of small."""
+    for k in range(r):
+        for i in range(N):
+            image[i] = 0.0
+        # M is symmetric: its rows are its columns.
+        for j in range(N):
+            weight = lift[k, j]
+            for i in range(N):
+                image[i] += matrix[j, i] * weight
+        total = 0.0
+        for i in range(N):
+            total += lift[k, i] * matrix[i, N]
+        small[k, r] = total
+        for j in range(k + 1):
+            total = 0.0
+            for i in range(N):
+                total += lift[j, i] * image[i]
+            small[k, j] = total
+    # Cholesky: V^T M V is positive definite.
+    for k in range(r):
+        pivot = small[k, k]
+        for j in range(k):
+            pivot -= small[k, j] * small[k, j]
+        pivot = math.sqrt(pivot)
+        small[k, k] = pivot
+        for i in range(k + 1, r):
+            total = small[i, k]
+            for j in range(k):
+                total -= small[i, j] * small[k, j]
+            small[i, k] = total / pivot
+    for k in range(r):
+        total = small[k, r]
+        for j in range(k):
+            total -= small[k, j] * small[j, r]
+        small[k, r] = total / small[k, k]
+    for k in range(r - 1, -1, -1):
+        total = small[k, r]
+        for j in range(k + 1, r):
+            total -= small[j, k] * small[j, r]
+        small[k, r] = total / small[k, k]
+
+
+def error_norm(form, error, y, dim, space, typical, tolerance):
+    """Largest error of a state as a multiple of its tolerance; not a number if y is none.
+
+    In a subspace the error is lifted first, so that a tolerance means the same in every form.
+    """
+    mean, lift, _ = space
+    largest = 0.0
+    if form == FULL:
+        for i in range(dim):
+            ratio = abs(error[i]) / (typical[i] + abs(y[i]))
+            if not ratio <= largest:
+                largest = ratio
+    elif form == STATE:
+        for i in range(2 * N):
+            value, change = mean[i], 0.0
+            for j in range(dim):
+                value += lift[j, i] * y[j]
+                change += lift[j, i] * error[j]
+            ratio = abs(change) / (typical[i] + abs(value))
+            if not ratio <= largest:
+                largest = ratio
+    else:
+        r = dim // 2
+        for i in range(N):
+            value, change, rate, drift = mean[i], 0.0, 0.0, 0.0
+            for j in range(r):
+                value += lift[j, i] * y[j]
+                change += lift[j, i] * error[j]
+                rate += lift[j, i] * y[r + j]
+                drift += lift[j, i] * error[r + j]
+            ratio = abs(change) / (typical[i] + abs(value))
+            if not ratio <= largest:
+                largest = ratio
+            ratio = abs(drift) / (typical[N + i] + abs(rate))
+            if not ratio <= largest:
+                largest = ratio
+    return largest / tolerance
+
