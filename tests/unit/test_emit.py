@@ -194,7 +194,7 @@ def test_tangent_kernel_is_the_jacobian_times_a_basis(
 
 
 def test_angle_without_a_name_is_refused() -> None:
-    with pytest.raises(ValueError, match="name the angle on the tape first"):
+    with pytest.raises(ValueError, match="name the argument on the tape first"):
         kernel_source(program_of(sp.sin(x + y)))
 
 

@@ -11,12 +11,28 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.simulation import dynamic
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, SOLVERS
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "no reduction: the full-order model, the baseline"
 REFERENCE = ""
+_DYNAMIC = {
+    "solver": Setting(
+        "text",
+        "explicit",
+        "explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh Jacobians; "
+        "ros34pw2: W-method of order 3, one Jacobian for all runs",
+        choices=dynamic.SOLVERS,
+    ),
+    "tolerance": Setting(
+        "number",
+        1e-6,
+        "largest local error of a state relative to its typical size",
+        minimum=1e-13,
+    ),
+}
 # Kind of model -> settings; a model of another kind is solved as it comes.
 SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
     "ae": {
@@ -35,11 +51,19 @@ SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
             above=True,
         ),
     },
+    "ode": _DYNAMIC,
+    "dae": _DYNAMIC,
+}
+_DYNAMIC_PRESETS: dict[str, dict[str, Value]] = {
+    "recommended": {},
+    "strongest": {"solver": "ros34pw2", "tolerance": 3e-3},
 }
 # Kind of model -> presets.  The paper's kind of baseline is Newton's method; the strongest solver
 # found stands beside it.
 PRESETS_BY_KIND: dict[str, dict[str, dict[str, Value]]] = {
     "ae": {"recommended": {}, "strongest": {"solver": "chord", "tolerance": 1e-6}},
+    "ode": _DYNAMIC_PRESETS,
+    "dae": _DYNAMIC_PRESETS,
 }
 
 

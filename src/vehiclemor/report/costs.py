@@ -2,53 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.report.timing import BASELINE, STRONGEST, timing
+from vehiclemor.report.contestants import RACES
+from vehiclemor.report.timing import timing
 
 if TYPE_CHECKING:
     import pandas as pd
-
-# Per model: the error that is printed beside the times.
-ERROR_COLUMN = {"double_wishbone": "rms_second_euler_angle"}
-# Columns of the table, of which a model has those that its solvers count.
-COUNTS = (
-    "iterations",
-    "residual_evaluations",
-    "rhs_calls",
-    "steps",
-    "rejected_steps",
-    "jacobian_evaluations",
-    "factorisations",
-)
+    import xarray as xr
 
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
-    """Cost of every contestant of a model on its nominal maneuver.
+    """Cost of every contestant of a model on its nominal maneuver, from every start.
 
     Returns
     -------
     pandas.DataFrame
-        `us_per_run`, `ns_per_sample`, counts, `speed_up` (against Newton's method with fresh
-        Jacobians, the paper's kind of baseline), `speed_up_strongest` (against the strongest
-        full-order solver), `offline_us`, and the number of runs after which a reduced model has
-        paid for its training against either baseline (missing where it never does).
+        `us_per_run`, `ns_per_sample`, counts, `speed_up` (against the paper's kind of baseline),
+        `speed_up_strongest` (against the strongest full-order solver), errors, `offline_us`, and
+        the number of runs after which a reduced model has paid for its training against either
+        baseline (missing where it never does).
     """
     import pandas as pd
 
     data = timing(model, folder)
-    seconds = data["seconds"]
-    rows = []
+    rows = [row for start in data["start"].values for row in _rows(model, data.sel(start=start))]
+    return pd.DataFrame(rows)
+
+
+def _rows(model: str, data: xr.Dataset) -> list[dict[str, object]]:
+    """Rows of one start."""
+    rows: list[dict[str, object]] = []
     for label in data["contestant"].values:
         row = data.sel(contestant=label)
         own, offline = float(row["seconds"]), float(row["offline_seconds"])
         entry: dict[str, object] = {
+            "start": str(data["start"].item()),
             "contestant": str(label),
+            "status": str(row["status"].item()),
             "rank": int(row["effective_rank"]),
             "us_per_run": own * 1e6,
             "ns_per_sample": float(row["seconds_per_sample"]) * 1e9,
-            **{name: int(row[name]) for name in COUNTS if name in data},
+            **{name: int(row[name]) for name in RACES[model].counts},
             "tolerance": float(row["tolerance"]),
             "quartile_spread": _share(float(row["seconds_upper"] - row["seconds_lower"]), own),
         }
@@ -57,48 +54,61 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         for output in data["output"].values:
             entry[f"rms_{output}"] = float(row["rms_error"].sel(output=output))
         entry["offline_us"] = offline * 1e6
-        for name, baseline in (("break_even", BASELINE), ("break_even_strongest", STRONGEST)):
-            saved = float(seconds.sel(contestant=baseline)) - own
+        for name, ratio in (
+            ("break_even", float(row["speed_up"])),
+            ("break_even_strongest", float(row["speed_up_strongest"])),
+        ):
+            # Time saved in a run; a run that has failed saves nothing.
+            saved = own * (ratio - 1.0) if entry["status"] == "ok" else 0.0
             pays = saved > 0.0 and offline > 0.0
             entry[name] = offline / saved if pays else float("nan")
         rows.append(entry)
-    return pd.DataFrame(rows)
+    return rows
 
 
 def printed_costs(folder: Path) -> str:
     """Cost tables of all timed models as text."""
-    from vehiclemor.report.timing import CONTESTANTS
+    return "\n\n".join(_printed(model, folder) for model in RACES)
 
-    parts = []
-    for model in CONTESTANTS:
-        data = timing(model, folder)
-        table = cost_table(model, folder)
-        lines = [
-            f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})",
-            (
-                "speed-up x1: against Newton with fresh Jacobians at 1e-12; x2: against the "
-                "strongest full-order solver; break-even in runs; +-%: half the quartile spread"
-            ),
-            (
-                f"{'':<25}{'rank':>5}{'tol.':>7}{'us/run':>8}{'+-%':>5}{'ns/point':>9}"
-                f"{'iterations':>11}{'residuals':>10}{'Jacobians':>10}{'x1':>6}{'x2':>6}"
-                f"{'RMS angle':>10}{'offline us':>11}{'break-even x1/x2':>17}"
-            ),
-        ]
-        for row in table.to_dict("records"):
-            speed = f"{_cell(row['speed_up'], 2):>6}{_cell(row['speed_up_strongest'], 2):>6}"
-            even = f"{_even(row['break_even'])} / {_even(row['break_even_strongest'])}"
-            if row["offline_us"] == 0.0:
-                even = "-"
-            lines.append(
-                f"{row['contestant']:<25}{row['rank']:>5}{_power(row['tolerance']):>7}"
-                f"{row['us_per_run']:>8.1f}{50.0 * row['quartile_spread']:>5.0f}"
-                f"{row['ns_per_sample']:>9.1f}{row['iterations']:>11}"
-                f"{row['residual_evaluations']:>10}{row['jacobian_evaluations']:>10}"
-                f"{speed}{row[ERROR_COLUMN[model]]:>10.1e}{row['offline_us']:>11.1f}{even:>17}"
-            )
-        parts.append("\n".join(lines))
-    return "\n\n".join(parts)
+
+def _printed(model: str, folder: Path) -> str:
+    data, table, race = timing(model, folder), cost_table(model, folder), RACES[model]
+    head = f"{'':<27}{'rank':>5}{'tol.':>7}{'us/run':>9}{'+-%':>5}{'ns/point':>9}"
+    head += "".join(f"{heading:>11}" for heading in race.counts.values())
+    head += f"{'x1':>7}{'x2':>7}" + "".join(f"{_heading(name):>10}" for name in race.errors)
+    lines = [
+        f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})",
+        (
+            f"speed-up x1: against {race.baseline}; x2: against {race.strongest}; "
+            f"break-even in runs; +-%: half the quartile spread; errors are RMS"
+        ),
+        f"{head}{'offline us':>11}{'break-even x1/x2':>17}",
+    ]
+    starts = list(dict.fromkeys(table["start"]))
+    for start in starts:
+        if len(starts) > 1:
+            lines.append(f"start {start}")
+        for row in table[table["start"] == start].to_dict("records"):
+            lines.append(_line(row, race.counts, race.errors))
+    return "\n".join(lines)
+
+
+def _line(row: dict, counts: Iterable[str], errors: Iterable[str]) -> str:
+    text = f"{row['contestant']:<27}{row['rank']:>5}{_power(row['tolerance']):>7}"
+    text += f"{row['us_per_run']:>9.1f}{50.0 * row['quartile_spread']:>5.0f}"
+    text += f"{row['ns_per_sample']:>9.1f}" + "".join(f"{row[name]:>11}" for name in counts)
+    text += f"{_cell(row['speed_up'], 2):>7}{_cell(row['speed_up_strongest'], 2):>7}"
+    if row["status"] != "ok":
+        return f"{text}  {row['status']}"
+    text += "".join(f"{row[f'rms_{name}']:>10.1e}" for name in errors)
+    even = f"{_even(row['break_even'])} / {_even(row['break_even_strongest'])}"
+    if row["offline_us"] == 0.0:
+        even = "-"
+    return f"{text}{row['offline_us']:>11.1f}{even:>17}"
+
+
+def _heading(output: str) -> str:
+    return {"second_euler_angle": "angle", "lateral_position": "Y"}.get(output, output)
 
 
 def _share(part: float, whole: float) -> float:

@@ -9,13 +9,25 @@ from vehiclemor.report.compare import comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.regenerate import write_text
 from vehiclemor.simulation.model import build
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
-MODEL = "double_wishbone"
-OUTPUTS = ("spindle_y", "second_euler_angle")
+# Model -> outputs whose errors are listed.
+OUTPUTS = {
+    "double_wishbone": ("spindle_y", "second_euler_angle"),
+    "independent_suspension_vehicle": (
+        "pitch",
+        "yaw",
+        "roll",
+        "lateral_position",
+        "vertical_speed",
+    ),
+}
+SETTINGS_STUDY = "vehicle-settings"
 LATEX_SPECIAL = {"\\": r"\textbackslash{}"} | {c: f"\\{c}" for c in "&%$#_{}"} | {"^": r"\^{}"}
 
 
@@ -27,12 +39,12 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     list of Path
         Files written.
     """
-    tables = {
-        "comparison": comparison("paper", results, jobs),
-        "costs": cost_table(MODEL, results),
-        "errors": error_table(results, jobs),
-        "operations": operation_table(),
-    }
+    tables = {"comparison": comparison("paper", results, jobs)}
+    for model in OUTPUTS:
+        tables[f"costs-{model}"] = cost_table(model, results)
+        tables[f"errors-{model}"] = error_table(model, results, jobs)
+        tables[f"operations-{model}"] = operation_table(model)
+    tables["vehicle-settings"] = settings_table(results, jobs)
     written = []
     for name, table in tables.items():
         for suffix, text in (
@@ -44,31 +56,51 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     return written
 
 
-def error_table(results: Path, jobs: int = 1) -> pd.DataFrame:
-    """RMS errors, floors, counts and status of every cell of the paper's studies."""
+def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
+    """RMS errors, floors, counts and status of every cell of the paper's studies of a model."""
     import pandas as pd
 
-    from vehiclemor.study.combine import flattened
-
-    cells = flattened(run_studies("paper", results, jobs))
-    columns: dict[str, object] = {"study": cells["study"].values}
-    for name in ("frequency_factor", "amplitude_factor", "control_period", "equation_seed"):
-        columns[name] = cells[name].values
-    columns |= {"rounding_seed": cells["rounding_seed"].values, "method": cells["method"].values}
-    columns |= {"rank": cells["rank"].values, "effective_rank": cells["effective_rank"].values}
-    for output in OUTPUTS:
-        columns[f"rms_{output}"] = cells["rms_error"].sel(output=output).values
-        columns[f"floor_{output}"] = cells["floor_rms_error"].sel(output=output).values
-    for name in ("iterations", "residual_evaluations", "status", "message"):
-        columns[name] = cells[name].values
-    return pd.DataFrame(columns)
+    parts = []
+    for name, dataset in run_studies("paper", results, jobs).items():
+        if dataset.attrs["model"] == model:
+            parts.append(_flat(dataset, OUTPUTS[model]).assign(study=name))
+    table = pd.concat(parts, ignore_index=True)
+    first = ["study", "method", "start"]
+    return table[[*first, *(c for c in table.columns if c not in first)]]
 
 
-def operation_table() -> pd.DataFrame:
-    """Exact operation counts of the generated kernels."""
+def settings_table(results: Path, jobs: int = 1) -> pd.DataFrame:
+    """Control-period POD on the 14-DOF vehicle with every combination of its settings.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Errors and floors of pitch and yaw, evaluations, largest growth rate of a reduced Jacobian,
+        status and reason of each combination.
+    """
+    dataset = run_studies(SETTINGS_STUDY, results, jobs)[SETTINGS_STUDY]
+    return _flat(dataset, ("pitch", "yaw"))
+
+
+def _flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:
+    """One row for each cell of a study: its place in the grid, errors, counts, status."""
+    grid = list(dataset["status"].dims)
+    kept = ["effective_rank", *DYNAMIC_COUNTS, *ALGEBRAIC_COUNTS, "growth_rate"]
+    scalars = [name for name in kept if name in dataset]
+    table = dataset[[*scalars, "status", "message"]].to_dataframe().reset_index()
+    for output in outputs:
+        for name, short in (("rms_error", "rms"), ("floor_rms_error", "floor")):
+            values = dataset[name].sel(output=output).transpose(*grid)
+            table[f"{short}_{output}"] = values.to_series().to_numpy()
+    columns = [*grid, *(c for c in table.columns if c.startswith(("rms_", "floor_"))), *scalars]
+    return table[[*columns, "status", "message"]]
+
+
+def operation_table(model: str) -> pd.DataFrame:
+    """Exact operation counts of a model's generated kernels."""
     import pandas as pd
 
-    counts = build(MODEL).operation_counts
+    counts = build(model).operation_counts
     return pd.DataFrame([{"kernel": name, **count} for name, count in counts.items()])
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,9 +16,10 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
+from vehiclemor.report.contestants import RACES, Contestant
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.study.provenance import code_digest, machine, versions
 from vehiclemor.study.store import prepare_folder, read_dataset, write_dataset
@@ -31,45 +31,17 @@ ROUNDS = 41
 FIT_ROUNDS = 9
 
 
-@dataclass(frozen=True)
-class Contestant:
-    """One line of the timing table: a method with settings, run on the nominal maneuver."""
-
-    label: str
-    method: str
-    preset: str = "recommended"
-    settings: dict[str, Value] = field(default_factory=dict)
-
-
-BASELINE, STRONGEST = "full order, Newton", "full order, strongest"
-# Per model: what is timed.  The first is the paper's kind of baseline, the second the strongest.
-CONTESTANTS = {
-    "double_wishbone": (
-        Contestant(BASELINE, "full_order"),
-        Contestant(STRONGEST, "full_order", "strongest"),
-        Contestant("full order, dense", "full_order", settings={"solver": "newton_dense"}),
-        Contestant("full order, Newton, 1e-6", "full_order", settings={"tolerance": 1e-6}),
-        Contestant("replay", "replay"),
-        Contestant("pod r=3", "pod", settings={"rank": 3}),
-        Contestant("pod r=3, 1e-6", "pod", settings={"rank": 3, "tolerance": 1e-6}),
-        Contestant("pod literal r=3", "pod", "literal", {"rank": 3}),
-        Contestant("pod r=4", "pod", settings={"rank": 4}),
-        Contestant("pod literal r=6", "pod", "literal", {"rank": 6}),
-        Contestant("fixed basis r=3", "fixed_basis", settings={"rank": 3}),
-        Contestant("fixed basis r=4", "fixed_basis", settings={"rank": 4}),
-    ),
-}
-
-
 def timing(model_name: str, folder: Path) -> xr.Dataset:
     """Stored timing of a model's contestants, measured first if it is missing or out of date.
 
     Returns
     -------
     xarray.Dataset
-        On the dimension `contestant`: median and quartiles of the seconds of a run, seconds for a
-        time point, offline seconds, counts.
+        On the dimensions `start` and `contestant`: median and quartiles of the seconds of a run,
+        seconds for a time point, offline seconds, counts, errors, status.
     """
+    import xarray as xr
+
     model = build(model_name)
     path = folder / "studies" / f"timing-{model_name}.nc"
     key = _identity(model)
@@ -78,25 +50,27 @@ def timing(model_name: str, folder: Path) -> xr.Dataset:
         if dataset.attrs.get("timing") == key:
             return dataset
     prepare_folder(folder)
-    dataset = measure(model, CONTESTANTS[model_name])
+    contestants = RACES[model_name].contestants
+    parts = [measure(model, contestants, start) for start in model.starts]
+    dataset = xr.concat(parts, dim="start", join="exact", combine_attrs="override")
     dataset.attrs["timing"] = key
     write_dataset(dataset, path)
     return dataset
 
 
 def _identity(model: Model) -> str:
-    contestants = [repr(contestant) for contestant in CONTESTANTS[model.name]]
-    digests = [code_digest(model.name, c.method) for c in CONTESTANTS[model.name]]
+    race = RACES[model.name].contestants
+    contestants = [repr(contestant) for contestant in race]
+    digests = [code_digest(model.name, contestant.method) for contestant in race]
     content = json.dumps([contestants, digests, model.kernel_hash, machine(), ROUNDS])
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
-def measure(model: Model, contestants: tuple[Contestant, ...]) -> xr.Dataset:
-    """Time the contestants on the model's nominal maneuver."""
+def measure(model: Model, contestants: tuple[Contestant, ...], start: str) -> xr.Dataset:
+    """Time the contestants on the model's nominal maneuver from one start."""
     import xarray as xr
 
     maneuver: Maneuver = component("maneuver", component("model", model.name).MANEUVER)
-    start = model.starts[0]
     fits: list[list[float]] = [[] for _ in contestants]
     reduced: list[ReducedModel] = []
     tolerances: list[float] = []
@@ -113,13 +87,14 @@ def measure(model: Model, contestants: tuple[Contestant, ...]) -> xr.Dataset:
         tolerances.append(float(settings.get("tolerance", np.nan)))
     seconds = np.empty((ROUNDS + 1, len(contestants)))
     counts: list[dict[str, int]] = [{} for _ in contestants]
+    status = [""] * len(contestants)
     errors = np.empty((len(contestants), len(model.outputs)))
     reference = model.simulate(maneuver, start).outputs
     for turn in range(ROUNDS + 1):
         for index, candidate in enumerate(reduced):
             trajectory = candidate.simulate(maneuver, start)
             seconds[turn, index] = trajectory.seconds
-            counts[index] = trajectory.counts
+            counts[index], status[index] = trajectory.counts, trajectory.status
             errors[index] = rms(trajectory.outputs - reference)
     seconds = seconds[1:]
 
@@ -135,7 +110,7 @@ def measure(model: Model, contestants: tuple[Contestant, ...]) -> xr.Dataset:
         "seconds_upper": (np.quantile(seconds, 0.75, axis=0), "s", "upper quartile"),
         "speed_up": (speed_up(0), "1", "against the paper's kind of baseline, median of rounds"),
         "speed_up_strongest": (speed_up(1), "1", "against the strongest full order, median"),
-        "tolerance": (tolerances, "1", "largest step of the last iteration"),
+        "tolerance": (tolerances, "1", "tolerance of the solver"),
         "seconds_per_sample": (np.median(seconds, axis=0) / samples, "s", "for one time point"),
         "offline_seconds": ([float(np.median(f)) for f in fits], "s", "training and fit, median"),
         "offline_evaluations": (
@@ -156,8 +131,11 @@ def measure(model: Model, contestants: tuple[Contestant, ...]) -> xr.Dataset:
         errors,
         {"units": "see outputs", "long_name": "RMS error on the run that is timed"},
     )
+    variables["status"] = ("contestant", status, {"long_name": "ok, or why there is no result"})
     labels = [contestant.label for contestant in contestants]
-    dataset = xr.Dataset(variables, {"contestant": labels, "output": list(model.outputs)})
+    dataset = xr.Dataset(
+        variables, {"contestant": labels, "output": list(model.outputs), "start": start}
+    )
     dataset.attrs = {
         "title": f"timing of {model.name}, interleaved, {ROUNDS} rounds, {samples} time points",
         "source": "vehiclemor",

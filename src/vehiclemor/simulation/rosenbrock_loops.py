@@ -6,7 +6,7 @@ Differential Equations II (2nd ed., Springer 1996), section IV.7:
     (I / (gamma h) - A) U_i = f(t + alpha_i h, y + sum a_ij U_j) + sum c_ij / h U_j + d_i h f_t
 """
 
-from vehiclemor.simulation.system_loops import error_norm, lifted, slope
+from vehiclemor.simulation.system_loops import FULL, error_norm, lifted, slope
 
 
 def difference_jacobian(
@@ -252,13 +252,18 @@ def rosenbrock_span(
         # Cubic Hermite interpolation between the ends of the step.
         while sample < len(samples) and samples[sample] <= t + h + 1e-12 * (1.0 + abs(t)):
             z = (samples[sample] - t) / h
-            weight = z * z * (3.0 - 2.0 * z)
+            after = z * z * (3.0 - 2.0 * z)
+            before = 1.0 - after
             left, right = h * z * (1.0 - z) * (1.0 - z), h * z * z * (z - 1.0)
-            for i in range(dim):
-                mid[i] = y[i] + weight * (new[i] - y[i]) + left * f[i] + right * f_new[i]
-            lifted(form, mid, dim, space, constants, scratch, state)
-            for i in range(len(state)):
-                path[sample, i] = state[i]
+            if form == FULL:
+                for i in range(dim):
+                    path[sample, i] = before * y[i] + after * new[i] + left * f[i] + right * f_new[i]
+            else:
+                for i in range(dim):
+                    mid[i] = before * y[i] + after * new[i] + left * f[i] + right * f_new[i]
+                lifted(form, mid, dim, space, constants, scratch, state)
+                for i in range(len(state)):
+                    path[sample, i] = state[i]
             sample += 1
         factor = min(6.0, max(0.2, 0.9 * max(error, 1e-10) ** -exponent))
         if rejected:

@@ -95,6 +95,6 @@ def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.
             return np.ascontiguousarray(np.stack(terms, axis=-1))
         pieces *= 2
     raise InputError(
-        f"maneuver {maneuver.name!r} is not smooth between t = {a:g} and {b:g} s; name the times of "
-        f"its corners as break points"
+        f"maneuver {maneuver.name!r} is not smooth between t = {a:g} and {b:g} s; "
+        f"name the times of its corners as break points"
     )

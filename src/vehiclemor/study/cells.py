@@ -99,8 +99,15 @@ def make_cell(
     training: str = "matched",
     training_set: tuple[tuple[float, float], ...] = (),
     keep: str = "trajectories",
+    must_fit: bool = True,
 ) -> Cell:
     """A validated cell.
+
+    Parameters
+    ----------
+    must_fit
+        Whether settings that are valid, but don't fit the model or each other, are an error here;
+        else computing the cell gives the result `rejected`.
 
     Raises
     ------
@@ -119,7 +126,7 @@ def make_cell(
     model.start(start)
     if training not in POLICIES:
         raise unknown("training policy", training, POLICIES)
-    if accepted:
+    if accepted and must_fit:
         method.check(model, complete)
     for pair in training_set:
         maneuver.perturbed(*pair)
@@ -213,6 +220,30 @@ def _expand(name: str, study: StudyFile) -> Grid:
                 study.training,
                 tuple((pair[0], pair[1]) for pair in study.training_set),
                 study.keep,
+                must_fit=False,
             )
         cells[place] = made[identity]
+    for label in methods:
+        _some_fits(model, [cell for key, cell in made.items() if key[0] == label])
     return Grid(name, study, dimensions, cells)
+
+
+def _some_fits(model: Model, cells: list[Cell]) -> None:
+    """Raise the first error if no cell of a method has settings that fit the model.
+
+    Corners of a grid may not fit, such as a rank above the number of snapshots; if nothing does,
+    the study is wrong.
+    """
+    first: InputError | None = None
+    for cell in cells:
+        method: Method = component("method", cell.method)
+        if not method.accepts(model)[0]:
+            return
+        try:
+            method.check(model, cell.settings)
+        except InputError as error:
+            first = first or error
+        else:
+            return
+    if first is not None:
+        raise first

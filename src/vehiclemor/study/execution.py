@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.errors import ConvergenceError, UnreachableError, VehiclemorError
+from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, VehiclemorError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import largest, rms, signal_range
 from vehiclemor.reduction.interface import Method, Offline
@@ -52,6 +52,10 @@ def compute_cell(
     if not accepted:
         return _failed(model, maneuver, cell, "rejected", reason)
     try:
+        method.check(model, cell.settings)
+    except InputError as error:
+        return _failed(model, maneuver, cell, "rejected", str(error))
+    try:
         reference = model.simulate(maneuver, cell.start)
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
         reduced = method.fit(model, runs, cell.settings)
@@ -68,7 +72,14 @@ def compute_cell(
     except Exception as error:  # noqa: BLE001 - a plug-in's bug spoils its own cell, not the study
         return _failed(model, maneuver, cell, "error", f"{type(error).__name__}: {error}")
     return _result(
-        model, cell, trajectory, reference, approximation, reduced.offline, reduced.effective_rank
+        model,
+        cell,
+        trajectory,
+        reference,
+        approximation,
+        reduced.offline,
+        reduced.effective_rank,
+        float(getattr(reduced, "growth_rate", np.nan)),
     )
 
 
@@ -102,6 +113,7 @@ def _result(
     approximation: np.ndarray | None,
     offline: Offline,
     effective_rank: int,
+    growth_rate: float = np.nan,
 ) -> xr.Dataset:
     error = trajectory.outputs - reference.outputs
     floor = np.full(len(model.outputs), np.nan)
@@ -129,6 +141,9 @@ def _result(
             {"units": "see speed_unit", "long_name": "RMS error of the speed"},
         )
     scalars: dict[str, tuple[float, str, str]] = {}
+    if model.speeds:
+        meaning = "largest real part of an eigenvalue of the reduced Jacobian in any window"
+        scalars["growth_rate"] = (growth_rate, "1/s", meaning)
     residual_at = getattr(model, "residual_at", None)
     if residual_at is not None:
         residual = float(np.abs(residual_at(trajectory.coordinates, trajectory.inputs)).max())

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+
+from vehiclemor.report.figures.lines import (
+    DEFAULT,
+    FULL,
+    LITERAL,
+    REPLAY,
+    Results,
+    legend_above,
+    point,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Results = Mapping[str, "xr.Dataset"]
 LABELS = {
     "spindle_y": "spindle displacement y (m)",
     "second_euler_angle": r"second Euler angle $\eta$ (rad)",
 }
-FULL: dict[str, Any] = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
-DEFAULT: dict[str, Any] = {"color": "#0072B2", "linestyle": "--"}
-LITERAL: dict[str, Any] = {"color": "#D55E00", "linestyle": "-."}
-REPLAY: dict[str, Any] = {"color": "#666666", "linestyle": ":", "linewidth": 1.2}
-
-
-def point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
-    """One method at one place of the grid."""
-    return dataset.sel({"method": label, **place}).squeeze(drop=True)
 
 
 def _panels() -> tuple[Figure, list[Axes]]:
@@ -37,11 +36,6 @@ def _panels() -> tuple[Figure, list[Axes]]:
     axes[1].set_xlabel("time (s)")
     axes[1].set_xlim(0.0, 10.0)
     return figure, list(axes)
-
-
-def _legend(figure: Figure, axis: Axes) -> None:
-    handles, labels = axis.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4)
 
 
 def _control_periods(axis: Axes) -> None:
@@ -63,7 +57,7 @@ def _comparison(dataset: xr.Dataset, replay: bool) -> Figure:
             recorded = point(dataset, "replay", rank=3)["outputs"].sel(output=output)
             axis.plot(full.time, recorded, label="replay", **REPLAY)
         _control_periods(axis)
-    _legend(figure, axes[0])
+    legend_above(figure, axes[0])
     return figure
 
 
@@ -91,7 +85,7 @@ def figure_7(results: Results) -> Figure:
         _control_periods(axis)
     axes[0].set_ylabel("error of y (m)")
     axes[1].set_ylabel(r"error of $\eta$ (rad)")
-    _legend(figure, axes[0])
+    legend_above(figure, axes[0])
     return figure
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
@@ -57,7 +57,9 @@ def figure_5(results: Mapping[str, xr.Dataset]) -> Figure:
     for travel, alpha in ((-0.1, 0.25), (0.1, 0.25), (0.0, 1.0)):
         _draw(space, model, model.solve([travel, 0.0]), alpha)
     _axes_in_space(space)
-    _draw_graph(graph)
+    draw_graph(graph, NODES, EDGES, COLORS)
+    graph.set_xlim(-0.45, 3.65)
+    graph.set_ylim(-0.35, 2.35)
     handles, labels = space.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower left", ncols=3, fontsize=7.5)
     figure.text(0.02, 0.94, "(a)")
@@ -107,12 +109,16 @@ def _draw(axis: Any, model: AlgebraicModel, q: np.ndarray, alpha: float) -> None
 
 
 def _wheel(axis: Any, centre: np.ndarray, spin: np.ndarray, alpha: float) -> None:
+    axis.plot(*rim(centre, spin, WHEEL_RADIUS).T, color="#999999", linewidth=1.0, alpha=alpha)
+
+
+def rim(centre: np.ndarray, spin: np.ndarray, radius: float) -> np.ndarray:
+    """Points (n, 3) of a wheel's circle about its spin axis (3,), a unit vector."""
     up = np.cross([1.0, 0.0, 0.0], spin)
     up /= np.linalg.norm(up)
     forward = np.cross(spin, up)
     angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]
-    rim = centre + WHEEL_RADIUS * (np.cos(angle) * forward + np.sin(angle) * up)
-    axis.plot(*rim.T, color="#999999", linewidth=1.0, alpha=alpha)
+    return centre + radius * (np.cos(angle) * forward + np.sin(angle) * up)
 
 
 def _axes_in_space(axis: Any) -> None:
@@ -130,19 +136,23 @@ def _axes_in_space(axis: Any) -> None:
     axis.locator_params(nbins=4)
 
 
-def _draw_graph(axis: Axes) -> None:
+def draw_graph(
+    axis: Axes,
+    nodes: Mapping[str, tuple[float, float]],
+    edges: Sequence[tuple[str, str, str]],
+    colors: Mapping[str, str],
+) -> None:
+    """Topological graph: bodies in boxes, joints on the lines between them, closures dashed."""
     axis.set_axis_off()
-    axis.set_xlim(-0.45, 3.65)
-    axis.set_ylim(-0.35, 2.35)
-    for start, end, text in EDGES:
-        (xa, ya), (xb, yb) = NODES[start], NODES[end]
+    for start, end, text in edges:
+        (xa, ya), (xb, yb) = nodes[start], nodes[end]
         closure = "closure" in text
         style = "--" if closure else "-"
         axis.plot([xa, xb], [ya, yb], style, color="#555555", linewidth=1.2, zorder=1)
         place = {"ha": "center", "va": "center", "fontsize": 7.5, "zorder": 2}
         box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
         axis.text((xa + xb) / 2, (ya + yb) / 2, text, bbox=box, **place)
-    for name, (x, y) in NODES.items():
-        box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": COLORS[name]}
+    for name, (x, y) in nodes.items():
+        box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": colors[name]}
         text = name.replace(" ", "\n")
         axis.text(x, y, text, ha="center", va="center", fontsize=7.5, bbox=box, zorder=3)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 
+from vehiclemor.report.figures.lines import legend_above
 from vehiclemor.report.figures.perturbations import NUMBERS, OUTPUTS
 from vehiclemor.report.published import load_published
 
@@ -58,6 +59,5 @@ def figure_equation_order(results: Mapping[str, xr.Dataset]) -> Figure:
         axis.set_ylabel(label)
         axis.set_xlabel("variant, sorted by error")
         axis.set_title(f"({letter})")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    legend_above(figure, axes[0])
     return figure

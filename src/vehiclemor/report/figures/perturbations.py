@@ -9,14 +9,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import LogNorm
 
-from vehiclemor.report.figures.histories import DEFAULT, LITERAL, REPLAY
+from vehiclemor.report.figures.lines import DEFAULT, LITERAL, REPLAY, Results, legend_above
 from vehiclemor.report.published import load_published
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Results = Mapping[str, "xr.Dataset"]
 OUTPUTS = {
     "spindle_y": "RMS error of y (m)",
     "second_euler_angle": r"RMS error of $\eta$ (rad)",
@@ -62,19 +62,41 @@ def figure_13(results: Results) -> Figure:
             axis.set_ylabel(label)
             axis.set_xlabel(f"{factor.split('_')[0]} perturbation (%)")
             axis.set_title(f"({'abcd'[2 * row + column]})")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    legend_above(figure, axes[0, 0], columns=3)
     return figure
 
 
 def figure_13_map(results: Results) -> Figure:
     """RMS errors over both perturbations, for POD and for replay."""
-    dataset = results["perturbation-grid"]
+    return error_map(results["perturbation-grid"], OUTPUTS, NUMBERS)
+
+
+def error_map(
+    dataset: xr.Dataset,
+    outputs: Mapping[str, str],
+    numbers: Mapping[str, str],
+    values_in_cells: bool = False,
+) -> Figure:
+    """RMS errors over frequency and amplitude perturbations, POD beside replay.
+
+    Parameters
+    ----------
+    dataset
+        Grid of both factors.
+    outputs
+        Output -> label of its colours; one row of panels each.
+    numbers
+        Output -> id of the published number that is drawn as a white line, if there is one.
+    values_in_cells
+        Write the error into each cell; the colours then leave the nominal input out, whose error
+        is far below all others.
+    """
     figure, axes = plt.subplots(2, 2, sharex=True, sharey=True, figsize=(6.7, 5.6))
     published = load_published().numbers
     frequency = 100.0 * (dataset["frequency_factor"].values - 1.0)
     amplitude = 100.0 * (dataset["amplitude_factor"].values - 1.0)
-    for row, (output, label) in enumerate(OUTPUTS.items()):
+    nominal = np.isclose(amplitude, 0.0)[:, None] & np.isclose(frequency, 0.0)
+    for row, (output, label) in enumerate(outputs.items()):
         errors = {
             method: dataset["rms_error"]
             .sel({"method": method, "output": output})
@@ -83,9 +105,10 @@ def figure_13_map(results: Results) -> Figure:
             .values
             for method in ("pod", "replay")
         }
+        shown = [e[~nominal] if values_in_cells else e for e in errors.values()]
         norm = LogNorm(
-            min(float(np.nanmin(e[e > 0.0])) for e in errors.values()),
-            max(float(np.nanmax(e)) for e in errors.values()),
+            min(float(np.nanmin(e[e > 0.0])) for e in shown),
+            max(float(np.nanmax(e)) for e in shown),
         )
         meshes = []
         for column, (method, values) in enumerate(errors.items()):
@@ -100,10 +123,13 @@ def figure_13_map(results: Results) -> Figure:
                 rasterized=True,
             )
             meshes.append(mesh)
-            bound = published[NUMBERS[output]].value
-            axis.contour(
-                frequency, amplitude, values, levels=[bound], colors="white", linewidths=1.2
-            )
+            if output in numbers:
+                bound = published[numbers[output]].value
+                axis.contour(
+                    frequency, amplitude, values, levels=[bound], colors="white", linewidths=1.2
+                )
+            if values_in_cells:
+                _write(axis, frequency, amplitude, values, norm)
             axis.grid(visible=False)
             name = "POD, r = 3" if method == "pod" else "replay"
             axis.set_title(f"({'abcd'[2 * row + column]}) {name}")
@@ -111,5 +137,24 @@ def figure_13_map(results: Results) -> Figure:
                 axis.set_ylabel("amplitude perturbation (%)")
             if row == 1:
                 axis.set_xlabel("frequency perturbation (%)")
-        figure.colorbar(meshes[-1], ax=axes[row, :], label=label)
+        extend = "min" if values_in_cells else "neither"
+        figure.colorbar(meshes[-1], ax=axes[row, :], label=label, extend=extend)
     return figure
+
+
+def _write(
+    axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, norm: LogNorm
+) -> None:
+    """Errors with two digits, on dark cells in white."""
+    for (j, i), value in np.ndenumerate(values):
+        dark = value <= 0.0 or float(norm(value)) < 0.5
+        digits = f"{value:.1g}" if value < 1e-3 else f"{value:#.2g}"
+        axis.text(
+            frequency[i],
+            amplitude[j],
+            digits.rstrip(".").replace("e-0", "e-"),
+            ha="center",
+            va="center",
+            fontsize=5.5,
+            color="white" if dark else "black",
+        )

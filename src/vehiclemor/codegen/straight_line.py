@@ -1,0 +1,432 @@
+"""Machine code of straight-line kernels, written from their text without type inference.
+
+A kernel of a vehicle has thousands of scalar operations.  The compiler spends seconds on the types
+of these, though all are floats, and once more in every loop that calls the kernel.  Here its text
+becomes LLVM instructions directly, and its machine code has one place that all loops call.  Batches
+of elementary functions become vector instructions, from the text of the same scalar functions.
+"""
+
+import ast
+import hashlib
+import inspect
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.errors import TypingError
+from numba.core.typing import signature
+from numba.extending import intrinsic
+
+from vehiclemor.codegen import arctangent, exponential, sincos
+from vehiclemor.codegen.emit import LANES, RESULTS
+
+# A product and a sum may become one operation, as in the loops that are compiled with them.
+FLAGS = ("contract",)
+DOUBLE = ir.DoubleType()
+# Half a batch at a time: vectors of 512 bits were a fifth slower.
+WIDTH = LANES // 2
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
+# A float plus this has no digits after the point.
+SHIFT = 1.5 * 2.0**52
+POINTER = types.CPointer(types.float64)
+SOURCES: dict[str, ModuleType] = {
+    "sincos": sincos,
+    "atan": arctangent,
+    "exp": exponential,
+}
+BATCHES = {f"{name}_batch": name for name in RESULTS}
+LLVM_FUNCTIONS = {
+    "math.sqrt": "llvm.sqrt",
+    "math.log": "llvm.log",
+    "math.sin": "llvm.sin",
+    "math.cos": "llvm.cos",
+    "math.fabs": "llvm.fabs",
+    "abs": "llvm.fabs",
+    "np.abs": "llvm.fabs",
+    "np.floor": "llvm.floor",
+}
+# Functions of the C library, with as many arguments as Python's.
+LIBRARY = ("tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")
+COMPARISONS = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
+
+Key = str | tuple[str, int]
+# Calls a function of `math` on values: the compiler's own way to the C library.
+Library = Callable[[str, Sequence[Any]], Any]
+
+
+def source_hash() -> str:
+    """Hash of the source that makes the machine code: this module and the elementary functions."""
+    modules = [inspect.getmodule(source_hash), *SOURCES.values()]
+    texts = [inspect.getsource(module) for module in modules if module is not None]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
+
+
+class _Expressions:
+    """Writes the instructions of expressions of floats, or of vectors of floats."""
+
+    def __init__(self, builder: Any, library: Library) -> None:
+        self._builder = builder
+        self._library = library
+
+    def value(self, node: ast.expr, names: Callable[[ast.expr], Any], kind: ir.Type) -> Any:
+        """Value of an expression; `names` gives those of its names and array entries."""
+        match node:
+            case ast.Constant(value=float() as number):
+                return _constant(kind, number)
+            case ast.Name() | ast.Subscript():
+                return names(node)
+            case ast.BinOp(left, operator, right):
+                left = self.value(left, names, kind)
+                right = self.value(right, names, kind)
+                return self._binary(node, operator, left, right)
+            case ast.UnaryOp(ast.USub(), ast.Constant(value=float() as number)):
+                return _constant(kind, -number)
+            case ast.UnaryOp(ast.USub(), operand):
+                return self._builder.fneg(self.value(operand, names, kind), flags=FLAGS)
+            case ast.IfExp(test, body, orelse):
+                return self._builder.select(
+                    self.value(test, names, kind),
+                    self.value(body, names, kind),
+                    self.value(orelse, names, kind),
+                )
+            case ast.Compare(left, [operator], [right]) if type(operator) in COMPARISONS:
+                # An inequality holds where one side is not a number; other comparisons don't.
+                unordered = isinstance(operator, ast.NotEq)
+                compare = self._builder.fcmp_unordered if unordered else self._builder.fcmp_ordered
+                return compare(
+                    COMPARISONS[type(operator)],
+                    self.value(left, names, kind),
+                    self.value(right, names, kind),
+                )
+            case ast.Call(function, arguments, []):
+                return self._call(
+                    node, ast.unparse(function), [self.value(a, names, kind) for a in arguments]
+                )
+        raise ValueError(f"{ast.unparse(node)}: {type(node).__name__} is not straight-line")
+
+    def elementary(self, name: str, argument: Any) -> tuple[Any, ...]:
+        """Results of `sincos` or `atan` of a float or a vector, from the text of the function."""
+        constants, function = _elementary(name)
+        values: dict[str, Any] = {function.args.args[0].arg: argument}
+
+        def read(node: ast.expr) -> Any:
+            if isinstance(node, ast.Name) and node.id in values:
+                return values[node.id]
+            if isinstance(node, ast.Name) and node.id in constants:
+                return _constant(argument.type, constants[node.id])
+            raise ValueError(f"{ast.unparse(node)}: unknown in {name}")
+
+        for statement in function.body:
+            match statement:
+                case ast.Assign([ast.Name(target)], expression):
+                    values[target] = self.value(expression, read, argument.type)
+                case ast.Return(ast.Tuple(elements)):
+                    return tuple(self.value(e, read, argument.type) for e in elements)
+                case ast.Return(ast.expr() as expression):
+                    return (self.value(expression, read, argument.type),)
+                case _:
+                    raise ValueError(f"{ast.unparse(statement)}: not straight-line")
+        raise ValueError(f"{name} returns nothing")
+
+    def _binary(self, node: ast.expr, operator: ast.operator, left: Any, right: Any) -> Any:
+        match operator:
+            case ast.Add():
+                return self._builder.fadd(left, right, flags=FLAGS)
+            case ast.Sub():
+                return self._builder.fsub(left, right, flags=FLAGS)
+            case ast.Mult():
+                return self._builder.fmul(left, right, flags=FLAGS)
+            case ast.Div():
+                return self._builder.fdiv(left, right, flags=FLAGS)
+            case ast.Pow():
+                power = _function(self._builder, "llvm.pow", left.type, left.type)
+                return self._builder.call(power, [left, right])
+        raise ValueError(f"{ast.unparse(node)}: {type(operator).__name__} is not straight-line")
+
+    def _call(self, node: ast.expr, name: str, arguments: list[Any]) -> Any:
+        if name in LLVM_FUNCTIONS and len(arguments) == 1:
+            kind = arguments[0].type
+            return self._builder.call(
+                _function(self._builder, LLVM_FUNCTIONS[name], kind), arguments
+            )
+        if name in {"atan", "math.exp"} and len(arguments) == 1:
+            return self.elementary(name.removeprefix("math."), arguments[0])[0]
+        if name == "power_of_two" and len(arguments) == 1:
+            return self._power_of_two(arguments[0])
+        if name.removeprefix("math.") in LIBRARY and name.startswith("math."):
+            return self._library(name.removeprefix("math."), arguments)
+        raise ValueError(f"{ast.unparse(node)}: {name} is not straight-line")
+
+    def _power_of_two(self, number: Any) -> Any:
+        # The last bits of the sum are the whole number, also a negative one.
+        builder = self._builder
+        whole = ir.IntType(64) if number.type == DOUBLE else ir.VectorType(ir.IntType(64), WIDTH)
+        bits = builder.bitcast(builder.fadd(number, _constant(number.type, SHIFT)), whole)
+        biased = builder.add(bits, _whole(whole, 1023))
+        return builder.bitcast(builder.shl(biased, _whole(whole, 52)), number.type)
+
+
+def _function(builder: Any, name: str, *kinds: ir.Type) -> Any:
+    """An LLVM function of floats or vectors, by its name without the suffix of its type."""
+    suffix = f"v{WIDTH}f64" if kinds[0] == VECTOR else "f64"
+    function = ir.FunctionType(kinds[0], kinds)
+    return cgutils.get_or_insert_function(builder.module, function, f"{name}.{suffix}")
+
+
+def _constant(kind: ir.Type, number: float) -> ir.Constant:
+    return ir.Constant(kind, [number] * WIDTH if kind == VECTOR else number)
+
+
+def _whole(kind: ir.Type, number: int) -> ir.Constant:
+    return ir.Constant(kind, number if kind == ir.IntType(64) else [number] * WIDTH)
+
+
+@cache
+def _elementary(name: str) -> tuple[dict[str, float], ast.FunctionDef]:
+    """Constants of an elementary function's module, and the function without its docstring."""
+    module = SOURCES[name]
+    tree = ast.parse(inspect.getsource(module))
+    function = next(n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == name)
+    function.body = function.body[1:]
+    return {k: v for k, v in vars(module).items() if isinstance(v, float)}, function
+
+
+class _Kernel:
+    """Text of a kernel as statements that know what they need and what they define."""
+
+    def __init__(self, text: str) -> None:
+        tree = ast.parse(text).body
+        if len(tree) != 1 or not isinstance(tree[0], ast.FunctionDef):
+            raise ValueError("a kernel is one function")
+        self.name = tree[0].name
+        self.arguments = [a.arg for a in tree[0].args.args]
+        self.statements = [n for n in tree[0].body if not isinstance(n, ast.Pass)]
+        places = [
+            _places(target)
+            for node in self.statements
+            if isinstance(node, ast.Assign)
+            for target in node.targets
+            if isinstance(target, ast.Subscript) and ast.unparse(target.value) == "_result"
+        ]
+        self.dimensions = max((len(place) for place in places), default=1)
+        # Every place of a result is written, so the largest tells its shape.
+        self.columns = 1 + max((place[-1] for place in places), default=0)
+
+    @property
+    def pointers(self) -> list[str]:
+        """Arguments that the machine code takes: scratch space is not needed."""
+        return [name for name in self.arguments if name != "_work"]
+
+
+@cache
+def _kernel(text: str) -> _Kernel:
+    return _Kernel(text)
+
+
+def _places(node: ast.Subscript) -> tuple[int, ...]:
+    elements = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+    places = [e.value for e in elements if isinstance(e, ast.Constant) and isinstance(e.value, int)]
+    if len(places) != len(elements) or len(places) > 2:
+        raise ValueError(f"{ast.unparse(node)}: an index is not constant")
+    return tuple(places)
+
+
+def emit(text: str, builder: Any, pointers: Mapping[str, Any], library: Library) -> None:
+    """Write the instructions of a kernel.
+
+    Parameters
+    ----------
+    text
+        Its source, as `kernel_source` prints it.
+    builder
+        Where the instructions go.
+    pointers
+        Argument -> pointer to its first float; the scratch space needs none.
+    library
+        Calls a function of `math`.
+
+    Raises
+    ------
+    ValueError
+        If the text has anything but straight-line arithmetic.
+    """
+    kernel = _kernel(text)
+    expressions = _Expressions(builder, library)
+    values: dict[Key, Any] = {}
+
+    def address(name: str, place: int) -> Any:
+        return builder.gep(pointers[name], [ir.Constant(ir.IntType(64), place)])
+
+    def read(node: ast.expr) -> Any:
+        # Loads come where they are needed first: registers are few.
+        match node:
+            case ast.Name(name) if name in values:
+                return values[name]
+            case ast.Subscript(ast.Name(array)) if array in kernel.arguments:
+                places = _places(node)
+                if array == "_work" and ("_work", places[0]) in values:
+                    return values["_work", places[0]]
+                if array not in {"_work", "_result"} and len(places) == 1:
+                    return builder.load(address(array, places[0]))
+        raise ValueError(f"{ast.unparse(node)}: unknown, or of the wrong shape")
+
+    for statement in kernel.statements:
+        match statement:
+            case ast.Assign([ast.Name(target)], expression):
+                values[target] = expressions.value(expression, read, DOUBLE)
+            case ast.Assign([ast.Subscript(ast.Name("_work")) as target], expression):
+                values["_work", _places(target)[0]] = expressions.value(expression, read, DOUBLE)
+            case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
+                place = _places(target)
+                if len(place) != kernel.dimensions:
+                    raise ValueError(f"{ast.unparse(target)}: other results have another shape")
+                flat = place[0] if len(place) == 1 else place[0] * kernel.columns + place[1]
+                builder.store(expressions.value(expression, read, DOUBLE), address("_result", flat))
+            case ast.Assign(
+                [ast.Tuple(elements)], ast.Call(ast.Name("sincos_one"), [argument], [])
+            ) if len(elements) == 2:
+                results = expressions.elementary(
+                    "sincos", expressions.value(argument, read, DOUBLE)
+                )
+                values |= zip((ast.unparse(e) for e in elements), results, strict=True)
+            case ast.Expr(
+                ast.Call(ast.Name(name), [ast.Name("_work"), ast.Constant(int() as first)], [])
+            ) if name in BATCHES:
+                lanes = [values["_work", first + lane] for lane in range(LANES)]
+                results = _batch(builder, expressions, BATCHES[name], lanes)
+                values |= {
+                    ("_work", first + LANES + place): result for place, result in enumerate(results)
+                }
+            case _:
+                raise ValueError(
+                    f"{ast.unparse(statement)}: {type(statement).__name__} is not straight-line"
+                )
+
+
+def _batch(builder: Any, expressions: _Expressions, name: str, lanes: Sequence[Any]) -> list[Any]:
+    """Results of an elementary function for a batch of arguments, lane by lane."""
+    places = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
+    parts = []
+    for first in range(0, LANES, WIDTH):
+        vector = ir.Constant(VECTOR, ir.Undefined)
+        for lane, place in enumerate(places):
+            vector = builder.insert_element(vector, lanes[first + lane], place)
+        parts.append(expressions.elementary(name, vector))
+    return [
+        builder.extract_element(part[result], place)
+        for result in range(len(RESULTS[name]))
+        for part in parts
+        for place in places
+    ]
+
+
+def machine_signature(text: str) -> Any:
+    """Signature of a kernel's machine code: a pointer for each argument."""
+    return types.void(*[POINTER] * len(_kernel(text).pointers))
+
+
+def straight_line(text: str) -> Any:
+    """Function for compiled code that executes a kernel, given a tuple of pointers to floats.
+
+    Parameters
+    ----------
+    text
+        Source of the kernel, as `kernel_source` prints it.
+    """
+
+    @intrinsic
+    def execute(typing_context: Any, pointers: Any) -> Any:
+        del typing_context
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            def library(name: str, values: Sequence[Any]) -> Any:
+                floats = [types.float64] * len(values)
+                function = getattr(math, name)
+                return context.get_function(function, signature(types.float64, *floats))(
+                    builder, values
+                )
+
+            given = cgutils.unpack_tuple(builder, args[0], len(sig.args[0]))
+            emit(text, builder, dict(zip(_kernel(text).pointers, given, strict=True)), library)
+            return context.get_dummy_value()
+
+        return types.void(pointers), generate
+
+    return execute
+
+
+# Machine code that compiled loops call by name lives as long as the process.
+_alive: list[Any] = []
+
+
+def caller(text: str, machine: Any) -> Any:
+    """Function for compiled code that calls a kernel's machine code, given a tuple of arrays.
+
+    The code is found by a name made from the kernel's text, so that loops which are taken from the
+    cache find it too.
+
+    Parameters
+    ----------
+    text
+        Source of the kernel.
+    machine
+        The C function that `straight_line` was compiled into.
+    """
+    kernel = _kernel(text)
+    digest = hashlib.sha256(f"{source_hash()}\n{text}".encode()).hexdigest()[:16]
+    symbol = f"vehiclemor_{kernel.name}_{digest}"
+    llvm.add_symbol(symbol, machine.address)
+    _alive.append(machine)
+
+    @intrinsic
+    def call(typing_context: Any, arrays: Any) -> Any:
+        del typing_context
+        _check(kernel, arrays)
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            pointers = []
+            for name, kind, array in zip(
+                kernel.arguments,
+                sig.args[0],
+                cgutils.unpack_tuple(builder, args[0], len(sig.args[0])),
+                strict=True,
+            ):
+                if name != "_work":
+                    pointers.append(context.make_array(kind)(context, builder, array).data)
+            kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
+            function = cgutils.get_or_insert_function(builder.module, kind, symbol)
+            function.attributes.add("nounwind")
+            builder.call(function, pointers)
+            return context.get_dummy_value()
+
+        return types.void(arrays), generate
+
+    return call
+
+
+def _check(kernel: _Kernel, arrays: Iterable[Any]) -> None:
+    for name, kind in zip(kernel.arguments, arrays, strict=True):
+        dimensions = kernel.dimensions if name == "_result" else 1
+        if not (
+            isinstance(kind, types.Array)
+            and kind.dtype == types.float64
+            and kind.layout == "C"
+            and kind.ndim == dimensions
+        ):
+            raise TypingError(
+                f"{kernel.name}: {name.removeprefix('_')} must be a C-contiguous array of floats "
+                f"with {dimensions} dimension(s), not {kind}"
+            )

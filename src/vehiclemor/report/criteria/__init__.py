@@ -1,0 +1,13 @@
+"""The paper's claims as numeric criteria: claim -> (results, label of a method) -> finding."""
+
+from collections.abc import Callable
+
+from vehiclemor.report.criteria import double_wishbone, independent_suspension_vehicle
+from vehiclemor.report.criteria.finding import Finding, Results
+
+CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
+    **double_wishbone.CRITERIA,
+    **independent_suspension_vehicle.CRITERIA,
+}
+# Claims about subspaces or the cost of integrating: replay has neither.
+WITHOUT_REPLAY = double_wishbone.WITHOUT_REPLAY | independent_suspension_vehicle.WITHOUT_REPLAY

@@ -1,0 +1,78 @@
+"""What a criterion returns, and what counts as visible in a figure.
+
+The paper shows curves; a reader sees a deviation on them when it is a visible share of the
+signal's range.  Each criterion is evaluated for the default settings and for the paper's literal
+ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+
+# Share of a signal's range from which on a deviation counts as visible in a figure: 2 mm on a curve
+# that is 40 mm high.
+VISIBLE = 0.05
+# Curves that agree within this share of the range lie on top of each other: 0.4 mm there.
+INDISTINGUISHABLE = 0.01
+# A change of an error by less than this share is no change.
+SMALLEST_CHANGE = 0.01
+Results = Mapping[str, "xr.Dataset"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Outcome of one criterion.
+
+    Attributes
+    ----------
+    measured
+        The number that decides.
+    bound
+        What it is compared with.
+    met
+        Whether the claim holds.
+    explanation
+        What the number is, and what else was seen.
+    """
+
+    measured: float
+    bound: float
+    met: bool
+    explanation: str
+
+
+def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
+    """One method at one place of the grid."""
+    # A dictionary: `method` is also the name of an argument of `sel`.
+    return dataset.sel({"method": label, **place}).squeeze(drop=True)
+
+
+def deviation_history(point: xr.Dataset, output: str) -> xr.DataArray:
+    """Error history as a share of the full-order signal's range."""
+    error = point["outputs"].sel(output=output) - point["reference_outputs"].sel(output=output)
+    return error / point["signal_range"].sel(output=output)
+
+
+def largest_deviation(point: xr.Dataset, output: str) -> float:
+    """Largest error of an output as a share of the full-order signal's range."""
+    chosen = point.sel(output=output)
+    return float(chosen["max_error"] / chosen["signal_range"])
+
+
+def relative_rms(dataset: xr.Dataset, label: str, output: str) -> np.ndarray:
+    """RMS errors of a method over a grid as shares of the full-order signal's range."""
+    chosen = dataset.sel({"method": label, "output": output}).squeeze(drop=True)
+    return (chosen["rms_error"] / chosen["signal_range"]).values
+
+
+def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISIBLE) -> Finding:
+    """Whether the largest deviation of all named outputs stays below a share of their ranges."""
+    worst = max(largest_deviation(point, output) for output in outputs)
+    text = "largest deviation, as a share of the signal's range"
+    return Finding(worst, bound, worst < bound, text)

@@ -1,0 +1,115 @@
+"""The paper's claims on the 14-DOF vehicle, figures 2 to 4, as criteria that can fail.
+
+Every criterion takes the worse of the two starts: from the equilibrium the car hardly pitches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.report.criteria.finding import (
+    SMALLEST_CHANGE,
+    VISIBLE,
+    Finding,
+    Results,
+    at_point,
+    largest_deviation,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+STARTS = ("equilibrium", "dropped")
+OUTPUTS = ("lateral_position", "pitch", "yaw")
+# Control periods (s): the paper's, and one that is clearly longer.
+PERIOD, LONGER_PERIOD = 0.5, 2.5
+
+
+def _worst(values: dict[str, float]) -> tuple[float, str]:
+    """Largest value and where it is; missing if any is missing."""
+    missing = [name for name, value in values.items() if value != value]
+    if missing:
+        return float("nan"), missing[0]
+    name = max(values, key=lambda key: values[key])
+    return values[name], name
+
+
+def _failures(dataset: xr.Dataset) -> str:
+    states = {s: str(dataset["status"].sel(start=s).item()) for s in STARTS}
+    return ", ".join(f"{start}: {status}" for start, status in states.items() if status != "ok")
+
+
+def follows_closely(results: Results, label: str) -> Finding:
+    """Figures 2 and 3: trajectory, pitch and yaw can hardly be told from the full model's."""
+    chosen = at_point(results["figures-2-4"], label, rank=3)
+    deviations = {
+        f"{output} from {start}": largest_deviation(chosen.sel(start=start), output)
+        for start in STARTS
+        for output in OUTPUTS
+    }
+    worst, where = _worst(deviations)
+    failed = _failures(chosen)
+    met = worst < VISIBLE and not failed
+    text = f"largest deviation of {where}, as a share of the signal's range"
+    return Finding(worst, VISIBLE, met, f"{text}; {failed}" if failed else text)
+
+
+def three_states_suffice(results: Results, label: str) -> Finding:
+    """Text: three states hold most of the information, by the best approximation in them."""
+    chosen = at_point(results["figures-2-4"], label, rank=3)
+    shares = {
+        f"{output} from {start}": float(
+            chosen["floor_rms_error"].sel(start=start, output=output)
+            / chosen["signal_range"].sel(start=start, output=output)
+        )
+        for start in STARTS
+        for output in OUTPUTS
+    }
+    worst, where = _worst(shares)
+    text = f"RMS error of the best approximation of {where}, as a share of the signal's range"
+    return Finding(worst, VISIBLE, worst < VISIBLE, text)
+
+
+def shorter_periods_sharpen_basis(results: Results, label: str) -> Finding:
+    """Text: a subspace for each control period is more accurate than one for a longer time."""
+    study = at_point(results["vehicle-control-period"], label, rank=3)
+    floors = study["floor_rms_error"].sel(output=["pitch", "yaw"])
+    ratios = floors.sel(control_period=PERIOD) / floors.sel(control_period=5.0)
+    worst = float(ratios.max())
+    bound = 1.0 - SMALLEST_CHANGE
+    text = (
+        f"RMS error of the best approximation with {PERIOD:g} s as a multiple of that with 5 s, "
+        f"worst of pitch and yaw and both starts (best {float(ratios.min()):.2g})"
+    )
+    return Finding(worst, bound, worst < bound, text)
+
+
+def longer_periods_save_time(results: Results, label: str) -> Finding:
+    """Text: longer control periods save time substantially, at the price of some deviation."""
+    study = at_point(results["vehicle-control-period"], label, rank=3)
+    calls, errors = study["rhs_calls"], study["rms_error"].sel(output="yaw")
+    saved = calls.sel(control_period=LONGER_PERIOD) / calls.sel(control_period=PERIOD)
+    price = errors.sel(control_period=LONGER_PERIOD) / errors.sel(control_period=PERIOD)
+    status = study["status"].sel(control_period=[PERIOD, LONGER_PERIOD])
+    finished = bool((status == "ok").all())
+    worst, bound = float(saved.max()), 0.9
+    text = (
+        f"evaluations with {LONGER_PERIOD:g} s as a multiple of those with {PERIOD:g} s, worse of "
+        f"both starts; the yaw error grows {np.nanmin(price.values):.2g} to "
+        f"{np.nanmax(price.values):.2g} times"
+    )
+    if not finished:
+        text += "; some runs diverge"
+    return Finding(worst, bound, finished and worst < bound, text)
+
+
+CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
+    "gv_fig3_closely_matches": follows_closely,
+    "gv_three_states_suffice": three_states_suffice,
+    "gv_control_periods_sharpen_basis": shorter_periods_sharpen_basis,
+    "gv_longer_period_saves_time": longer_periods_save_time,
+}
+WITHOUT_REPLAY = frozenset(CRITERIA) - {"gv_fig3_closely_matches"}

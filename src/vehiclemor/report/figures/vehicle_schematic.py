@@ -1,0 +1,182 @@
+"""Figure 1: the 14-DOF vehicle drawn from its own geometry, beside its topological graph."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from vehiclemor.models import independent_suspension_vehicle as vehicle
+from vehiclemor.parameters import load_parameters
+from vehiclemor.report.figures.lines import Results
+from vehiclemor.report.figures.mechanism import draw_graph, rim
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = {"road": "#777777", "chassis": "#000000", "mass": "#D55E00", "wheel": "#0072B2"}
+SPRING, DAMPER, SIZES, AXES = "#009E73", "#CC79A7", "#555555", "#E69F00"
+# Only for the drawing: outline of the sprung body (m) and steering angle (rad).
+HALF_WIDTH, BOTTOM, TOP, OVERHANG = 0.45, 0.50, 0.92, 0.15
+DRAWN_STEER = np.deg2rad(20.0)
+GREEK = ("psi", "theta", "phi", "gamma")
+CAPTIONS = {"fontsize": 7.5, "ha": "center", "va": "center"}
+
+
+def figure_1(results: Results) -> Figure:
+    """Vehicle at rest in equilibrium, in the chassis frame moved to the road, and the graph."""
+    del results
+    parameters = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
+    p = {name: float(parameters[name]) for name in vehicle.PARAMETERS}
+    # Placed by hand: the style's automatic layout can't deal with axes in space.
+    figure = plt.figure(figsize=(6.7, 4.4))
+    figure.set_layout_engine("none")
+    space = figure.add_axes((-0.03, 0.06, 0.64, 0.94), projection="3d")
+    graph = figure.add_axes((0.61, 0.10, 0.39, 0.83))
+    _draw_vehicle(space, p)
+    _draw_sizes(space, p)
+    _frame_space(space)
+    _draw_vehicle_graph(graph)
+    handles, labels = space.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower left", ncols=4, fontsize=7.5)
+    figure.text(0.02, 0.95, "(a)")
+    figure.text(0.62, 0.95, "(b)")
+    return figure
+
+
+def wheel_centres(p: dict[str, float]) -> np.ndarray:
+    """Wheel centres (4, 3) in m at zero travel, x and y from the sprung CG, z from the road."""
+    d = vehicle.derived(p)
+    return np.array(
+        [
+            (
+                d.sprung_distance[0] if front else -d.sprung_distance[1],
+                (0.5 if left else -0.5) * p["front_track" if front else "rear_track"],
+                p["sprung_height"] - d.depth[0 if front else 1],
+            )
+            for front, left in zip(vehicle.FRONT, vehicle.LEFT, strict=True)
+        ]
+    )
+
+
+def _draw_vehicle(axis: Any, p: dict[str, float]) -> None:
+    centres = wheel_centres(p)
+    ends = np.array([centres[0, 0] + OVERHANG, centres[2, 0] - OVERHANG])
+    corners = [(ends[i], side * HALF_WIDTH) for i, side in ((0, 1), (0, -1), (1, -1), (1, 1))]
+    levels = [[(x, y, z) for x, y in corners] for z in (BOTTOM, TOP)]
+    sides = [[levels[0][i - 1], levels[0][i], levels[1][i], levels[1][i - 1]] for i in range(4)]
+    body = Poly3DCollection([*levels, *sides], facecolor="#999999", edgecolor="black")
+    body.set_alpha(0.10)
+    body.set_linewidth(0.8)
+    axis.add_collection3d(body)
+    for number, (centre, front) in enumerate(zip(centres, vehicle.FRONT, strict=True)):
+        x, y, z = centre
+        steer = DRAWN_STEER if front else 0.0
+        first = number == 0
+        circle = rim(centre, np.array([-np.sin(steer), np.cos(steer), 0.0]), p["tire_radius"])
+        # The road presses the tire flat by its static deflection.
+        circle[:, 2] = np.maximum(circle[:, 2], 0.0)
+        name = "wheel" if first else None
+        axis.plot(*circle.T, color=COLORS["wheel"], linewidth=1.8, label=name)
+        inner = np.sign(y) * HALF_WIDTH
+        axis.plot([x, x], [inner, y], [TOP, TOP], color="black", linewidth=1.4)
+        _strut(axis, centre, first)
+        name = "lumped mass" if first else None
+        axis.plot(x, y, z, "s", color=COLORS["mass"], markersize=6, label=name, linestyle="none")
+        if front:
+            ahead = np.array([[0.0, 0.0], [0.75, 0.0], [0.0, 0.0]])
+            axis.plot(*(centre[:, None] + ahead.T @ np.eye(2) * 1.0), color=SIZES) if False else None
+            _steering(axis, centre)
+    heights = p["sprung_height"]
+    axis.plot(0.0, 0.0, heights, "o", color="black", markersize=5, linestyle="none", label="CG")
+    for direction, name in zip(np.eye(3), "xyz", strict=True):
+        axis.quiver(0, 0, heights, *(0.62 * direction), color=AXES, linewidth=1.6)
+        axis.text(*(0.72 * direction + [0, 0, heights]), name, color=AXES, **CAPTIONS)
+
+
+def _strut(axis: Any, centre: np.ndarray, named: bool) -> None:
+    """Prismatic joint along the chassis z axis: spring and damper side by side."""
+    x, y, z = centre
+    part = np.array([0.0, 0.2, *np.linspace(0.23, 0.77, 10), 0.8, 1.0])
+    turns = np.array([0.0, 0.0, *(0.05 * (-1.0) ** np.arange(10)), 0.0, 0.0])
+    height = z + part * (TOP - z)
+    name = "spring" if named else None
+    axis.plot(x - 0.07 + turns, np.full(14, y), height, color=SPRING, linewidth=1.2, label=name)
+    half, quarter = (z + TOP) / 2.0, (TOP - z) / 4.0
+    name = "damper" if named else None
+    style = {"color": DAMPER, "linewidth": 1.2}
+    axis.plot([x + 0.07] * 2, [y, y], [z, half], **style, label=name)
+    axis.plot([x + 0.03, x + 0.11], [y, y], [half, half], **style)
+    cup = x + np.array([0.02, 0.02, 0.12, 0.12])
+    axis.plot(cup, [y] * 4, half + quarter * np.array([-0.6, 0.7, 0.7, -0.6]), **style)
+    axis.plot([x + 0.07] * 2, [y, y], [half + 0.7 * quarter, TOP], **style)
+    for level in (z, TOP):
+        axis.plot([x - 0.07, x + 0.07], [y, y], [level, level], color="black", linewidth=1.2)
+
+
+def _steering(axis: Any, centre: np.ndarray) -> None:
+    """Steering angle in the plane of the wheel centres."""
+    x, y, z = centre
+    angle = np.linspace(0.0, DRAWN_STEER, 15)
+    arc = np.array([x + 0.7 * np.cos(angle), y + 0.7 * np.sin(angle), np.full(15, z)])
+    style = {"color": SIZES, "linewidth": 0.9}
+    axis.plot(*arc, **style)
+    axis.plot([x, x + 0.8], [y, y], [z, z], linestyle="--", **style)
+    steered = 0.8 * np.array([np.cos(DRAWN_STEER), np.sin(DRAWN_STEER)])
+    axis.plot([x, x + steered[0]], [y, y + steered[1]], [z, z], **style)
+    middle = 0.84 * np.array([np.cos(DRAWN_STEER / 2), np.sin(DRAWN_STEER / 2)])
+    axis.text(x + middle[0], y + middle[1], z, r"$\delta$", **CAPTIONS)
+
+
+def _draw_sizes(axis: Any, p: dict[str, float]) -> None:
+    """Dimensions on the road with their values."""
+    centres, whole = wheel_centres(p), 0.0
+    front, rear = centres[0, 0], centres[2, 0]
+    whole = front - p["front_axle_distance"]
+    side = -0.5 * p["front_track"] - 0.45
+    for start, end, symbol, value in (
+        ((front, side, 0), (whole, side, 0), "a", p["front_axle_distance"]),
+        ((whole, side, 0), (rear, side, 0), "b", p["rear_axle_distance"]),
+        ((front + 1.0, *centres[0, 1:2], 0), (front + 1.0, centres[1, 1], 0), "T_f", p["front_track"]),
+        ((rear - 0.6, centres[2, 1], 0), (rear - 0.6, centres[3, 1], 0), "T_r", p["rear_track"]),
+        ((0, 0, 0), (0, 0, p["sprung_height"]), "h_s", p["sprung_height"]),
+    ):
+        line = np.array([start, end], dtype=float)
+        axis.plot(*line.T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
+        axis.text(*line.mean(axis=0), f"${symbol}$ = {value:.3f} m", color=SIZES, **CAPTIONS)
+
+
+def _frame_space(axis: Any) -> None:
+    axis.set_axis_off()
+    axis.set_proj_type("ortho")
+    axis.set_xlim(-2.1, 2.2)
+    axis.set_ylim(-1.3, 1.0)
+    axis.set_zlim(0.0, 1.3)
+    axis.set_box_aspect((4.3, 2.3, 1.3), zoom=1.5)
+    axis.view_init(elev=24, azim=-55)
+
+
+def _symbol(name: str) -> str:
+    """A coordinate's name as a formula."""
+    head, _, tail = name.partition("_")
+    head = f"\\{head}" if head in GREEK else head
+    return f"${head}_{{{tail}}}$" if tail else f"${head}$"
+
+
+def _draw_vehicle_graph(axis: Axes) -> None:
+    names = [_symbol(quantity.name) for quantity in vehicle.COORDINATES]
+    nodes, colors = {"road": (1.5, 3.1), "chassis": (1.5, 2.1)}, dict(COLORS)
+    free = f"free, {len(names) - 8} DOF\n" + ", ".join(names[:-8])
+    edges = [("road", "chassis", free)]
+    for number, wheel in enumerate(vehicle.WHEELS):
+        mass, tire = f"mass {wheel}", f"wheel {wheel}"
+        nodes |= {mass: (float(number), 0.95), tire: (float(number), 0.0)}
+        colors |= {mass: COLORS["mass"], tire: COLORS["wheel"]}
+        edges.append(("chassis", mass, f"P {names[6 + number]}"))
+        edges.append((mass, tire, f"R {names[10 + number]}"))
+    draw_graph(axis, nodes, edges, colors)
+    axis.set_xlim(-0.45, 3.45)
+    axis.set_ylim(-0.3, 3.3)

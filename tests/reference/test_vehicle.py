@@ -1,0 +1,434 @@
+"""The 14-DOF vehicle against independent mechanics, conservation laws and other integrators."""
+
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import linear_sum_assignment
+from sksundae.cvode import CVODE
+
+from tests.oracles import vehicle_lagrange as oracle
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.registry import component
+from vehiclemor.simulation.dynamic import SOLVERS, DynamicModel, build
+from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.trajectory import Trajectory
+
+NAME = "independent_suspension_vehicle"
+COORDINATES, WHEELS = 14, 4
+LANE_CHANGE = component("maneuver", "lane_change")
+STRAIGHT = component("maneuver", "straight_ahead")
+# What the published vehicle leaves out: product of inertia and damping of the tires.
+EXTENDED = {"product_of_inertia": 35.0, "tire_damping": 400.0, "unsprung_mass": 44.0}
+IN_ORACLE = {"product_of_inertia": "Ixz", "tire_damping": "ct", "unsprung_mass": "m_u"}
+EXTENDED_ORACLE = {**oracle.PARAMETERS, **{IN_ORACLE[k]: v for k, v in EXTENDED.items()}}
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> DynamicModel:
+    return build(NAME)
+
+
+@pytest.fixture(scope="module")
+def extended() -> DynamicModel:
+    return build(NAME, overrides=EXTENDED)
+
+
+def states(seed: int, number: int) -> list[tuple[np.ndarray, float]]:
+    """Random large motions with steering angles; in some of them wheels are off the road."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(number):
+        q = np.concatenate(
+            [
+                rng.uniform(-50.0, 50.0, 2),
+                0.6 + rng.uniform(-0.08, 0.06, 1),
+                rng.uniform(-3.0, 3.0, 1),
+                rng.uniform(-0.25, 0.25, 2),
+                rng.uniform(-0.08, 0.08, 4),
+                rng.uniform(-20.0, 20.0, 4),
+            ]
+        )
+        nu = np.concatenate(
+            [
+                [rng.uniform(5.0, 35.0), *rng.uniform(-4.0, 4.0, 2)],
+                rng.uniform(-2.0, 2.0, 3),
+                rng.uniform(-2.0, 2.0, 4),
+                rng.uniform(10.0, 110.0, 4),
+            ]
+        )
+        found.append((np.concatenate([q, nu]), float(rng.uniform(-0.5, 0.5))))
+    return found
+
+
+LARGE = [*states(1, 28), (oracle.dropped(), 0.0), (oracle.dropped(), 0.3)]
+
+
+def close(found, expected, tolerance=1e-9) -> None:
+    found, expected = np.asarray(found), np.asarray(expected)
+    error = np.abs(found - expected) / np.maximum(1.0, np.abs(expected))
+    assert error.max() < tolerance
+
+
+def outputs(model: DynamicModel, x: np.ndarray, delta: float) -> dict[str, np.ndarray]:
+    """Outputs by name, four values where there is one for each wheel."""
+    row = dict(zip(model.outputs, model.outputs_at(x[None], np.array([[delta]]))[0], strict=True))
+    wheels = ("FL", "FR", "RL", "RR")
+    names = ("Fx", "Fy", "Fz", "Mz", "slip_ratio", "slip_angle")
+    return {name: np.array([row[f"{name}_{wheel}"] for wheel in wheels]) for name in names}
+
+
+def second_order(model: DynamicModel, x, delta) -> tuple[np.ndarray, np.ndarray]:
+    """Mass matrix and forces of the equations in the coordinates."""
+    result, work = np.empty((14, 15)), np.zeros(model.kernels.WORK)
+    model.kernels.second_order(x, np.array([delta]), model.constants, work, result)
+    return result[:, :-1], result[:, -1]
+
+
+def speeds(model: DynamicModel, q, rates) -> np.ndarray:
+    result, work = np.empty(14), np.zeros(model.kernels.WORK)
+    x = np.concatenate([q, rates])
+    model.kernels.speeds(x, np.zeros(1), model.constants, work, result)
+    return result
+
+
+# Equations of motion
+
+
+def test_accelerations_are_those_of_dalemberts_principle(vehicle):
+    for x, delta in LARGE:
+        close(vehicle.derivative(x, delta), oracle.accelerations(x, delta))
+
+
+def test_accelerations_with_every_parameter_in_play(extended):
+    for x, delta in states(2, 12):
+        expected = oracle.accelerations(x, delta, EXTENDED_ORACLE)
+        close(extended.derivative(x, delta), expected)
+
+
+def test_tire_forces_and_slips_are_those_of_the_specification(vehicle):
+    off = 0
+    for x, delta in LARGE:
+        found, expected = outputs(vehicle, x, delta), oracle.tire_forces(x, delta)
+        pairs = {"slip_ratio": "kappa", "slip_angle": "alpha"}
+        for name, values in found.items():
+            close(values, expected[pairs.get(name, name)])
+        lifted = expected["Fz"] == 0.0
+        off += lifted.sum()
+        for name in ("Fx", "Fy", "Mz"):
+            assert not found[name][lifted].any()
+    assert off > 8
+
+
+def test_second_order_form_holds_with_the_oracles_second_derivatives(vehicle):
+    for x, delta in LARGE:
+        rates = oracle.accelerations(x, delta)
+        # The kinematic equations, differentiated along the motion without rounding.
+        along = oracle.accelerations(x + 1e-30j * rates, delta)[:14]
+        q_second = along.imag / 1e-30
+        mass, force = second_order(vehicle, x, delta)
+        np.testing.assert_allclose(mass, mass.T, rtol=0, atol=1e-12 * np.abs(mass).max())
+        assert np.linalg.eigvalsh(mass).min() > 0.1
+        close(np.linalg.solve(mass, force), q_second)
+
+
+def test_mass_matrix_is_the_kinetic_energys(vehicle):
+    for x, _ in LARGE[:10]:
+        per_rate = np.array([speeds(vehicle, x[:14], e) for e in np.eye(14)]).T
+        expected = per_rate.T @ oracle.kinetic_matrix(x, 0.0) @ per_rate
+        close(vehicle.mass_matrix(x), expected, 1e-11)
+
+
+def test_speeds_invert_the_kinematic_equations(vehicle):
+    for x, delta in LARGE:
+        rates = vehicle.derivative(x, delta)[:14]
+        close(speeds(vehicle, x[:14], rates), x[14:], 1e-13)
+
+
+def test_equations_of_motion_are_those_of_pinocchio(vehicle):
+    """Recursive Newton-Euler of the tree, fed with the model's accelerations and tire forces."""
+    p = {name: float(value) for name, value in vehicle.parameters.values().items()}
+    d = oracle.derived()
+    for x, delta in [*LARGE[:12], LARGE[-1]]:
+        q, nu = x[:14], x[14:]
+        tree = pin.Model()
+        body = tree.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
+        inertia = np.diag([p["roll_inertia"], p["pitch_inertia"], d["Izz"]])
+        sprung = pin.Inertia(p["sprung_mass"], np.zeros(3), inertia)
+        tree.appendBodyToJoint(body, sprung, pin.SE3.Identity())
+        spins = []
+        # Depth first: Pinocchio numbers the joints in this order.
+        for wheel in range(WHEELS):
+            end, side = ("f" if wheel < 2 else "r"), (1.0 if wheel % 2 == 0 else -1.0)
+            track = p["front_track" if wheel < 2 else "rear_track"]
+            reach = d["a_s"] if wheel < 2 else -d["b_s"]
+            place = pin.SE3(np.eye(3), np.array([reach, side * track / 2, -d[f"h_{end}"]]))
+            slide = tree.addJoint(body, pin.JointModelPZ(), place, f"slide_{wheel}")
+            steer = pin.utils.rotate("z", delta if wheel < 2 else 0.0)
+            turned = pin.SE3(steer, np.zeros(3))
+            spin = tree.addJoint(slide, pin.JointModelRY(), turned, f"spin_{wheel}")
+            about, across = p["spin_inertia"], p["diametral_inertia"]
+            disc = pin.Inertia(p["unsprung_mass"], np.zeros(3), np.diag([across, about, across]))
+            tree.appendBodyToJoint(spin, disc, pin.SE3.Identity())
+            spins.append(spin)
+        rotation = (
+            pin.utils.rotate("z", q[3]) @ pin.utils.rotate("y", q[4]) @ pin.utils.rotate("x", q[5])
+        )
+        place = [*q[:3], *pin.Quaternion(rotation).coeffs()]
+        order = [*range(6), *(6 + k + 4 * part for k in range(WHEELS) for part in (0, 1))]
+        data = tree.createData()
+        position = np.array([*place, *q[order[6:]]])
+        pin.forwardKinematics(tree, data, position)
+        forces = outputs(vehicle, x, delta)
+        outside = [pin.Force.Zero() for _ in range(tree.njoints)]
+        for wheel, spin in enumerate(spins):
+            at = data.oMi[spin]
+            axle, up = at.rotation[:, 1], np.array([0.0, 0.0, 1.0])
+            ahead = np.cross(axle, up) / np.linalg.norm(np.cross(axle, up))
+            shear = forces["Fx"][wheel] * ahead + forces["Fy"][wheel] * np.cross(up, ahead)
+            moment = np.cross(-at.translation[2] * up, shear) + forces["Mz"][wheel] * up
+            push = shear + forces["Fz"][wheel] * up
+            outside[spin] = pin.Force(at.rotation.T @ push, at.rotation.T @ moment)
+        acceleration = vehicle.derivative(x, delta)[14:]
+        joint_forces = pin.rnea(
+            tree, data, position, nu[order], acceleration[order], pin.StdVec_Force(outside)
+        )
+        found = np.empty(14)
+        found[order] = joint_forces
+        # What the joints must do: nothing but the springs and dampers on the slides.
+        expected = np.zeros(14)
+        for wheel in range(WHEELS):
+            end, side = ("f", "front") if wheel < 2 else ("r", "rear")
+            spring = d[f"S0_{end}"] + p[f"{side}_stiffness"] * q[6 + wheel]
+            expected[6 + wheel] = -spring - p[f"{side}_damping"] * nu[6 + wheel]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
+        mass = np.empty((14, 14))
+        # Pinocchio promises the upper triangle alone.
+        upper = np.triu(pin.crba(tree, data, position))
+        mass[np.ix_(order, order)] = upper + np.triu(upper, 1).T
+        per_rate = np.array([speeds(vehicle, q, e) for e in np.eye(14)]).T
+        close(second_order(vehicle, x, delta)[0], per_rate.T @ mass @ per_rate, 1e-10)
+
+
+# Equilibrium and symmetries
+
+
+def test_straight_running_is_an_equilibrium(vehicle):
+    x = vehicle.start("equilibrium")
+    np.testing.assert_allclose(x, oracle.equilibrium(), rtol=1e-15)
+    rates = vehicle.derivative(x, 0.0)
+    assert np.abs(rates[14:]).max() < 1e-9
+    assert rates[0] == pytest.approx(20.0)
+    p = oracle.PARAMETERS
+    weight = (p["m_s"] + 4 * p["m_u"]) * p["g"]
+    assert outputs(vehicle, x, 0.0)["Fz"].sum() == pytest.approx(weight, rel=1e-12)
+
+
+def test_any_speed_and_any_load_has_its_equilibrium(extended):
+    fast = build(NAME, overrides={"initial_speed": 37.0, "product_of_inertia": -20.0})
+    for model in (fast, extended):
+        rates = model.derivative(model.start(), 0.0)
+        assert np.abs(rates[14:]).max() < 1e-9
+
+
+def test_the_dropped_start_keeps_its_velocity_in_space(vehicle):
+    x = vehicle.start("dropped")
+    np.testing.assert_allclose(x, oracle.dropped(), rtol=1e-15)
+    np.testing.assert_allclose(vehicle.derivative(x, 0.0)[:3], [20.0, 0.0, 0.0], atol=1e-14)
+
+
+def test_the_mirrored_vehicle_moves_as_the_mirror_image(vehicle):
+    for x, delta in LARGE:
+        expected = oracle.mirror(vehicle.derivative(x, delta))
+        close(vehicle.derivative(oracle.mirror(x), -delta), expected, 1e-11)
+
+
+def test_place_heading_and_wheel_angles_have_no_influence(vehicle):
+    rng = np.random.default_rng(5)
+    for x, delta in LARGE[:12]:
+        moved = x.copy()
+        turn = rng.uniform(-3.0, 3.0)
+        moved[:2] += rng.uniform(-100.0, 100.0, 2)
+        moved[3] += turn
+        moved[10:14] += rng.uniform(-50.0, 50.0, 4)
+        before, after = vehicle.derivative(x, delta), vehicle.derivative(moved, delta)
+        path = (before[0] + 1j * before[1]) * np.exp(1j * turn)
+        close(after[:2], [path.real, path.imag], 1e-12)
+        close(after[2:], before[2:], 1e-12)
+
+
+# Energy
+
+
+def integrate(
+    model: DynamicModel,
+    maneuver: Maneuver,
+    start: np.ndarray,
+    solver: str,
+    tolerance: float,
+    times: np.ndarray,
+) -> Trajectory:
+    found = model.integrate(maneuver, start, full_space(14), solver, tolerance, times)
+    assert found.status == "ok", found.message
+    return found
+
+
+def test_energy_changes_by_the_power_of_tires_and_dampers(vehicle):
+    for x, delta in LARGE:
+        rates = vehicle.derivative(x, delta)
+        rate = oracle.energy(x + 1e-30j * rates, delta=delta).imag / 1e-30
+        assert rate == pytest.approx(oracle.power(x, delta), rel=1e-9, abs=1e-5)
+
+
+def test_energy_is_conserved_without_dampers_and_shear():
+    # No stiffness of a tire against slip: no force along the road.
+    overrides = dict.fromkeys(("PKX1", "PKX2", "PKY1", "front_damping", "rear_damping"), 0.0)
+    free = build(NAME, overrides=overrides)
+    start = free.start("dropped")
+    # Rolls, pitches and bounces; the rear wheels are off the road at first.
+    start[15:20] = [0.3, start[16], 0.4, 0.1, 0.2]
+    times = np.linspace(0.0, 4.0, 9)
+    path = integrate(free, STRAIGHT, start, "explicit", 1e-11, times)
+    energies = np.array([oracle.energy(x) for x in path.states])
+    assert np.abs(np.diff(path.outputs[:, 3])).max() > 1e-3
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-8)
+    # Beside the part that springs and body exchange, too.
+    exchanged = oracle.energy(start) - oracle.energy(oracle.equilibrium())
+    np.testing.assert_allclose(energies, energies[0], rtol=0, atol=1e-6 * abs(exchanged))
+    forces = outputs(free, path.states[3], 0.1)
+    assert not any(forces[name].any() for name in ("Fx", "Fy", "Mz"))
+
+
+def test_dampers_and_tires_take_energy_away(vehicle):
+    times = np.linspace(0.0, 3.0, 31)
+    path = integrate(vehicle, STRAIGHT, vehicle.start("dropped"), "explicit", 1e-9, times)
+    energies = np.array([oracle.energy(x) for x in path.states])
+    assert np.all(np.diff(energies) < 1e-3)
+    assert energies[0] - energies[-1] > 50.0
+
+
+# Linear theory
+
+
+def test_yaw_gain_is_the_single_track_vehicles(vehicle):
+    x = vehicle.start()
+    h = 1e-5
+    by_steer = (vehicle.derivative(x, h) - vehicle.derivative(x, -h)) / (2 * h)
+    jacobian = vehicle.jacobian(x, 0.0)
+    # Lateral motions are the ones that the mirror reverses; cyclic states play no part.
+    reverse = (np.eye(28) - np.array([oracle.mirror(e) for e in np.eye(28)])) / 2
+    lateral = [4 + 1, *range(6, 10), *range(14, 28)]
+    basis, size, _ = np.linalg.svd(reverse[np.ix_(lateral, lateral)])
+    basis = basis[:, size > 0.5]
+    system = basis.T @ jacobian[np.ix_(lateral, lateral)] @ basis
+    steady = basis @ np.linalg.solve(system, -basis.T @ by_steer[lateral])
+    gain = steady[lateral.index(19)]
+    assert gain == pytest.approx(oracle.single_track_yaw_gain(), rel=1e-5)
+
+
+def test_eigenvalues_are_those_of_the_exact_jacobian(vehicle):
+    x = vehicle.start()
+    active = vehicle.active
+    exact = oracle.jacobian(x, 0.0)
+    found = np.linalg.eigvals(vehicle.jacobian(x, 0.0))
+    expected = np.linalg.eigvals(exact)
+    assert np.sum(np.abs(expected) < 1e-5) == 8
+    distance = np.abs(found[:, None] - expected)
+    pairs = linear_sum_assignment(distance)
+    assert distance[pairs].max() < 1e-5
+    # Nothing but the path in the plane depends on what is left out.
+    left_out = np.delete(np.arange(28), active)
+    assert np.abs(exact[2:][:, left_out]).max() < 1e-12
+    # The wheels' spins are the stiff part.
+    assert np.sum(expected.real < -100.0) == 4
+
+
+# Trajectories
+
+
+def test_the_lane_change_ends_where_its_amplitude_was_calibrated(vehicle):
+    end = integrate(vehicle, LANE_CHANGE, vehicle.start(), "explicit", 1e-10, np.array([25.0]))
+    assert end.outputs[0, 1] == pytest.approx(3.4999973, abs=1e-6)
+    assert end.outputs[0, 2] == pytest.approx(6.8e-4, abs=5e-6)
+
+
+# Until the pulse of the lane change is over, and a little more.
+TIMES = np.array([0.9, 1.7, 2.6, 3.4, 4.0])
+
+
+@pytest.fixture(scope="module", params=["equilibrium", "dropped"])
+def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """Start and states at `TIMES` by LSODA of SciPy, broken at the maneuver's break points."""
+    x = start = vehicle.start(request.param)
+    path, edges = [], [0.0, 1.0, 3.5, 4.0]
+    for a, b in itertools.pairwise(edges):
+        times = [*(t for t in TIMES if a < t < b), b]
+
+        def rates(t, x):
+            return vehicle.derivative(x, oracle.lane_change(t))
+
+        solution = solve_ivp(rates, (a, b), x, "LSODA", times, rtol=1e-10, atol=1e-11)
+        x = solution.y[:, -1]
+        path += [state for t, state in zip(times, solution.y.T, strict=True) if np.any(t == TIMES)]
+    return start, np.array(path)
+
+
+@pytest.mark.parametrize(
+    ("solver", "tolerance"), [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 1e-9)]
+)
+def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
+    start, expected = reference
+    found = integrate(vehicle, LANE_CHANGE, start, solver, tolerance, TIMES).states
+    assert np.abs(found - expected).max() < 1e-6
+
+
+def test_sundials_agrees_with_lsoda(vehicle, reference):
+    start, expected = reference
+    x, edges = start, [0.0, 1.0, 3.5, 4.0]
+    for a, b in itertools.pairwise(edges):
+
+        def rates(t, x, slope):
+            slope[:] = vehicle.derivative(x, oracle.lane_change(t))
+
+        solver = CVODE(rates, rtol=1e-9, atol=1e-10, max_num_steps=100000)
+        x = solver.solve(np.array([a, b]), x).y[-1]
+    np.testing.assert_allclose(x, expected[-1], rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
+    exact = integrate(vehicle, LANE_CHANGE, vehicle.start(), "explicit", 1e-12, TIMES).states
+    errors = []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        found = integrate(vehicle, LANE_CHANGE, vehicle.start(), solver, tolerance, TIMES).states
+        errors.append(np.abs(found - exact).max())
+    assert errors[2] < 0.2 * errors[1] < 0.04 * errors[0]
+
+
+@pytest.mark.parametrize(("solver", "order"), [("explicit", 5), ("rodas4", 4), ("ros34pw2", 3)])
+def test_the_path_in_the_plane_converges_with_the_order_of_the_method(vehicle, solver, order):
+    """Though the Jacobian leaves out how the path turns with the heading."""
+    exact = integrate(vehicle, LANE_CHANGE, vehicle.start(), "explicit", 1e-13, TIMES).states
+    # Fixed steps, where the explicit pair is stable and rounding plays no part.
+    steps = np.array([0.008, 0.004]) if solver == "explicit" else np.array([0.04, 0.02])
+    errors = []
+    for step in steps:
+        found = vehicle.integrate(
+            LANE_CHANGE, vehicle.start(), full_space(14), solver, 1e6, TIMES, step
+        )
+        errors.append(np.abs(found.states - exact)[:, [0, 1]].max())
+    assert np.log2(errors[0] / errors[1]) > order - 1.2, errors
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_heading_does_not_change_the_steps(vehicle, solver):
+    """A vehicle that sets off in another direction makes the same manoeuvre, turned."""
+    turned = vehicle.start()
+    turned[3] = 1.1
+    found = integrate(vehicle, LANE_CHANGE, turned, solver, 1e-5, TIMES)
+    plain = integrate(vehicle, LANE_CHANGE, vehicle.start(), solver, 1e-5, TIMES)
+    place = (plain.states[:, 0] + 1j * plain.states[:, 1]) * np.exp(1.1j)
+    np.testing.assert_allclose(found.states[:, 0] + 1j * found.states[:, 1], place, atol=5e-3)
+    np.testing.assert_allclose(found.states[:, 14:], plain.states[:, 14:], atol=1e-3)

@@ -1,0 +1,77 @@
+"""Plug-in model of three decoupled equations with known solutions, to try the integrators on.
+
+A driven pendulum (nonlinear), the problem of Prothero and Robinson (stiff where `rate` is large),
+and z' = growth z^2, which blows up at 1 / (growth z(0)).
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import sympy as sp
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.equations import DynamicEquations, Quantity
+from vehiclemor.parameters import Declared
+from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.tape import Tape
+
+NAME = "standard_problems"
+KIND = "ode"
+SUMMARY = "problems with known solutions"
+MANEUVER = "straight_ahead"
+CYCLIC = ()
+PARAMETER_FILE = Path(__file__).with_suffix(".toml")
+PARAMETERS = {name: Declared("1") for name in ("rate", "growth", "angle", "tracked", "exploding")}
+ANGLE, TRACKED, ANGULAR_SPEED, EXPLODING = range(4)
+
+
+def check(p: Mapping[str, float]) -> None:
+    """Every value is allowed."""
+    del p
+
+
+def starts(p: Mapping[str, float]) -> dict[str, np.ndarray]:
+    return {"only": np.array([p["angle"], p["tracked"], 0.0, p["exploding"]])}
+
+
+def quantities(*names: str) -> tuple[Quantity, ...]:
+    return tuple(Quantity(name, "1", name) for name in names)
+
+
+def derive() -> DynamicEquations:
+    x = sp.symbols("angle tracked angular_speed exploding", real=True)
+    torque, target, target_rate = u = sp.symbols("torque target target_rate", real=True)
+    p = {name: sp.Symbol(f"p_{name}", real=True) for name in PARAMETERS}
+    tape = Tape()
+    derivative = [
+        x[ANGULAR_SPEED],
+        p["rate"] * (target - x[TRACKED]) + target_rate,
+        torque - tape.let(sp.sin(x[ANGLE])),
+        p["growth"] * x[EXPLODING] ** 2,
+    ]
+    zeros = [sp.Integer(0)] * 6
+    functions = {
+        "derivative": (derivative, (4,)),
+        # Arctangents, so that the kernels contain the batch that evaluates them.
+        "outputs": ([*x, *(tape.let(sp.atan(state)) for state in x)], (8,)),
+        "second_order": (zeros, (2, 3)),
+        "speeds": (list(x[2:]), (2,)),
+    }
+    program = assemble(tape, {"x": x, "u": u}, list(p.values()), functions)
+    names = quantities("angle", "tracked"), quantities("angular_speed", "exploding")
+    inputs = quantities("torque", "target", "target_rate")
+    arcs = quantities(*(f"arctangent_{state}" for state in x))
+    return DynamicEquations(*names, inputs, (*names[0], *names[1], *arcs), program)
+
+
+def driven(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    """Inputs for which angle and tracked value are cos t."""
+    del frequency, amplitude
+    c, s = np.cos(times), np.sin(times)
+    return np.column_stack([np.sin(c) - c, c, -s])
+
+
+def maneuver(signal, duration: float, corners: tuple[float, ...] = ()) -> Maneuver:
+    names = ("torque", "target", "target_rate")
+    return Maneuver("test", "", signal, names, duration, 11, lambda _: corners)

@@ -1,0 +1,168 @@
+"""Machine code written from a kernel's text computes what the text says."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from llvmlite import ir
+from numba import cfunc, njit
+from numba.core.errors import TypingError
+
+from tests.unit.programs import random_program, run
+from vehiclemor.codegen import arctangent, exponential, sincos
+from vehiclemor.codegen.emit import kernel_source, work_size
+from vehiclemor.codegen.link import linked_source
+from vehiclemor.codegen.straight_line import caller, emit, machine_signature, straight_line
+from vehiclemor.symbolic.program import Program, assemble
+from vehiclemor.symbolic.tape import Tape
+
+x, y, p = sp.symbols("x y p", real=True)
+
+
+def compiled(text: str):
+    """A function of arrays from the text of one kernel."""
+    lines = straight_line(text)
+    arguments = text[text.index("(") + 1 : text.index(")")]
+    pointers = arguments.replace("_work, ", "")
+    namespace = {"lines": lines}
+    exec(f"def machine({pointers}):\n    lines(({pointers},))", namespace)  # noqa: S102
+    namespace["call"] = caller(text, cfunc(machine_signature(text))(namespace["machine"]))
+    exec(f"def kernel({arguments}):\n    call(({arguments},))", namespace)  # noqa: S102
+    return njit(namespace["kernel"])
+
+
+def texts(program: Program) -> dict[str, str]:
+    parts = kernel_source(program).strip().split("\n\n\n")
+    return {part[4 : part.index("(")]: f"{part}\n" for part in parts}
+
+
+def result_of(program: Program, values: dict[sp.Symbol, float]) -> np.ndarray:
+    kernels = texts(program)
+    work = np.full(work_size(program), np.nan)
+    constants = np.full(len(program.constant_symbols), np.nan)
+    parameters = np.array([values[symbol] for symbol in program.parameters])
+    compiled(kernels["constants"])(parameters, work, constants)
+    arguments = [np.array([values[s] for s in symbols]) for symbols in program.arguments.values()]
+    result = np.full(program.functions["f"].shape, np.nan)
+    compiled(kernels["f"])(*arguments, constants, work, result)
+    return result
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), a=st.floats(-2, 2), b=st.floats(-2, 2), c=st.floats(-2, 2))
+def test_random_programs_equal_plain_python(seed, a, b, c):
+    tape, results = random_program(seed, [x, y, p], 25)
+    program = assemble(tape, {"q": [x, y]}, [p], {"f": (results, (len(results),))})
+    values = {x: a, y: b, p: c}
+    expected = run(program, "f", values)
+    np.testing.assert_allclose(result_of(program, values), expected, rtol=1e-13, atol=1e-13)
+
+
+def test_functions_and_powers_of_the_printer():
+    expressions = [
+        sp.sqrt(x), sp.exp(-x), sp.Abs(x - y), sp.tan(x), sp.asin(x / 7), sp.acos(x / 7),
+        sp.atan2(-x, y), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.log(x), x**7, -x, 1 / x**3,
+        x ** sp.Rational(3, 2), x + p, sp.Float(2.5), sp.Integer(-3),
+    ]  # fmt: skip
+    program = assemble(Tape(), {"q": [x, y]}, [p], {"f": (expressions, (6, 3))})
+    values = {x: 1.7, y: 2.3, p: 0.6}
+    found = result_of(program, values)
+    assert found.shape == (6, 3)
+    np.testing.assert_allclose(found, run(program, "f", values), rtol=1e-14)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8, 11, 16])
+@pytest.mark.parametrize("function", [sp.sin, sp.cos, sp.atan])
+def test_batches_with_and_without_padding(count, function):
+    symbols = sp.symbols(f"a:{count}", real=True)
+    results = [function(s) + p for s in symbols]
+    program = assemble(Tape(), {"q": symbols}, [p], {"f": (results, (count,))})
+    values = dict(zip(symbols, np.linspace(-40.0, 55.0, count), strict=True)) | {p: 0.25}
+    expected = run(program, "f", values)
+    np.testing.assert_allclose(result_of(program, values), expected, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("function", ["exp", "atan", "sincos"])
+def test_elementary_functions_at_all_sizes(function, rng):
+    call = {"exp": "math.exp(_x[0])", "atan": "atan(_x[0])", "sincos": "a"}[function]
+    first = "    a, b = sincos_one(_x[0])\n" if function == "sincos" else ""
+    kernel = compiled(f"def {function}_one(_x, _result):\n{first}    _result[0] = {call}\n")
+    plain = {"exp": math.exp, "atan": math.atan, "sincos": math.sin}[function]
+    text = {"exp": exponential.exp, "atan": arctangent.atan, "sincos": sincos.sincos}[function]
+    numbers = [*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), 0.0, -0.0, 5e-324]
+    result = np.empty(1)
+    for number in numbers:
+        kernel(np.array([number]), result)
+        assert result[0] == pytest.approx(plain(number), rel=5e-16, abs=1e-15)
+        assert result[0] == pytest.approx(np.ravel(text(number))[0], rel=5e-16, abs=1e-15)
+    kernel(np.array([np.nan]), result)
+    assert np.isnan(result[0])
+
+
+def test_exponential_beyond_the_range_of_floats():
+    kernel = compiled("def edge(_x, _result):\n    _result[0] = math.exp(_x[0])\n")
+    result = np.empty(1)
+    for number in (-np.inf, -1e300, -746.0, -740.0, -708.5, 709.7, 711.0, 1e300, np.inf):
+        kernel(np.array([number]), result)
+        with np.errstate(all="ignore"):
+            np.testing.assert_allclose(result[0], np.exp(number), rtol=1e-15, atol=5e-324)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "a = _x[0] % 2.0",
+        "a = unknown",
+        "a = [_x[0]]",
+        "a = math.gamma(_x[0])",
+        "a = math.sqrt(_x[0], 1.0)",
+        "a = _x[i]",
+        "a = _x[0, 0]",
+        "a = _x[0] if 1 else 2.0",
+        "a = _work[3]",
+        "a = b = 1.0",
+        "a += 1.0",
+        "a, b = atan(_x[0])",
+        "for i in range(3): pass",
+        "return _x[0]",
+        "exp_batch(_work, 0)",
+        "_result[0, 0] = 1.0",
+        "_other[0] = 1.0",
+    ],
+)
+def test_what_is_not_straight_line_is_refused(line):
+    text = f"def odd(_x, _work, _result):\n    {line}\n    _result[0] = 1.0\n"
+    kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()] * 2)
+    function = ir.Function(ir.Module(), kind, "odd")
+    pointers = dict(zip(("_x", "_result"), function.args, strict=True))
+    builder = ir.IRBuilder(function.append_basic_block())
+    with pytest.raises(ValueError, match=r"straight-line|unknown|index|shape"):
+        emit(text, builder, pointers, lambda *_: None)
+
+
+def test_arrays_of_another_kind_are_refused():
+    kernel = compiled("def first(_x, _result):\n    _result[0] = _x[0]\n")
+    result = np.empty(1)
+    for wrong in (np.arange(6.0)[::2], np.arange(3), np.zeros((2, 2)), np.zeros(2, np.float32)):
+        with pytest.raises(TypingError, match="first: x must be a C-contiguous array of floats"):
+            kernel(wrong, result)
+    with pytest.raises(TypingError, match="first: result must be a C-contiguous"):
+        kernel(np.zeros(2), np.empty((1, 1)))
+
+
+def test_equal_to_what_the_compiler_makes_of_the_text():
+    tape, results = random_program(3, [x, y, p], 40)
+    program = assemble(tape, {"q": [x, y]}, [p], {"f": (results, (len(results),))})
+    namespace: dict = {}
+    source = linked_source(kernel_source(program), [], {}, "a test")
+    exec(source.replace("cache=True, ", ""), namespace)  # noqa: S102
+    constants = np.empty(len(program.constant_symbols))
+    work, result = np.zeros(work_size(program)), np.empty(len(results))
+    namespace["constants"](np.array([0.6]), work, constants)
+    namespace["f"](np.array([1.7, 2.3]), constants, work, result)
+    np.testing.assert_allclose(
+        result_of(program, {x: 1.7, y: 2.3, p: 0.6}), result, rtol=1e-14, atol=1e-15
+    )
