@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vehiclemor.codegen import cache
+from vehiclemor.codegen import cache, straight_line
 from vehiclemor.codegen.link import linked_source
 from vehiclemor.simulation import newton_loops
 
@@ -26,6 +26,56 @@ used = {
 }
 print(json.dumps([used, model.kernels.__file__, run.coordinates[250].tolist()]))
 """
+
+DYNAMIC = """
+import json
+import numpy as np
+from vehiclemor.simulation.dynamic import build
+
+model = build("independent_suspension_vehicle")
+found = model.derivatives_at(model.start()[None], np.zeros((1, 1)))
+used = {
+    name: [sum(d.stats.cache_hits.values()), sum(d.stats.cache_misses.values())]
+    for name, d in vars(model.kernels).items()
+    if getattr(d, "signatures", None)
+}
+machine = {n: d.cache_hits for n, d in vars(model.kernels).items() if n.endswith("_machine")}
+print(json.dumps([used, machine, found.tolist()]))
+"""
+
+
+def test_second_process_writes_no_machine_code_of_a_dynamic_model(tmp_path: Path) -> None:
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
+    environment["VEHICLEMOR_CACHE"] = str(tmp_path)
+    found = []
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", DYNAMIC],
+            env=environment,
+            cwd=tmp_path,
+            check=False,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        found.append(json.loads(done.stdout))
+    (_, cold, first), (used, machine, second) = found
+    assert set(cold.values()) == {0}
+    assert {"_derivative_machine", "_second_order_machine", "_outputs_machine"} <= set(machine)
+    assert set(machine.values()) == {1}
+    assert {"derivative_path", "constants"} <= set(used)
+    for name, (hits, misses) in used.items():
+        assert hits > 0, name
+        assert misses == 0, name
+    assert first == second
+
+
+def test_machine_code_follows_the_source_that_writes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    kernels = "def f(_q, _work, _result):\n    _result[0] = _q[0]\n"
+    source = linked_source(kernels, [], {}, "a test", direct=True)
+    assert source == linked_source(kernels, [], {}, "a test", direct=True)
+    monkeypatch.setattr(straight_line, "source_hash", lambda: "another")
+    assert source != linked_source(kernels, [], {}, "a test", direct=True)
 
 
 def test_second_process_compiles_nothing(tmp_path: Path) -> None:

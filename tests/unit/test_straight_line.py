@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import cfunc, njit
 from numba.core.errors import TypingError
 
-from tests.unit.programs import random_program, run
+from tests.unit.programs import run
 from vehiclemor.codegen import arctangent, exponential, sincos
 from vehiclemor.codegen.emit import kernel_source, work_size
 from vehiclemor.codegen.link import linked_source
@@ -51,20 +51,52 @@ def result_of(program: Program, values: dict[sp.Symbol, float]) -> np.ndarray:
     return result
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 2**32 - 1), a=st.floats(-2, 2), b=st.floats(-2, 2), c=st.floats(-2, 2))
-def test_random_programs_equal_plain_python(seed, a, b, c):
-    tape, results = random_program(seed, [x, y, p], 25)
-    program = assemble(tape, {"q": [x, y]}, [p], {"f": (results, (len(results),))})
-    values = {x: a, y: b, p: c}
-    expected = run(program, "f", values)
-    np.testing.assert_allclose(result_of(program, values), expected, rtol=1e-13, atol=1e-13)
+OPERATIONS = (
+    "{a} * {b} - {c}",
+    "-{a} + 0.5 * {b}",
+    "{a} / (2.0 + abs({b}))",
+    "math.sqrt(1.0 + {a} * {a})",
+    "math.exp(-abs({a}))",
+    "atan({a})",
+    "math.atan2({a}, 3.0 + {b} * {b})",
+)
+
+
+def random_text(seed: int, length: int = 60) -> str:
+    rng = np.random.default_rng(seed)
+    names, lines = ["_x[0]", "_x[1]", "_x[2]"], []
+    for number in range(length):
+        a, b, c = (names[int(k)] for k in rng.integers(len(names), size=3))
+        if rng.integers(8) == 0:
+            lines.append(f"s{number}, v{number} = sincos_one({a})")
+        else:
+            operation = OPERATIONS[int(rng.integers(len(OPERATIONS)))]
+            lines.append(f"v{number} = {operation.format(a=a, b=b, c=c)}")
+        names.append(f"v{number}")
+    lines += [f"_result[{k}] = {name}" for k, name in enumerate(names[3:])]
+    return "\n    ".join(["def random(_x, _result):", *lines]) + "\n"
+
+
+@settings(max_examples=6, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1), st.lists(st.floats(-2, 2), min_size=3, max_size=3))
+def test_random_programs_equal_plain_python(seed, numbers):
+    text = random_text(seed)
+    plain = {
+        "math": math,
+        "atan": math.atan,
+        "sincos_one": lambda angle: (math.sin(angle), math.cos(angle)),
+    }
+    exec(text, plain)  # noqa: S102
+    found, expected = np.full(60, np.nan), np.full(60, np.nan)
+    plain["random"](np.array(numbers), expected)
+    compiled(text)(np.array(numbers), found)
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
 
 
 def test_functions_and_powers_of_the_printer():
     expressions = [
         sp.sqrt(x), sp.exp(-x), sp.Abs(x - y), sp.tan(x), sp.asin(x / 7), sp.acos(x / 7),
-        sp.atan2(-x, y), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.log(x), x**7, -x, 1 / x**3,
+        sp.atan2(x - 2, y), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.log(x), x**7, -x, 1 / x**3,
         x ** sp.Rational(3, 2), x + p, sp.Float(2.5), sp.Integer(-3),
     ]  # fmt: skip
     program = assemble(Tape(), {"q": [x, y]}, [p], {"f": (expressions, (6, 3))})
@@ -74,8 +106,8 @@ def test_functions_and_powers_of_the_printer():
     np.testing.assert_allclose(found, run(program, "f", values), rtol=1e-14)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 5, 8, 11, 16])
-@pytest.mark.parametrize("function", [sp.sin, sp.cos, sp.atan])
+@pytest.mark.parametrize("count", [2, 3, 8, 11])
+@pytest.mark.parametrize("function", [sp.sin, sp.atan])
 def test_batches_with_and_without_padding(count, function):
     symbols = sp.symbols(f"a:{count}", real=True)
     results = [function(s) + p for s in symbols]
@@ -154,8 +186,8 @@ def test_arrays_of_another_kind_are_refused():
 
 
 def test_equal_to_what_the_compiler_makes_of_the_text():
-    tape, results = random_program(3, [x, y, p], 40)
-    program = assemble(tape, {"q": [x, y]}, [p], {"f": (results, (len(results),))})
+    results = [sp.sin(x) * y / x + p, sp.cos(x) - sp.atan(y) * sp.sin(y), sp.atan(x), x - y * p]
+    program = assemble(Tape(), {"q": [x, y]}, [p], {"f": (results, (4,))})
     namespace: dict = {}
     source = linked_source(kernel_source(program), [], {}, "a test")
     exec(source.replace("cache=True, ", ""), namespace)  # noqa: S102

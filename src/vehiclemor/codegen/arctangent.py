@@ -2,8 +2,8 @@
 
 import numpy as np
 
-# Rational approximation on [-0.66, 0.66] with two reductions of the argument: S. L. Moshier, Methods
-# and Programs for Mathematical Functions (Ellis Horwood, 1989), the Cephes library's atan.c.
+# Rational approximation on [-0.66, 0.66] with two reductions of the argument: S. L. Moshier,
+# Methods and Programs for Mathematical Functions (Ellis Horwood, 1989), Cephes library, atan.c.
 TAN_3_PI_8 = 2.41421356237309504880
 HALF_PI = 1.57079632679489661923
 QUARTER_PI = 0.785398163397448309616

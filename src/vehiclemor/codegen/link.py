@@ -57,10 +57,8 @@ def linked_source(
     from vehiclemor.codegen import arctangent, sincos
 
     elementary = (_functions(sincos), _functions(arctangent))
-    if direct:
-        lines += _direct(kernels)
-    else:
-        lines += [_decorated(text, INLINE_LINES) for text in (*elementary, kernels)]
+    lines += [_decorated(text, INLINE_LINES) for text in elementary]
+    lines += _direct(kernels) if direct else [_decorated(kernels, INLINE_LINES)]
     longest = INLINE_LINES if inline_loops else 0
     lines += [_decorated(_functions(module), longest) for module in loops]
     body = "\n".join(lines)

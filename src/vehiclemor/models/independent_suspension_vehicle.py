@@ -331,9 +331,7 @@ def _loads(
     """Force on a wheel and its moment about the wheel centre; the vertical load has no arm."""
     shear = g.named(
         tape,
-        g.add(
-            g.scale(tire.longitudinal, contact.heading), g.scale(tire.lateral, contact.leftward)
-        ),
+        g.add(g.scale(tire.longitudinal, contact.heading), g.scale(tire.lateral, contact.leftward)),
     )
     arm = g.named(tape, g.scale(-contact.height, up))
     moment = g.add(g.cross(arm, shear), g.scale(tire.aligning, up))

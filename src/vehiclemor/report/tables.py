@@ -66,7 +66,7 @@ def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
             parts.append(_flat(dataset, OUTPUTS[model]).assign(study=name))
     table = pd.concat(parts, ignore_index=True)
     first = ["study", "method", "start"]
-    return table[[*first, *(c for c in table.columns if c not in first)]]
+    return table.reindex(columns=[*first, *(c for c in table.columns if c not in first)])
 
 
 def settings_table(results: Path, jobs: int = 1) -> pd.DataFrame:
@@ -93,7 +93,7 @@ def _flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:
             values = dataset[name].sel(output=output).transpose(*grid)
             table[f"{short}_{output}"] = values.to_series().to_numpy()
     columns = [*grid, *(c for c in table.columns if c.startswith(("rms_", "floor_"))), *scalars]
-    return table[[*columns, "status", "message"]]
+    return table.reindex(columns=[*columns, "status", "message"])
 
 
 def operation_table(model: str) -> pd.DataFrame:

@@ -116,9 +116,7 @@ def explicit_span(
             )
         slope(form, t + h, segment, mid, dim, signal, space, constants, scratch, k6)
         for i in range(dim):
-            new[i] = y[i] + h * (
-                B1 * k1[i] + B3 * k3[i] + B4 * k4[i] + B5 * k5[i] + B6 * k6[i]
-            )
+            new[i] = y[i] + h * (B1 * k1[i] + B3 * k3[i] + B4 * k4[i] + B5 * k5[i] + B6 * k6[i])
         slope(form, t + h, segment, new, dim, signal, space, constants, scratch, k7)
         counts[0] += 6
         for i in range(dim):
@@ -147,9 +145,7 @@ def explicit_span(
                 last = h * (
                     D1 * k1[i] + D3 * k3[i] + D4 * k4[i] + D5 * k5[i] + D6 * k6[i] + D7 * k7[i]
                 )
-                mid[i] = y[i] + z * (
-                    difference + (1 - z) * (bend + z * (back + (1 - z) * last))
-                )
+                mid[i] = y[i] + z * (difference + (1 - z) * (bend + z * (back + (1 - z) * last)))
             lifted(form, mid, dim, space, constants, scratch, state)
             for i in range(len(state)):
                 path[sample, i] = state[i]

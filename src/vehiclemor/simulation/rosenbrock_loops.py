@@ -257,7 +257,9 @@ def rosenbrock_span(
             left, right = h * z * (1.0 - z) * (1.0 - z), h * z * z * (z - 1.0)
             if form == FULL:
                 for i in range(dim):
-                    path[sample, i] = before * y[i] + after * new[i] + left * f[i] + right * f_new[i]
+                    path[sample, i] = (
+                        before * y[i] + after * new[i] + left * f[i] + right * f_new[i]
+                    )
             else:
                 for i in range(dim):
                     mid[i] = before * y[i] + after * new[i] + left * f[i] + right * f_new[i]

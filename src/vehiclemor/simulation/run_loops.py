@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from vehiclemor.codegen.stubs import INPUTS, OUTPUTS, WORK, N, derivative, outputs
+from vehiclemor.codegen.stubs import INPUTS, WORK, N, derivative, outputs
 from vehiclemor.simulation.explicit_loops import explicit_span
 from vehiclemor.simulation.rosenbrock_loops import rosenbrock_span
-from vehiclemor.simulation.system_loops import COORDINATES, FULL, input_at, lifted, projected, slope
+from vehiclemor.simulation.system_loops import COORDINATES, input_at, lifted, projected, slope
 
 
 def run(
@@ -76,6 +76,7 @@ def run(
     for i in range(2 * N):
         x[i] = start[i]
     sample, window, step, segment = 0, -1, 0.0, -1
+    space, dim = (means[0], lifts[0], drops[0]), ranks[0]
     t = span_edges[0]
     for span in range(len(span_segments)):
         if span_windows[span] != window:

@@ -37,9 +37,7 @@ class Spaces:
         """Arguments of the compiled loops."""
         return self.means, self.lifts, self.drops, self.ranks
 
-    def spans(
-        self, breaks: np.ndarray, end: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def spans(self, breaks: np.ndarray, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Spans without a break point or window edge inside, from 0 to `end`.
 
         Parameters

@@ -211,4 +211,3 @@ def error_norm(form, error, y, dim, space, typical, tolerance):
             if not ratio <= largest:
                 largest = ratio
     return largest / tolerance
-

@@ -166,17 +166,18 @@ def kane(
     mass: list[list[sp.Expr]] = [[sp.Integer(0)] * speeds for _ in range(speeds)]
     force: list[sp.Expr] = [sp.Integer(0)] * speeds
     for body in bodies:
-        parts = [(body.centre.columns, lambda a, m=body.mass: g.scale(m, a))]
         free = g.subtract(body.force, g.scale(body.mass, body.centre.bias))
         loads = [(body.centre.columns, g.named(tape, free))]
+        # Columns beside their images: mass times velocity, inertia times angular velocity.
+        columns = body.centre.columns
+        images = [(columns, {k: g.scale(body.mass, column) for k, column in columns.items()})]
         if body.rotation is not None and body.inertia is not None:
-            inertia = body.inertia
-            parts.append((body.rotation.columns, lambda a, i=inertia: product(i, a)))
+            columns = body.rotation.columns
+            images.append((columns, {k: product(body.inertia, c) for k, c in columns.items()}))
             turning = g.named(tape, g.subtract(body.moment, body.rotation.bias))
-            loads.append((body.rotation.columns, turning))
-        for columns, weighted in parts:
-            for k, column in columns.items():
-                image = weighted(column)
+            loads.append((columns, turning))
+        for columns, weighted in images:
+            for k, image in weighted.items():
                 for j, other in columns.items():
                     if j >= k:
                         mass[j][k] += g.dot(other, image)
