@@ -31,8 +31,8 @@ MANEUVER = "lane_change"
 WHEELS = body.WHEELS
 FRONT = (True, True, False, False)
 LEFT = (True, False, True, False)
-# The right-hand side does not depend on them, yaw apart, which only turns the path in the plane.
-CYCLIC = ("X", "Y", "psi", *(f"gamma_{wheel}" for wheel in WHEELS))
+# The right-hand side does not depend on them.
+CYCLIC = ("X", "Y", *(f"gamma_{wheel}" for wheel in WHEELS))
 
 COORDINATES = (
     *body.COORDINATES,

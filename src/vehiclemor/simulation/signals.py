@@ -61,7 +61,10 @@ def signal_of(maneuver: Maneuver) -> Signal:
         raise InputError(
             f"input {maneuver.inputs[column]} is not finite at t = {probe[sample]:.6g} s"
         )
-    largest = np.abs(values).max(axis=0) + 1e-300
+    # A short pulse may lie between the probes of the whole run.
+    inside = np.concatenate([np.linspace(a, b, 18)[1:-1] for a, b in pairwise(edges)])
+    samples = np.concatenate([values, maneuver.at(inside)])
+    largest = np.abs(samples).max(axis=0) + 1e-300
     parts = [_segment(maneuver, a, b, largest) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
     return Signal(edges, first.astype(np.int64), np.concatenate(parts))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import LogNorm
+from matplotlib.ticker import NullFormatter
 
 from vehiclemor.report.figures.lines import DEFAULT, LITERAL, REPLAY, Results, legend_above
 from vehiclemor.report.published import load_published
@@ -116,7 +117,7 @@ def error_map(
             mesh = axis.pcolormesh(
                 frequency,
                 amplitude,
-                values,
+                np.maximum(values, 0.5 * norm.vmin) if values_in_cells else values,
                 norm=norm,
                 cmap="cividis",
                 shading="nearest",
@@ -138,7 +139,9 @@ def error_map(
             if row == 1:
                 axis.set_xlabel("frequency perturbation (%)")
         extend = "min" if values_in_cells else "neither"
-        figure.colorbar(meshes[-1], ax=axes[row, :], label=label, extend=extend)
+        bar = figure.colorbar(meshes[-1], ax=axes[row, :], label=label, extend=extend)
+        if values_in_cells:
+            bar.ax.yaxis.set_minor_formatter(NullFormatter())
     return figure
 
 
@@ -146,15 +149,15 @@ def _write(
     axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, norm: LogNorm
 ) -> None:
     """Errors with two digits, on dark cells in white."""
+    middle = np.sqrt(float(norm.vmin or 1.0) * float(norm.vmax or 1.0))
     for (j, i), value in np.ndenumerate(values):
-        dark = value <= 0.0 or float(norm(value)) < 0.5
         digits = f"{value:.1g}" if value < 1e-3 else f"{value:#.2g}"
         axis.text(
             frequency[i],
             amplitude[j],
-            digits.rstrip(".").replace("e-0", "e-"),
+            digits.replace("e-0", "e-"),
             ha="center",
             va="center",
             fontsize=5.5,
-            color="white" if dark else "black",
+            color="white" if value < middle else "black",
         )

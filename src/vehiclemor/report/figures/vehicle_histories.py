@@ -27,15 +27,15 @@ STUDY = "figures-2-4"
 STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
 LABELS = {"pitch": r"pitch $\theta$ (rad)", "yaw": r"yaw $\psi$ (rad)"}
 NUMBERS = {"pitch": "gv_rms_pitch", "yaw": "gv_rms_yaw"}
-# Method -> its name and line.
+# Method -> its name and line; gaps of the upper line show the lower one where both coincide.
 REDUCED: dict[str, tuple[str, dict[str, Any]]] = {
-    "pod": ("POD, r = 3 (default)", DEFAULT),
+    "pod": ("POD, r = 3 (default)", {**DEFAULT, "linestyle": (0, (3, 3)), "zorder": 2.5}),
     "pod_literal": ("POD, r = 3 (literal)", LITERAL),
 }
 STATE: dict[str, Any] = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
 # The response has died away at this time (s), long before the end of the run.
 SHOWN = 6.0
-FIRST_SECONDS = "time (s), {:g} of 25 s"
+FIRST_SECONDS = "time (s), first {:g} s of 25 s"
 
 
 def figure_2(results: Results) -> Figure:
@@ -78,6 +78,8 @@ def figure_3(results: Results) -> Figure:
             reduced = point(results[STUDY], label, start=start)["outputs"].sel(output=output)
             _plot_until_it_leaves(axis, reduced, text, style)
         axis.set_ylabel(LABELS[output])
+        axis.ticklabel_format(style="plain")
+        axis.locator_params(axis="y", nbins=5)
     marker = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
     axes[0, 0].plot([], [], color=LITERAL["color"], label="literal leaves the axes", **marker)
     legend_above(figure, axes[0, 0])
@@ -107,25 +109,33 @@ def _plot_until_it_leaves(
 
 
 def figure_4(results: Results) -> Figure:
-    """Errors of figure 3."""
+    """Errors of figure 3, the largest in each control period."""
     last = 2.0 * SHOWN
     figure, axes = _panels(last)
     published, dataset = load_published().numbers, results[STUDY]
     drawn = dict(REDUCED)
     if "pod_state" in dataset["method"].values:
-        drawn["pod_state"] = ("POD, r = 3 (state, energy)", STATE)
+        drawn["pod_state"] = ("POD, r = 3 (state in energy product)", STATE)
     for (row, column), axis in np.ndenumerate(axes):
         start, output = list(STARTS)[column], list(LABELS)[row]
+        number = published[NUMBERS[output]]
         for label, (text, style) in drawn.items():
             reduced = point(dataset, label, start=start)
             error = abs(reduced["outputs"] - reduced["reference_outputs"]).sel(output=output)
-            axis.semilogy(reduced.time, error, label=text, **style)
-        number = published[NUMBERS[output]].value
-        axis.axhline(number, color="black", linestyle=":", label="published RMS error")
+            edges, largest = _largest(error, float(number.control_period or last))
+            axis.semilogy(edges, largest, label=text, drawstyle="steps-post", **style)
+        axis.axhline(number.value, color="black", linestyle=":", label="published RMS error")
         axis.set_ylim(1e-8, 30.0)
-        axis.set_ylabel(f"|error of {LABELS[output].replace(' (', '| (')}")
-    legend_above(figure, axes[0, 0])
+        axis.set_ylabel(f"largest error of {LABELS[output]}")
+    legend_above(figure, axes[0, 0], columns=2)
     return figure
+
+
+def _largest(error: xr.DataArray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Starts of the control periods (n,) in s and the largest error in each."""
+    window = np.floor(error["time"].values / period + 1e-9).astype(int)
+    starts = np.unique(window)
+    return period * starts, np.array([error.values[window == k].max() for k in starts])
 
 
 def figure_zero_steer(results: Results) -> Figure:

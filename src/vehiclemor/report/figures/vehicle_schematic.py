@@ -41,8 +41,11 @@ def figure_1(results: Results) -> Figure:
     _frame_space(space)
     _draw_vehicle_graph(graph)
     handles, labels = space.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower left", ncols=4, fontsize=7.5)
+    figure.legend(handles, labels, loc="lower left", ncols=5, fontsize=7.5)
     figure.text(0.02, 0.95, "(a)")
+    whole = 1e3 * (p["front_axle_distance"] - vehicle.derived(p).sprung_distance[0])
+    note = f"a, b: to the CG of the whole car, {whole:.0f} mm behind that of the sprung body"
+    figure.text(0.07, 0.953, note, fontsize=6.5, color=SIZES)
     figure.text(0.62, 0.95, "(b)")
     return figure
 
@@ -87,14 +90,13 @@ def _draw_vehicle(axis: Any, p: dict[str, float]) -> None:
         name = "lumped mass" if first else None
         axis.plot(x, y, z, "s", color=COLORS["mass"], markersize=6, label=name, linestyle="none")
         if front:
-            ahead = np.array([[0.0, 0.0], [0.75, 0.0], [0.0, 0.0]])
-            axis.plot(*(centre[:, None] + ahead.T @ np.eye(2) * 1.0), color=SIZES) if False else None
             _steering(axis, centre)
-    heights = p["sprung_height"]
-    axis.plot(0.0, 0.0, heights, "o", color="black", markersize=5, linestyle="none", label="CG")
+    origin = np.array([0.0, 0.0, p["sprung_height"]])
+    dot = {"marker": "o", "markersize": 5, "linestyle": "none"}
+    axis.plot(*origin, color="black", label="CG of the sprung body", **dot)
     for direction, name in zip(np.eye(3), "xyz", strict=True):
-        axis.quiver(0, 0, heights, *(0.62 * direction), color=AXES, linewidth=1.6)
-        axis.text(*(0.72 * direction + [0, 0, heights]), name, color=AXES, **CAPTIONS)
+        axis.quiver(*origin, *(0.7 * direction), color=AXES, linewidth=1.4, arrow_length_ratio=0.2)
+        axis.text(*(origin + 0.8 * direction), name, color=AXES, **CAPTIONS)
 
 
 def _strut(axis: Any, centre: np.ndarray, named: bool) -> None:
@@ -132,30 +134,32 @@ def _steering(axis: Any, centre: np.ndarray) -> None:
 
 
 def _draw_sizes(axis: Any, p: dict[str, float]) -> None:
-    """Dimensions on the road with their values."""
-    centres, whole = wheel_centres(p), 0.0
-    front, rear = centres[0, 0], centres[2, 0]
-    whole = front - p["front_axle_distance"]
-    side = -0.5 * p["front_track"] - 0.45
-    for start, end, symbol, value in (
-        ((front, side, 0), (whole, side, 0), "a", p["front_axle_distance"]),
-        ((whole, side, 0), (rear, side, 0), "b", p["rear_axle_distance"]),
-        ((front + 1.0, *centres[0, 1:2], 0), (front + 1.0, centres[1, 1], 0), "T_f", p["front_track"]),
-        ((rear - 0.6, centres[2, 1], 0), (rear - 0.6, centres[3, 1], 0), "T_r", p["rear_track"]),
-        ((0, 0, 0), (0, 0, p["sprung_height"]), "h_s", p["sprung_height"]),
+    """Dimensions on the road with their values, each label beside its line."""
+    front_left, front_right, rear_left, rear_right = wheel_centres(p) * [1.0, 1.0, 0.0]
+    side, ahead, behind = [0.0, -0.5, 0.0], [1.05, 0.0, 0.0], [-0.6, 0.0, 0.0]
+    whole = front_right - [p["front_axle_distance"], 0.0, 0.0]
+    rear = np.array([rear_right[0], front_right[1], 0.0])
+    top = np.array([0.0, 0.0, p["sprung_height"]])
+    for start, end, label_at, symbol, value in (
+        (front_right + side, whole + side, side, "a", p["front_axle_distance"]),
+        (whole + side, rear + side, side, "b", p["rear_axle_distance"]),
+        (front_left + ahead, front_right + ahead, [0.75, 0, 0], "T_f", p["front_track"]),
+        (rear_left + behind, rear_right + behind, [-0.75, 0, 0], "T_r", p["rear_track"]),
+        (0.0 * top, top, [0.0, 0.0, -0.62 * top[2]], "h_s", p["sprung_height"]),
     ):
-        line = np.array([start, end], dtype=float)
+        line = np.array([start, end])
         axis.plot(*line.T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
-        axis.text(*line.mean(axis=0), f"${symbol}$ = {value:.3f} m", color=SIZES, **CAPTIONS)
+        text = f"${symbol}$ = {value:.3f} m"
+        axis.text(*(line.mean(axis=0) + 0.45 * np.array(label_at)), text, color=SIZES, **CAPTIONS)
 
 
 def _frame_space(axis: Any) -> None:
     axis.set_axis_off()
     axis.set_proj_type("ortho")
-    axis.set_xlim(-2.1, 2.2)
+    axis.set_xlim(-2.2, 2.4)
     axis.set_ylim(-1.3, 1.0)
-    axis.set_zlim(0.0, 1.3)
-    axis.set_box_aspect((4.3, 2.3, 1.3), zoom=1.5)
+    axis.set_zlim(0.0, 1.2)
+    axis.set_box_aspect((4.6, 2.3, 1.2), zoom=1.22)
     axis.view_init(elev=24, azim=-55)
 
 
