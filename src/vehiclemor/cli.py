@@ -148,6 +148,8 @@ def _check_writable(out: Path) -> None:
 def _print_simulation(dataset: xr.Dataset, counts: Iterable[str], out: Path | None) -> None:
     status = dataset["status"].item()
     print(f"{dataset.attrs['title']}: {status} {dataset['message'].item()}".rstrip())
+    if dataset["remark"].item():
+        print(dataset["remark"].item())
     print(f"{'output':<20} {'RMS error':>12} {'floor':>12} {'largest':>12} {'range':>12}")
     for output in dataset["output"].values:
         row = dataset.sel(output=output)

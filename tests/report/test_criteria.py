@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from vehiclemor.report import criteria
-from vehiclemor.report.criteria import ANGLE, CRITERIA, DISPLACEMENT, VISIBLE
+from vehiclemor.report.criteria import CRITERIA
+from vehiclemor.report.criteria import double_wishbone as suspension
+from vehiclemor.report.criteria.double_wishbone import ANGLE, DISPLACEMENT
+from vehiclemor.report.criteria.finding import VISIBLE
 from vehiclemor.report.published import load_published
 
 AT_R3 = {"method": "pod", "rank": 3}
@@ -56,6 +58,30 @@ def amplitude_worse(dataset):
     dataset["rms_error"] = dataset["rms_error"] + 1.0
 
 
+def wrong_yaw_from_one_start(dataset):
+    place = {"method": "pod", "rank": 3, "start": "dropped", "output": "yaw"}
+    dataset["max_error"].loc[place] = 2.0 * VISIBLE * dataset["signal_range"].loc[place]
+
+
+def one_start_fails(dataset):
+    dataset["status"].loc[{"method": "pod", "rank": 3, "start": "equilibrium"}] = "diverged"
+
+
+def coarse_subspace(dataset):
+    place = {"method": "pod", "rank": 3, "start": "dropped", "output": "pitch"}
+    dataset["floor_rms_error"].loc[place] = 2.0 * VISIBLE * dataset["signal_range"].loc[place]
+
+
+def equally_sharp(dataset):
+    whole = dataset["floor_rms_error"].sel(control_period=5.0)
+    dataset["floor_rms_error"].loc[{"control_period": 0.5}] = whole
+
+
+def no_call_saved(dataset):
+    calls = dataset["rhs_calls"].sel(control_period=0.5)
+    dataset["rhs_calls"].loc[{"control_period": 2.5}] = calls
+
+
 def one_rounding_fails(dataset):
     place = {"method": "pod_uncut", "rank": 6, "rounding_seed": 7, "output": ANGLE}
     dataset["max_error"].loc[place] = 1.0
@@ -75,6 +101,11 @@ def shorter_is_worse(dataset):
 
 
 COUNTEREXAMPLES = [
+    ("gv_fig3_closely_matches", "figures-2-4", wrong_yaw_from_one_start),
+    ("gv_fig3_closely_matches", "figures-2-4", one_start_fails),
+    ("gv_three_states_suffice", "figures-2-4", coarse_subspace),
+    ("gv_control_periods_sharpen_basis", "vehicle-control-period", equally_sharp),
+    ("gv_longer_period_saves_time", "vehicle-control-period", no_call_saved),
     ("dw_fig6_nearly_identical", "figures-6-7", wrong_angle),
     ("dw_fig6_nearly_identical", "figures-6-7", wrong_displacement),
     ("dw_fig11_displacement_unaffected", "figure-11", wrong_displacement),
@@ -107,7 +138,7 @@ def test_subspaces_are_compared_by_their_principal_angles(results, monkeypatch):
     criterion = CRITERIA["dw_fig12_basis_insensitive_to_amplitude"]
     finding = criterion(results, "pod")
     assert 0.0 < finding.measured < np.pi / 2.0
-    monkeypatch.setattr(criteria, "SIMILAR_SUBSPACES", finding.measured / 2.0)
+    monkeypatch.setattr(suspension, "SIMILAR_SUBSPACES", finding.measured / 2.0)
     assert not criterion(results, "pod").met
 
 

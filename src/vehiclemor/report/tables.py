@@ -78,7 +78,7 @@ def settings_table(results: Path, jobs: int = 1) -> pd.DataFrame:
         Errors and floors of pitch and yaw, evaluations, largest growth rate of a reduced Jacobian,
         status and reason of each combination.
     """
-    dataset = run_studies(SETTINGS_STUDY, results, jobs)[SETTINGS_STUDY]
+    dataset = next(iter(run_studies(SETTINGS_STUDY, results, jobs).values()))
     return _flat(dataset, ("pitch", "yaw"))
 
 

@@ -333,7 +333,11 @@ class DynamicModel:
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
         outputs = self.outputs_at(states, inputs)
-        message = failure or self._left_validity(times, outputs)
+        message, sample = failure, len(times)
+        if not failure:
+            message, sample = self._left_validity(times, outputs)
+            # What follows means nothing.
+            states[sample:], outputs[sample:] = np.nan, np.nan
         status = "diverged" if message else "ok"
         n = len(self.coordinates)
         return Trajectory(
@@ -345,20 +349,23 @@ class DynamicModel:
             {name: int(count) for name, count in zip(DYNAMIC_COUNTS, counts, strict=True)},
             seconds,
             status,
-            message or self._lifted_wheels(times, outputs),
+            message,
+            self._lifted_wheels(times, outputs),
         )
 
-    def _left_validity(self, times: np.ndarray, outputs: np.ndarray) -> str:
+    def _left_validity(self, times: np.ndarray, outputs: np.ndarray) -> tuple[str, int]:
+        """What has left its range of validity, and at which sample first."""
+        first, message = len(times), ""
         for name, (low, high) in self.validity.items():
             values = outputs[:, self.outputs.index(name)]
             outside = np.flatnonzero(~((values >= low) & (values <= high)))
-            if len(outside):
-                sample = outside[0]
-                return (
-                    f"{name} is {values[sample]:.4g} at t = {times[sample]:.6g} s; the model holds "
+            if len(outside) and outside[0] < first:
+                first = int(outside[0])
+                message = (
+                    f"{name} is {values[first]:.4g} at t = {times[first]:.6g} s; the model holds "
                     f"from {low:g} to {high:g}"
                 )
-        return ""
+        return message, first
 
     def _lifted_wheels(self, times: np.ndarray, outputs: np.ndarray) -> str:
         off = {}

@@ -48,6 +48,8 @@ class Trajectory:
         One of `STATUSES`; from the failure on, a diverged trajectory is not a number.
     message
         Why it diverged, empty if it did not.
+    remark
+        What else there is to know, such as wheels that leave the ground.
     """
 
     time: np.ndarray
@@ -59,6 +61,7 @@ class Trajectory:
     seconds: float
     status: str = "ok"
     message: str = ""
+    remark: str = ""
 
     @property
     def states(self) -> np.ndarray:
@@ -116,4 +119,5 @@ def trajectory_dataset(
     )
     variables["status"] = ((), trajectory.status, {"long_name": f"one of {', '.join(STATUSES)}"})
     variables["message"] = ((), trajectory.message, {"long_name": "why the status is not ok"})
+    variables["remark"] = ((), trajectory.remark, {"long_name": "what else there is to know"})
     return xr.Dataset(variables | (further or {}), coordinates)

@@ -115,7 +115,7 @@ def figure_4(results: Results) -> Figure:
     published, dataset = load_published().numbers, results[STUDY]
     drawn = dict(REDUCED)
     if "pod_state" in dataset["method"].values:
-        drawn["pod_state"] = ("POD, r = 3 (state in energy product)", STATE)
+        drawn["pod_state"] = ("POD, r = 3 (state, energy)", STATE)
     for (row, column), axis in np.ndenumerate(axes):
         start, output = list(STARTS)[column], list(LABELS)[row]
         number = published[NUMBERS[output]]

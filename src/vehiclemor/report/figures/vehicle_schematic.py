@@ -32,10 +32,10 @@ def figure_1(results: Results) -> Figure:
     parameters = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
     p = {name: float(parameters[name]) for name in vehicle.PARAMETERS}
     # Placed by hand: the style's automatic layout can't deal with axes in space.
-    figure = plt.figure(figsize=(6.7, 4.4))
+    figure = plt.figure(figsize=(6.7, 4.1))
     figure.set_layout_engine("none")
-    space = figure.add_axes((-0.03, 0.06, 0.64, 0.94), projection="3d")
-    graph = figure.add_axes((0.61, 0.10, 0.39, 0.83))
+    space = figure.add_axes((-0.02, 0.05, 0.68, 0.95), projection="3d")
+    graph = figure.add_axes((0.65, 0.10, 0.35, 0.83))
     _draw_vehicle(space, p)
     _draw_sizes(space, p)
     _frame_space(space)
@@ -46,7 +46,7 @@ def figure_1(results: Results) -> Figure:
     whole = 1e3 * (p["front_axle_distance"] - vehicle.derived(p).sprung_distance[0])
     note = f"a, b: to the CG of the whole car, {whole:.0f} mm behind that of the sprung body"
     figure.text(0.07, 0.953, note, fontsize=6.5, color=SIZES)
-    figure.text(0.62, 0.95, "(b)")
+    figure.text(0.65, 0.95, "(b)")
     return figure
 
 
@@ -95,8 +95,8 @@ def _draw_vehicle(axis: Any, p: dict[str, float]) -> None:
     dot = {"marker": "o", "markersize": 5, "linestyle": "none"}
     axis.plot(*origin, color="black", label="CG of the sprung body", **dot)
     for direction, name in zip(np.eye(3), "xyz", strict=True):
-        axis.quiver(*origin, *(0.7 * direction), color=AXES, linewidth=1.4, arrow_length_ratio=0.2)
-        axis.text(*(origin + 0.8 * direction), name, color=AXES, **CAPTIONS)
+        axis.quiver(*origin, *(0.6 * direction), color=AXES, linewidth=1.4, arrow_length_ratio=0.2)
+        axis.text(*(origin + 0.62 * direction + [0.0, 0.0, 0.09]), name, color=AXES, **CAPTIONS)
 
 
 def _strut(axis: Any, centre: np.ndarray, named: bool) -> None:
@@ -123,29 +123,30 @@ def _steering(axis: Any, centre: np.ndarray) -> None:
     """Steering angle in the plane of the wheel centres."""
     x, y, z = centre
     angle = np.linspace(0.0, DRAWN_STEER, 15)
-    arc = np.array([x + 0.7 * np.cos(angle), y + 0.7 * np.sin(angle), np.full(15, z)])
+    arc = np.array([x + 0.5 * np.cos(angle), y + 0.5 * np.sin(angle), np.full(15, z)])
     style = {"color": SIZES, "linewidth": 0.9}
     axis.plot(*arc, **style)
-    axis.plot([x, x + 0.8], [y, y], [z, z], linestyle="--", **style)
-    steered = 0.8 * np.array([np.cos(DRAWN_STEER), np.sin(DRAWN_STEER)])
+    axis.plot([x, x + 0.6], [y, y], [z, z], linestyle="--", **style)
+    steered = 0.6 * np.array([np.cos(DRAWN_STEER), np.sin(DRAWN_STEER)])
     axis.plot([x, x + steered[0]], [y, y + steered[1]], [z, z], **style)
-    middle = 0.84 * np.array([np.cos(DRAWN_STEER / 2), np.sin(DRAWN_STEER / 2)])
+    middle = 0.66 * np.array([np.cos(DRAWN_STEER / 2), np.sin(DRAWN_STEER / 2)])
     axis.text(x + middle[0], y + middle[1], z, r"$\delta$", **CAPTIONS)
 
 
 def _draw_sizes(axis: Any, p: dict[str, float]) -> None:
     """Dimensions on the road with their values, each label beside its line."""
     front_left, front_right, rear_left, rear_right = wheel_centres(p) * [1.0, 1.0, 0.0]
-    side, ahead, behind = [0.0, -0.5, 0.0], [1.05, 0.0, 0.0], [-0.6, 0.0, 0.0]
+    side, ahead, behind = [0.0, -0.5, 0.0], [0.7, 0.0, 0.0], [-0.55, 0.0, 0.0]
+    below = [-0.35, -0.75, 0.0]
     whole = front_right - [p["front_axle_distance"], 0.0, 0.0]
     rear = np.array([rear_right[0], front_right[1], 0.0])
     top = np.array([0.0, 0.0, p["sprung_height"]])
     for start, end, label_at, symbol, value in (
-        (front_right + side, whole + side, side, "a", p["front_axle_distance"]),
-        (whole + side, rear + side, side, "b", p["rear_axle_distance"]),
-        (front_left + ahead, front_right + ahead, [0.75, 0, 0], "T_f", p["front_track"]),
-        (rear_left + behind, rear_right + behind, [-0.75, 0, 0], "T_r", p["rear_track"]),
-        (0.0 * top, top, [0.0, 0.0, -0.62 * top[2]], "h_s", p["sprung_height"]),
+        (front_right + side, whole + side, below, "a", p["front_axle_distance"]),
+        (whole + side, rear + side, below, "b", p["rear_axle_distance"]),
+        (front_left + ahead, front_right + ahead, [0.9, -0.5, 0.0], "T_f", p["front_track"]),
+        (rear_left + behind, rear_right + behind, [-0.05, -1.5, -0.5], "T_r", p["rear_track"]),
+        (0.0 * top, top, [-1.1, 0.0, -2.0 * top[2]], "h_s", p["sprung_height"]),
     ):
         line = np.array([start, end])
         axis.plot(*line.T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
@@ -159,8 +160,8 @@ def _frame_space(axis: Any) -> None:
     axis.set_xlim(-2.2, 2.4)
     axis.set_ylim(-1.3, 1.0)
     axis.set_zlim(0.0, 1.2)
-    axis.set_box_aspect((4.6, 2.3, 1.2), zoom=1.22)
-    axis.view_init(elev=24, azim=-55)
+    axis.set_box_aspect((4.6, 2.3, 1.2), zoom=1.2)
+    axis.view_init(elev=24, azim=-50)
 
 
 def _symbol(name: str) -> str:

@@ -1,0 +1,90 @@
+"""Speed of the 14-DOF vehicle: derivation, kernels, integrators, methods on the 25 s lane change.
+
+Timings are reported, never gated.  Counts and operation counts stand beside them.
+"""
+
+import numpy as np
+import pytest
+
+from vehiclemor.maneuvers import lane_change
+from vehiclemor.models import independent_suspension_vehicle
+from vehiclemor.reduction.settings import validated
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.registry import component
+from vehiclemor.simulation.dynamic import build
+from vehiclemor.symbolic.program import Program
+
+CALLS = 10_000
+FULL = {
+    "explicit 1e-6": ("explicit", 1e-6),
+    "explicit 1e-3": ("explicit", 1e-3),
+    "RODAS4 1e-4": ("rodas4", 1e-4),
+    "ROS34PW2 3e-3, one Jacobian": ("ros34pw2", 3e-3),
+}
+METHODS = {
+    "pod r=3": ("pod", "recommended", {"rank": 3}),
+    "pod state r=3": ("pod", "recommended", {"rank": 3, "formulation": "state"}),
+    "pod literal r=3": ("pod", "literal", {"rank": 3}),
+    "fixed basis r=3": ("fixed_basis", "recommended", {"rank": 3}),
+    "replay": ("replay", "recommended", {}),
+}
+
+
+@pytest.fixture(scope="module")
+def model():
+    """The model, compiled and parametrised."""
+    return build("independent_suspension_vehicle")
+
+
+@pytest.fixture(scope="module")
+def reference(model):
+    """Reference trajectory from the equilibrium."""
+    return model.simulate(lane_change)
+
+
+def test_derivation(benchmark):
+    """Symbolic derivation with elimination, common subexpressions and hoisting."""
+    benchmark.group = "symbolics"
+    equations = benchmark.pedantic(independent_suspension_vehicle.derive, rounds=3)
+    assert isinstance(equations.program, Program)
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+def test_right_hand_side(benchmark, model, start):
+    """State derivatives at 10 000 states in a compiled loop; a thousandth of it is ns a call."""
+    benchmark.group = f"right-hand side, {CALLS} calls in a compiled loop"
+    states = np.tile(model.start(start), (CALLS, 1))
+    inputs = np.full((CALLS, 1), 0.01)
+    result = benchmark(model.derivatives_at, states, inputs)
+    benchmark.extra_info["operations"] = model.operation_counts["derivative"]["total"]
+    assert np.isfinite(result).all()
+
+
+@pytest.mark.parametrize("label", FULL)
+def test_full_order(benchmark, model, reference, label):
+    """The 25 s lane change from the equilibrium."""
+    benchmark.group = "full order, 25 s"
+    solver, tolerance = FULL[label]
+    run = benchmark(model.simulate, lane_change, None, None, solver, tolerance)
+    error = np.abs(run.outputs - reference.outputs).max(axis=0)
+    lateral, yaw = (model.outputs.index(name) for name in ("lateral_position", "yaw"))
+    benchmark.extra_info |= run.counts
+    benchmark.extra_info |= {"seconds_in_loop": run.seconds, "largest_error_Y": error[lateral]}
+    assert error[lateral] < 0.05
+    assert error[yaw] < 3e-4
+
+
+@pytest.mark.parametrize("label", METHODS)
+def test_method(benchmark, model, reference, label):
+    """The same run with a reduced model, fitted beforehand."""
+    benchmark.group = "methods, 25 s"
+    name, preset, chosen = METHODS[label]
+    method = component("method", name)
+    settings = validated(name, method.settings(model.kind), chosen, method.presets(model)[preset])
+    start = model.starts[0]
+    reduced = method.fit(model, training_runs(model, lane_change, start, "matched"), settings)
+    run = benchmark(reduced.simulate, lane_change, start)
+    benchmark.extra_info |= run.counts
+    benchmark.extra_info["offline_seconds"] = reduced.offline.seconds
+    assert run.status == "ok"
+    assert run.outputs.shape == reference.outputs.shape

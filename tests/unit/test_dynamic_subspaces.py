@@ -1,0 +1,192 @@
+"""Projected equations of motion: exact in the whole space, energy kept, only the subspace counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.oracles import vehicle_lagrange as oracle
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import lane_change
+from vehiclemor.reduction import pod
+from vehiclemor.reduction.inner_products import coordinate_weight, state_weight
+from vehiclemor.reduction.settings import validated
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.simulation.dynamic import build
+from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.system_loops import COORDINATES, STATE
+
+N = 14
+TIMES = np.linspace(0.0, 4.0, 41)
+# No dampers, no shear forces of the tires: nothing takes energy away.
+CONSERVATIVE = {"front_damping": 0.0, "rear_damping": 0.0, "PKX1": 0.0, "PKX2": 0.0, "PKY1": 0.0}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return build("independent_suspension_vehicle")
+
+
+def whole_space(form, edges, mean=0.0, mixing=None):
+    """The identity, or any regular matrix, as basis in every window."""
+    size = N if form == COORDINATES else 2 * N
+    basis = np.eye(size) if mixing is None else mixing
+    windows = len(edges) - 1
+    lifts, drops = np.zeros((windows, size, 2 * N)), np.zeros((windows, size, 2 * N))
+    lifts[:, :, :size], drops[:, :, :size] = basis, np.linalg.inv(basis).T
+    ranks = np.full(windows, 2 * N, dtype=np.int64)
+    return Spaces(form, np.array(edges), np.full((windows, 2 * N), mean), lifts, drops, ranks)
+
+
+def fitted(model, start="equilibrium", maneuver=lane_change, **chosen):
+    settings = validated("pod", pod.settings("ode"), chosen)
+    pod.check(model, settings)
+    return pod.fit(model, training_runs(model, maneuver, start, "matched"), settings)
+
+
+@pytest.mark.parametrize("form", [STATE, COORDINATES])
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+def test_the_whole_space_gives_the_full_model(model, form, start):
+    generator = np.random.default_rng(3)
+    size = N if form == COORDINATES else 2 * N
+    mixing = np.eye(size) + 0.1 * generator.normal(size=(size, size))
+    spaces = whole_space(form, [0.0, 0.7, 2.0, 25.0], mean=0.3, mixing=mixing)
+    state = model.start(start)
+    full = model.integrate(lane_change, state, full_space(N), "explicit", 1e-10, TIMES)
+    reduced = model.integrate(lane_change, state, spaces, "explicit", 1e-10, TIMES)
+    assert reduced.status == "ok"
+    np.testing.assert_allclose(reduced.states, full.states, rtol=1e-7, atol=1e-6)
+
+
+def test_only_the_subspace_counts_not_its_basis(model):
+    reduced = fitted(model, "dropped")
+    spaces, generator = reduced.spaces, np.random.default_rng(1)
+    lifts, drops = spaces.lifts.copy(), spaces.drops.copy()
+    for k, rank in enumerate(spaces.ranks // 2):
+        mixing = np.linalg.qr(generator.normal(size=(rank, rank)))[0] * 2.0
+        lifts[k, :rank] = mixing @ lifts[k, :rank]
+        drops[k, :rank] = np.linalg.inv(mixing).T @ drops[k, :rank]
+    mixed = Spaces(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
+    state = model.start("dropped")
+    runs = [
+        model.integrate(lane_change, state, s, "explicit", 1e-10, TIMES) for s in (spaces, mixed)
+    ]
+    np.testing.assert_allclose(runs[0].states, runs[1].states, rtol=0, atol=1e-7)
+
+
+def test_projected_mechanics_keep_the_energy():
+    model = build("independent_suspension_vehicle", overrides=CONSERVATIVE)
+    maneuver = replace(lane_change, amplitude_factor=0.0, duration=3.0, samples=151)
+    one_window = {"control_period": 3.0, "snapshots": 100, "rank": 4, "tolerance": 1e-10}
+    reduced = fitted(model, "dropped", maneuver, **one_window)
+    run = reduced.simulate(maneuver, "dropped")
+    assert run.status == "ok"
+    p = {**oracle.PARAMETERS, "c_f": 0.0, "c_r": 0.0, "PKX1": 0.0, "PKX2": 0.0, "PKY1": 0.0}
+    energy = np.array([oracle.energy(x, p) for x in run.states[::5]])
+    exchanged = np.ptp([0.5 * p["m_s"] * x[16] ** 2 for x in run.states])
+    assert exchanged > 1.0
+    assert np.ptp(energy) < 1e-5 * exchanged
+
+
+def test_basis_is_orthonormal_in_its_inner_product(model):
+    for formulation, inner_product in (("state", "energy"), ("coordinates", "range")):
+        reduced = fitted(model, formulation=formulation, inner_product=inner_product)
+        for k, basis in enumerate(reduced.bases[:6]):
+            rank = basis.rank
+            product = reduced.spaces.drops[k, :rank] @ reduced.spaces.lifts[k, :rank].T
+            np.testing.assert_allclose(product, np.eye(rank), atol=1e-9)
+
+
+def test_energy_weight_is_the_kinetic_energy(model):
+    generator = np.random.default_rng(5)
+    period = 0.5
+    weight = state_weight(model, "energy", np.zeros((2, 2 * N)), period)
+    rest = model.start()
+    for _ in range(5):
+        x = rest.copy()
+        x[N:] = generator.normal(size=N)
+        still = rest.copy()
+        still[N:] = 0.0
+        kinetic = oracle.energy(x, oracle.PARAMETERS) - oracle.energy(still, oracle.PARAMETERS)
+        assert x[N:] @ weight[N:, N:] @ x[N:] == pytest.approx(2.0 * kinetic, rel=1e-9)
+        rates = model.derivative(x, [0.0])[:N]
+        assert rates @ weight[:N, :N] @ rates * period**2 == pytest.approx(2.0 * kinetic, rel=1e-9)
+
+
+def test_range_weight_makes_every_moving_state_as_wide_as_the_others(model):
+    histories = np.random.default_rng(2).normal(size=(50, N)) * np.logspace(-3, 3, N)
+    weight = coordinate_weight(model, "range", histories)
+    scaled = histories @ np.linalg.cholesky(weight)
+    np.testing.assert_allclose(np.ptp(scaled, axis=0), 1.0)
+
+
+def test_weighted_basis_spans_what_pymor_finds(model):
+    from pymor.algorithms.pod import pod as pymor_pod
+    from pymor.operators.numpy import NumpyMatrixOperator
+
+    window, rank = 3, 3
+    reduced = fitted(model, inner_product="energy", snapshots=8, rank=rank)
+    times = np.linspace(*reduced.spaces.edges[window : window + 2], 8)
+    snapshots = model.simulate(lane_change, None, times).coordinates
+    weight = coordinate_weight(model, "energy", snapshots)
+    operator = NumpyMatrixOperator(weight)
+    centred = operator.source.from_numpy((snapshots - snapshots.mean(axis=0)).T)
+    modes, values = pymor_pod(centred, product=operator, modes=rank)
+    found = modes.to_numpy()
+    projector = found @ found.T @ weight
+    basis = reduced.bases[window]
+    np.testing.assert_allclose(basis.singular_values[:rank], values, rtol=1e-4)
+    mine = basis.vectors @ basis.vectors.T @ weight
+    # What the third mode holds is small beside rounding of the first: compare on the snapshots.
+    centred_rows = snapshots - snapshots.mean(axis=0)
+    scale = np.abs(centred_rows).max(axis=0)
+    difference = centred_rows @ (mine - projector).T / scale
+    assert np.abs(difference).max() < 1e-6
+
+
+def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
+    reduced = fitted(model)
+    whole = whole_space(STATE, [0.0, 25.0])
+    jacobian = model.reduced_jacobian(whole, 0, model.start())
+    expected = np.linalg.eigvals(model.jacobian(model.start(), [0.0]))
+    found = np.linalg.eigvals(jacobian)
+    fast = expected.real < -1.0
+    assert np.sort(found.real)[: fast.sum()] == pytest.approx(np.sort(expected.real[fast]), rel=1e-4)
+    assert len(reduced.growth_rates) == 50
+    assert reduced.growth_rate == reduced.growth_rates.max()
+
+
+def test_a_tighter_rank_tolerance_drops_modes_of_noise(model):
+    kept = fitted(model, rank=8, rank_tolerance=0.0)
+    cut = fitted(model, rank=8, rank_tolerance=1e-6)
+    # Before steering begins the car runs straight: one direction, the rest is rounding.
+    assert cut.bases[0].rank == 1
+    assert kept.bases[0].rank == 8
+    values = kept.bases[0].singular_values
+    assert values[1] < 1e-6 * values[0]
+
+
+def test_divergence_is_recorded_with_its_time(model):
+    reduced = fitted(model, "dropped", formulation="paired", inner_product="range")
+    run = reduced.simulate(lane_change, "dropped")
+    assert run.status == "diverged"
+    assert "t = " in run.message
+    assert run.counts["rhs_calls"] > 0
+    failed = ~np.isfinite(run.states).all(axis=1)
+    assert failed.any()
+    assert not np.isfinite(run.states[np.argmax(failed) :]).any()
+
+
+@pytest.mark.parametrize(
+    ("chosen", "text"),
+    [
+        ({"rank": 15, "snapshots": 20}, "rank 15 is above the 14 coordinates"),
+        ({"rank": 29, "snapshots": 40, "formulation": "state"}, "rank 29 is above the 28 states"),
+        ({"rank": 4, "snapshots": 3}, "rank 4 is above the number of snapshots 3"),
+        ({"control_period": 1e-4}, "control_period is below"),
+        ({"formulation": "first order"}, "allowed: coordinates, state, paired"),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(model, chosen, text):
+    with pytest.raises(InputError, match=text):
+        fitted(model, **chosen)
