@@ -35,7 +35,7 @@ def explicit_span(
     limits,
     signal,
     space,
-    constants,
+    model,
     scratch,
     typical,
     vectors,
@@ -80,7 +80,7 @@ def explicit_span(
         vectors[8],
     )
     state = scratch[0]
-    slope(form, t, segment, y, dim, signal, space, constants, scratch, k1)
+    slope(form, t, segment, y, dim, signal, space, model, scratch, k1)
     counts[0] += 1
     if step <= 0.0:
         # The slope changes the state by a hundredth of its typical size, at most.
@@ -100,24 +100,24 @@ def explicit_span(
             return 4, t, step, sample
         for i in range(dim):
             mid[i] = y[i] + h * (A21 * k1[i])
-        slope(form, t + 0.2 * h, segment, mid, dim, signal, space, constants, scratch, k2)
+        slope(form, t + 0.2 * h, segment, mid, dim, signal, space, model, scratch, k2)
         for i in range(dim):
             mid[i] = y[i] + h * (A31 * k1[i] + A32 * k2[i])
-        slope(form, t + 0.3 * h, segment, mid, dim, signal, space, constants, scratch, k3)
+        slope(form, t + 0.3 * h, segment, mid, dim, signal, space, model, scratch, k3)
         for i in range(dim):
             mid[i] = y[i] + h * (A41 * k1[i] + A42 * k2[i] + A43 * k3[i])
-        slope(form, t + 0.8 * h, segment, mid, dim, signal, space, constants, scratch, k4)
+        slope(form, t + 0.8 * h, segment, mid, dim, signal, space, model, scratch, k4)
         for i in range(dim):
             mid[i] = y[i] + h * (A51 * k1[i] + A52 * k2[i] + A53 * k3[i] + A54 * k4[i])
-        slope(form, t + 8 / 9 * h, segment, mid, dim, signal, space, constants, scratch, k5)
+        slope(form, t + 8 / 9 * h, segment, mid, dim, signal, space, model, scratch, k5)
         for i in range(dim):
             mid[i] = y[i] + h * (
                 A61 * k1[i] + A62 * k2[i] + A63 * k3[i] + A64 * k4[i] + A65 * k5[i]
             )
-        slope(form, t + h, segment, mid, dim, signal, space, constants, scratch, k6)
+        slope(form, t + h, segment, mid, dim, signal, space, model, scratch, k6)
         for i in range(dim):
             new[i] = y[i] + h * (B1 * k1[i] + B3 * k3[i] + B4 * k4[i] + B5 * k5[i] + B6 * k6[i])
-        slope(form, t + h, segment, new, dim, signal, space, constants, scratch, k7)
+        slope(form, t + h, segment, new, dim, signal, space, model, scratch, k7)
         counts[0] += 6
         for i in range(dim):
             mid[i] = h * (
@@ -146,7 +146,7 @@ def explicit_span(
                     D1 * k1[i] + D3 * k3[i] + D4 * k4[i] + D5 * k5[i] + D6 * k6[i] + D7 * k7[i]
                 )
                 mid[i] = y[i] + z * (difference + (1 - z) * (bend + z * (back + (1 - z) * last)))
-            lifted(form, mid, dim, space, constants, scratch, state)
+            lifted(form, mid, dim, space, model, scratch, state)
             for i in range(len(state)):
                 path[sample, i] = state[i]
             sample += 1

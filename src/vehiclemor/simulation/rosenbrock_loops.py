@@ -10,7 +10,7 @@ from vehiclemor.simulation.system_loops import FULL, error_norm, lifted, slope
 
 
 def difference_jacobian(
-    form, t, segment, y, f, dim, active, signal, space, constants, scratch, shifted, image, jacobian
+    form, t, segment, y, f, dim, active, signal, space, model, scratch, shifted, image, jacobian
 ):
     """Columns of df/dy by forward differences into jacobian (dim, dim); inactive ones are zero."""
     for i in range(dim):
@@ -24,7 +24,7 @@ def difference_jacobian(
         change = 1.5e-8 * max(abs(y[column]), 1.0)
         shifted[column] = y[column] + change
         change = shifted[column] - y[column]
-        slope(form, t, segment, shifted, dim, signal, space, constants, scratch, image)
+        slope(form, t, segment, shifted, dim, signal, space, model, scratch, image)
         for i in range(dim):
             jacobian[i, column] = (image[i] - f[i]) / change
 
@@ -91,7 +91,7 @@ def rosenbrock_span(
     limits,
     signal,
     space,
-    constants,
+    model,
     scratch,
     typical,
     vectors,
@@ -135,7 +135,7 @@ def rosenbrock_span(
         vectors[6],
     )
     state = scratch[0]
-    slope(form, t, segment, y, dim, signal, space, constants, scratch, f)
+    slope(form, t, segment, y, dim, signal, space, model, scratch, f)
     counts[0] += 1
     if step <= 0.0:
         size = error_norm(form, f, y, dim, space, typical, 1.0)
@@ -173,14 +173,14 @@ def rosenbrock_span(
                     active,
                     signal,
                     space,
-                    constants,
+                    model,
                     scratch,
                     mid,
                     image,
                     jacobian,
                 )
                 later = 1e-7 * (1.0 + abs(t))
-                slope(form, t + later, segment, y, dim, signal, space, constants, scratch, f_t)
+                slope(form, t + later, segment, y, dim, signal, space, model, scratch, f_t)
                 for i in range(dim):
                     f_t[i] = (f_t[i] - f[i]) / later
                 counts[0] += min(len(active), dim) + 1
@@ -206,7 +206,7 @@ def rosenbrock_span(
                         for i in range(dim):
                             mid[i] += weight * stages[j, i]
                 moment = t + alpha[stage] * h
-                slope(form, moment, segment, mid, dim, signal, space, constants, scratch, b)
+                slope(form, moment, segment, mid, dim, signal, space, model, scratch, b)
                 counts[0] += 1
                 for j in range(stage):
                     weight = c[stage, j] / h
@@ -247,7 +247,7 @@ def rosenbrock_span(
             continue
         counts[1] += 1
         whole = t + 1.0001 * h <= end
-        slope(form, t + h, segment, new, dim, signal, space, constants, scratch, f_new)
+        slope(form, t + h, segment, new, dim, signal, space, model, scratch, f_new)
         counts[0] += 1
         # Cubic Hermite interpolation between the ends of the step.
         while sample < len(samples) and samples[sample] <= t + h + 1e-12 * (1.0 + abs(t)):
@@ -263,7 +263,7 @@ def rosenbrock_span(
             else:
                 for i in range(dim):
                     mid[i] = before * y[i] + after * new[i] + left * f[i] + right * f_new[i]
-                lifted(form, mid, dim, space, constants, scratch, state)
+                lifted(form, mid, dim, space, model, scratch, state)
                 for i in range(len(state)):
                     path[sample, i] = state[i]
             sample += 1

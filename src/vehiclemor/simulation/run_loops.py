@@ -22,7 +22,7 @@ def run(
     drops,
     ranks,
     signal,
-    constants,
+    model,
     typical,
     limits,
     restart,
@@ -86,10 +86,10 @@ def run(
             if form == COORDINATES:
                 input_at(t, span_segments[span], signal, scratch[1])
                 counts[0] += 1
-            projected(form, x, dim, space, constants, scratch, y)
+            projected(form, x, dim, space, model, scratch, y)
             if sample == 0:
                 while sample < len(samples) and samples[sample] <= t:
-                    lifted(form, y, dim, space, constants, scratch, scratch[0])
+                    lifted(form, y, dim, space, model, scratch, scratch[0])
                     for i in range(2 * N):
                         path[sample, i] = scratch[0][i]
                     sample += 1
@@ -108,7 +108,7 @@ def run(
                 limits,
                 signal,
                 space,
-                constants,
+                model,
                 scratch,
                 typical,
                 vectors,
@@ -128,7 +128,7 @@ def run(
                 limits,
                 signal,
                 space,
-                constants,
+                model,
                 scratch,
                 typical,
                 vectors,
@@ -145,29 +145,29 @@ def run(
             )
         if status != 0:
             return status, t
-        lifted(form, y, dim, space, constants, scratch, x)
+        lifted(form, y, dim, space, model, scratch, x)
         for i in range(2 * N):
             if not math.isfinite(x[i]):
                 return 2, t
     return 0, t
 
 
-def output_path(path, inputs, constants, result):
+def output_path(path, inputs, model, result):
     """Outputs at every sample of a path of states into result (samples, OUTPUTS)."""
     work = np.zeros(WORK)
     for sample in range(len(path)):
         x, u = path[sample], inputs[sample]
-        outputs(x, u, constants, work, result[sample])
+        outputs(x, u, model, result[sample])
 
 
-def derivative_path(path, inputs, constants, result):
+def derivative_path(path, inputs, model, result):
     """State derivatives at every sample of a path into result (samples, 2 N)."""
     work = np.zeros(WORK)
     for sample in range(len(path)):
-        derivative(path[sample], inputs[sample], constants, work, result[sample])
+        derivative(path[sample], inputs[sample], model, result[sample])
 
 
-def jacobian_at(x, u, constants, active, result):
+def jacobian_at(x, u, model, active, result):
     """Columns of df/dx (2 N, 2 N) by central differences; inactive ones are zero."""
     work, shifted = np.zeros(WORK), np.empty(2 * N)
     above, below = np.empty(2 * N), np.empty(2 * N)
@@ -179,14 +179,14 @@ def jacobian_at(x, u, constants, active, result):
         for i in range(2 * N):
             shifted[i] = x[i]
         shifted[column] = x[column] + change
-        derivative(shifted, u, constants, work, above)
+        derivative(shifted, u, model, above)
         shifted[column] = x[column] - change
-        derivative(shifted, u, constants, work, below)
+        derivative(shifted, u, model, below)
         for i in range(2 * N):
             result[i, column] = (above[i] - below[i]) / (2.0 * change)
 
 
-def reduced_slope(form, t, segment, y, dim, signal, mean, lift, drop, constants, dy):
+def reduced_slope(form, t, segment, y, dim, signal, mean, lift, drop, model, dy):
     """Right-hand side of one window's reduced system at reduced coordinates y (dim)."""
     scratch = (
         np.empty(2 * N),
@@ -196,10 +196,10 @@ def reduced_slope(form, t, segment, y, dim, signal, mean, lift, drop, constants,
         np.empty((N, N + 1)),
         np.empty((N, N + 1)),
     )
-    slope(form, t, segment, y, dim, signal, (mean, lift, drop), constants, scratch, dy)
+    slope(form, t, segment, y, dim, signal, (mean, lift, drop), model, scratch, dy)
 
 
-def reduced_coordinates(form, x, dim, u, mean, lift, drop, constants, y):
+def reduced_coordinates(form, x, dim, u, mean, lift, drop, model, y):
     """Reduced coordinates y (dim) of a state x in one window."""
     scratch = (
         np.empty(2 * N),
@@ -209,4 +209,4 @@ def reduced_coordinates(form, x, dim, u, mean, lift, drop, constants, y):
         np.empty((N, N + 1)),
         np.empty((N, N + 1)),
     )
-    projected(form, x, dim, (mean, lift, drop), constants, scratch, y)
+    projected(form, x, dim, (mean, lift, drop), model, scratch, y)

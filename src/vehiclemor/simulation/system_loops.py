@@ -10,19 +10,53 @@ COORDINATES
     y = (a, b): coordinates q = mean + V a, rates V b; V^T M V db/dt = V^T F with the model's own
     mass matrix, V the first rows of `lift`.
 
-`signal` is (edges, first, coefficients) of the inputs, `space` (mean, lift, drop) of the window,
-`scratch` (x, u, dx, work, matrix, small).
+`model` is (constants, addresses): the parameters' constants, and where the machine code of the
+model's kernels begins, zero where it has none.  So these loops are compiled once for all models, and
+sizes are lengths of arrays.  `signal` is (edges, first, coefficients) of the inputs, `space` (mean,
+lift, drop) of the window, `scratch` (x, u, dx, matrix, small).
 """
 
 import math
 
 import numpy as np
 
-from vehiclemor.codegen.stubs import INPUTS, N, derivative, second_order, speeds
+from vehiclemor.codegen.stubs import call_machine
 
 FULL = 0
 STATE = 1
 COORDINATES = 2
+
+
+def derivative(x, u, model, result):
+    """State derivative f(x, u) into result (2 n,)."""
+    call_machine(model[1][0], (x, u, model[0], result))
+
+
+def outputs(x, u, model, result):
+    """Outputs y(x, u) into result."""
+    call_machine(model[1][1], (x, u, model[0], result))
+
+
+def second_order(x, u, model, result):
+    """Mass matrix into result[:, :n] and forces into result[:, n]; result is (n, n + 1)."""
+    call_machine(model[1][2], (x, u, model[0], result))
+
+
+def speeds(x, u, model, result):
+    """Speeds into result (n,) or longer, where x holds rates of the coordinates in their place."""
+    call_machine(model[1][3], (x, u, model[0], result))
+
+
+def scratch_space(states, inputs):
+    """Work space of the functions below."""
+    n = states // 2
+    return (
+        np.empty(states),
+        np.zeros(inputs),
+        np.empty(states),
+        np.empty((n, n + 1)),
+        np.empty((n, n + 1)),
+    )
 
 
 def input_at(t, segment, signal, u):
@@ -38,7 +72,7 @@ def input_at(t, segment, signal, u):
         i = pieces - 1
     z = place - i
     row = first[segment] + i
-    for j in range(INPUTS):
+    for j in range(len(u)):
         value = coefficients[row, j, 5]
         value = coefficients[row, j, 4] + z * value
         value = coefficients[row, j, 3] + z * value
@@ -47,7 +81,7 @@ def input_at(t, segment, signal, u):
         u[j] = coefficients[row, j, 0] + z * value
 
 
-def lifted(form, y, dim, space, constants, scratch, x):
+def lifted(form, y, dim, space, model, scratch, x):
     """State x (2 N) of reduced coordinates y (dim)."""
     mean, lift, _ = space
     if form == FULL:
@@ -62,8 +96,8 @@ def lifted(form, y, dim, space, constants, scratch, x):
                 x[i] += lift[j, i] * y[j]
         return
     positions_and_rates(y, dim, space, x)
-    _, u, dx, work, _, _ = scratch
-    speeds(x, u, constants, work, dx)
+    _, u, dx, _, _ = scratch
+    speeds(x, u, model, dx)
     for i in range(N):
         x[N + i] = dx[i]
 
@@ -81,7 +115,7 @@ def positions_and_rates(y, dim, space, x):
             x[N + i] += lift[j, i] * y[r + j]
 
 
-def projected(form, x, dim, space, constants, scratch, y):
+def projected(form, x, dim, space, model, scratch, y):
     """Reduced coordinates y (dim) of a state x (2 N); one derivative in form COORDINATES."""
     mean, _, drop = space
     if form == FULL:
@@ -95,8 +129,8 @@ def projected(form, x, dim, space, constants, scratch, y):
             y[j] = total
     else:
         r = dim // 2
-        _, u, dx, work, _, _ = scratch
-        derivative(x, u, constants, work, dx)
+        _, u, dx, _, _ = scratch
+        derivative(x, u, model, dx)
         for j in range(r):
             total, rate = 0.0, 0.0
             for i in range(N):
@@ -106,15 +140,15 @@ def projected(form, x, dim, space, constants, scratch, y):
             y[r + j] = rate
 
 
-def slope(form, t, segment, y, dim, signal, space, constants, scratch, dy):
+def slope(form, t, segment, y, dim, signal, space, model, scratch, dy):
     """Right-hand side of the system at time t into dy (dim)."""
-    x, u, dx, work, matrix, small = scratch
+    x, u, dx, matrix, small = scratch
     input_at(t, segment, signal, u)
     if form == FULL:
-        derivative(y, u, constants, work, dy)
+        derivative(y, u, model, dy)
     elif form == STATE:
-        lifted(form, y, dim, space, constants, scratch, x)
-        derivative(x, u, constants, work, dx)
+        lifted(form, y, dim, space, model, scratch, x)
+        derivative(x, u, model, dx)
         drop = space[2]
         for j in range(dim):
             total = 0.0
@@ -122,8 +156,8 @@ def slope(form, t, segment, y, dim, signal, space, constants, scratch, dy):
                 total += drop[j, i] * dx[i]
             dy[j] = total
     else:
-        lifted(form, y, dim, space, constants, scratch, x)
-        second_order(x, u, constants, work, matrix)
+        lifted(form, y, dim, space, model, scratch, x)
+        second_order(x, u, model, matrix)
         galerkin(dim // 2, space[1], matrix, dx, small)
         r = dim // 2
         for j in range(r):

@@ -46,7 +46,7 @@ FIGURES: dict[str, Entry] = {
     "1": Entry(
         (),
         vehicle_schematic.figure_1,
-        "14-DOF vehicle in static equilibrium, drawn from the model with its public parameters (a), "
+        "14-DOF vehicle in static equilibrium, drawn from the model with its public data (a), "
         "and its topological graph (b) with the coordinates of the model: 6 of the free chassis, "
         "P prismatic joints of 4 lumped masses along the chassis z axis, R revolute joints of 4 "
         "wheels. Axes: ISO 8855. Outline of the sprung body and steering angle (20 degrees, "

@@ -107,17 +107,16 @@ def error_map(
             for method in ("pod", "replay")
         }
         shown = [e[~nominal] if values_in_cells else e for e in errors.values()]
-        norm = LogNorm(
-            min(float(np.nanmin(e[e > 0.0])) for e in shown),
-            max(float(np.nanmax(e)) for e in shown),
-        )
+        lowest = min(float(np.nanmin(e[e > 0.0])) for e in shown)
+        highest = max(float(np.nanmax(e)) for e in shown)
+        norm = LogNorm(lowest, highest)
         meshes = []
         for column, (method, values) in enumerate(errors.items()):
             axis = axes[row, column]
             mesh = axis.pcolormesh(
                 frequency,
                 amplitude,
-                np.maximum(values, 0.5 * norm.vmin) if values_in_cells else values,
+                np.maximum(values, 0.5 * lowest) if values_in_cells else values,
                 norm=norm,
                 cmap="cividis",
                 shading="nearest",
@@ -130,7 +129,7 @@ def error_map(
                     frequency, amplitude, values, levels=[bound], colors="white", linewidths=1.2
                 )
             if values_in_cells:
-                _write(axis, frequency, amplitude, values, norm)
+                _write(axis, frequency, amplitude, values, np.sqrt(lowest * highest))
             axis.grid(visible=False)
             name = "POD, r = 3" if method == "pod" else "replay"
             axis.set_title(f"({'abcd'[2 * row + column]}) {name}")
@@ -146,18 +145,17 @@ def error_map(
 
 
 def _write(
-    axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, norm: LogNorm
+    axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, dark: float
 ) -> None:
-    """Errors with two digits, on dark cells in white."""
-    middle = np.sqrt(float(norm.vmin or 1.0) * float(norm.vmax or 1.0))
+    """Errors with two digits, in white where they are below `dark`."""
     for (j, i), value in np.ndenumerate(values):
         digits = f"{value:.1g}" if value < 1e-3 else f"{value:#.2g}"
         axis.text(
-            frequency[i],
-            amplitude[j],
+            float(frequency[i]),
+            float(amplitude[j]),
             digits.replace("e-0", "e-"),
             ha="center",
             va="center",
             fontsize=5.5,
-            color="white" if value < middle else "black",
+            color="white" if value < dark else "black",
         )

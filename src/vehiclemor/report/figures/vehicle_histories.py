@@ -33,6 +33,12 @@ REDUCED: dict[str, tuple[str, dict[str, Any]]] = {
     "pod_literal": ("POD, r = 3 (literal)", LITERAL),
 }
 STATE: dict[str, Any] = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
+CROSS: dict[str, Any] = {
+    "marker": "x",
+    "markersize": 6,
+    "markeredgewidth": 1.6,
+    "linestyle": "none",
+}
 # The response has died away at this time (s), long before the end of the run.
 SHOWN = 6.0
 FIRST_SECONDS = "time (s), first {:g} s of 25 s"
@@ -80,8 +86,7 @@ def figure_3(results: Results) -> Figure:
         axis.set_ylabel(LABELS[output])
         axis.ticklabel_format(style="plain")
         axis.locator_params(axis="y", nbins=5)
-    marker = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
-    axes[0, 0].plot([], [], color=LITERAL["color"], label="literal leaves the axes", **marker)
+    axes[0, 0].plot([], [], color=LITERAL["color"], label="literal leaves the axes", **CROSS)
     legend_above(figure, axes[0, 0])
     return figure
 
@@ -94,17 +99,12 @@ def _plot_until_it_leaves(
     time, values = history["time"].values, history.values.copy()
     outside = np.flatnonzero(~((values >= low) & (values <= high)))
     if outside.size:
-        values[outside[0] + 1 :] = np.nan
-        edge = high if values[outside[0]] > high else low
-        axis.plot(
-            time[outside[0]],
-            edge,
-            marker="x",
-            markersize=6,
-            markeredgewidth=1.6,
-            color=style["color"],
-            clip_on=False,
-        )
+        first = int(outside[0])
+        # A run that has diverged ends without a value.
+        seen = first if np.isfinite(values[first]) else max(first - 1, 0)
+        place = (time[seen], np.clip(values[seen], low, high))
+        axis.plot(*place, color=style["color"], clip_on=False, **CROSS)
+        values[first + 1 :] = np.nan
     axis.plot(time, values, label=text, **style)
 
 
@@ -124,18 +124,24 @@ def figure_4(results: Results) -> Figure:
             error = abs(reduced["outputs"] - reduced["reference_outputs"]).sel(output=output)
             edges, largest = _largest(error, float(number.control_period or last))
             axis.semilogy(edges, largest, label=text, drawstyle="steps-post", **style)
+            ended = np.flatnonzero(np.isnan(largest))
+            if ended.size:
+                last_value = largest[ended[0] - 1]
+                axis.plot(edges[ended[0]], last_value, color=style["color"], **CROSS)
         axis.axhline(number.value, color="black", linestyle=":", label="published RMS error")
         axis.set_ylim(1e-8, 30.0)
         axis.set_ylabel(f"largest error of {LABELS[output]}")
-    legend_above(figure, axes[0, 0], columns=2)
+    axes[0, 0].plot([], [], color=LITERAL["color"], label="literal has diverged", **CROSS)
+    legend_above(figure, axes[0, 0], columns=3)
     return figure
 
 
 def _largest(error: xr.DataArray, period: float) -> tuple[np.ndarray, np.ndarray]:
     """Starts of the control periods (n,) in s and the largest error in each."""
-    window = np.floor(error["time"].values / period + 1e-9).astype(int)
+    # A sample between two periods belongs to the one that ends there.
+    window = np.maximum(np.ceil(error["time"].values / period - 1e-9).astype(int) - 1, 0)
     starts = np.unique(window)
-    return period * starts, np.array([error.values[window == k].max() for k in starts])
+    return period * starts, np.array([np.fmax.reduce(error.values[window == k]) for k in starts])
 
 
 def figure_zero_steer(results: Results) -> Figure:
