@@ -151,7 +151,9 @@ def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
     expected = np.linalg.eigvals(model.jacobian(model.start(), [0.0]))
     found = np.linalg.eigvals(jacobian)
     fast = expected.real < -1.0
-    assert np.sort(found.real)[: fast.sum()] == pytest.approx(np.sort(expected.real[fast]), rel=1e-4)
+    assert np.sort(found.real)[: fast.sum()] == pytest.approx(
+        np.sort(expected.real[fast]), rel=1e-4
+    )
     assert len(reduced.growth_rates) == 50
     assert reduced.growth_rate == reduced.growth_rates.max()
 

@@ -4,111 +4,173 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import cache, straight_line
+from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
+from vehiclemor.errors import InputError
+from vehiclemor.reduction.dynamic_subspaces import check_subspace
+from vehiclemor.registry import component
+from vehiclemor.simulation import dynamic, newton_loops, system_loops
+from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.system_loops import COORDINATES
+
+# Prints hits and misses of every compiled function, the machine code's hits, and a result.
+REPORT = """
+used = {
+    name: [sum(d.stats.cache_hits.values()), sum(d.stats.cache_misses.values())]
+    for module in modules
+    for name, d in vars(module).items()
+    if getattr(d, "signatures", None)
+}
+machine = {n: d.cache_hits for n, d in vars(modules[0]).items() if n.endswith("_machine")}
+print(json.dumps([used, machine, [module.__file__ for module in modules], result.tolist()]))
+"""
+
+LINKED = (
+    """
+import json
+import numpy as np
+from vehiclemor.codegen.cache import load_module
 from vehiclemor.codegen.link import linked_source
 from vehiclemor.simulation import newton_loops
 
-SIMULATE = """
-import json
-from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import build
-
-model = build("double_wishbone")
-run = model.simulate(component("maneuver", "sine_travel"))
-used = {
-    name: [sum(d.stats.cache_hits.values()), sum(d.stats.cache_misses.values())]
-    for name, d in vars(model.kernels).items()
-    if getattr(d, "signatures", None)
-}
-print(json.dumps([used, model.kernels.__file__, run.coordinates[250].tolist()]))
+kernels = "def residual(q, u, constants, work, result):\\n    result[0] = q[0] * u[0]\\n"
+sizes = {"N": 1, "INPUTS": 1, "OUTPUTS": 1, "WORK": 1}
+modules = [load_module("tiny", linked_source(kernels, [newton_loops], sizes, "a test"))]
+path, nothing, result = np.array([[2.0], [3.0]]), np.zeros(1), np.zeros((2, 1))
+modules[0].residual_path(path, path, nothing, result)
 """
+    + REPORT
+)
 
-DYNAMIC = """
+ADDRESSED = (
+    """
 import json
 import numpy as np
-from vehiclemor.simulation.dynamic import build
+from vehiclemor.codegen.cache import load_module
+from vehiclemor.codegen.link import kernels_source, loops_source
+from vehiclemor.simulation import run_loops, system_loops
 
-model = build("independent_suspension_vehicle")
-found = model.derivatives_at(model.start()[None], np.zeros((1, 1)))
-used = {
-    name: [sum(d.stats.cache_hits.values()), sum(d.stats.cache_misses.values())]
-    for name, d in vars(model.kernels).items()
-    if getattr(d, "signatures", None)
-}
-machine = {n: d.cache_hits for n, d in vars(model.kernels).items() if n.endswith("_machine")}
-print(json.dumps([used, machine, found.tolist()]))
+kernels = "def outputs(_x, _u, _constants, _work, _result):\\n    _result[0] = _x[0] * _u[0]\\n"
+modules = [load_module("tiny", kernels_source(kernels, {}, "a test"))]
+# Without the integrators, which take long to compile.
+modules.append(load_module("tiny_loops", loops_source([system_loops, run_loops], "a test")))
+path, nothing, result = np.array([[2.0], [3.0]]), np.zeros(1), np.zeros((2, 1))
+addresses = np.array([0, modules[0]._outputs_machine.address, 0, 0])
+modules[1].output_path(path, path, (nothing, addresses), result)
 """
+    + REPORT
+)
 
 
-def test_second_process_writes_no_machine_code_of_a_dynamic_model(tmp_path: Path) -> None:
+def process(script: str, folder: Path) -> tuple[dict, dict, list[Path], list]:
     environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
-    environment["VEHICLEMOR_CACHE"] = str(tmp_path)
-    found = []
-    for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, "-c", DYNAMIC],
-            env=environment,
-            cwd=tmp_path,
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        found.append(json.loads(done.stdout))
-    (_, cold, first), (used, machine, second) = found
-    assert set(cold.values()) == {0}
-    assert {"_derivative_machine", "_second_order_machine", "_outputs_machine"} <= set(machine)
-    assert set(machine.values()) == {1}
-    assert {"derivative_path", "constants"} <= set(used)
-    for name, (hits, misses) in used.items():
-        assert hits > 0, name
-        assert misses == 0, name
-    assert first == second
+    environment["VEHICLEMOR_CACHE"] = str(folder)
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(
+        command, env=environment, cwd=folder, check=False, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    used, machine, files, result = json.loads(done.stdout)
+    return used, machine, [Path(file) for file in files], result
 
 
-def test_machine_code_follows_the_source_that_writes_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    kernels = "def f(_q, _work, _result):\n    _result[0] = _q[0]\n"
-    source = linked_source(kernels, [], {}, "a test", direct=True)
-    assert source == linked_source(kernels, [], {}, "a test", direct=True)
-    monkeypatch.setattr(straight_line, "source_hash", lambda: "another")
-    assert source != linked_source(kernels, [], {}, "a test", direct=True)
-
-
-def test_second_process_compiles_nothing(tmp_path: Path) -> None:
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
-    environment["VEHICLEMOR_CACHE"] = str(tmp_path)
-
-    def process() -> tuple[dict[str, list[int]], Path, list[float]]:
-        done = subprocess.run(
-            [sys.executable, "-c", SIMULATE],
-            env=environment,
-            cwd=tmp_path,
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        used, path, state = json.loads(done.stdout)
-        return used, Path(path), state
-
-    first, source, cold = process()
-    assert first["newton_path"] == [0, 1]
+@pytest.mark.parametrize(
+    ("script", "functions"),
+    [(LINKED, {"residual_path"}), (ADDRESSED, {"output_path"})],
+    ids=["linked", "addressed"],
+)
+def test_second_process_compiles_nothing(tmp_path: Path, script: str, functions: set[str]) -> None:
+    first, cold, source, result = process(script, tmp_path)
+    assert result == [[4.0], [9.0]]
+    assert set(cold.values()) <= {0}
+    assert all(hits == 0 and misses == 1 for hits, misses in first.values())
     written = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
-    second, same, warm = process()
-    assert {"newton_path", "residual", "residual_jacobian", "constants"} <= set(second)
+    second, warm, same, again = process(script, tmp_path)
+    assert functions <= set(second)
     for name, (hits, misses) in second.items():
         assert hits > 0, name
         assert misses == 0, name
+    assert set(warm) == set(cold) == ({"_outputs_machine"} if script == ADDRESSED else set())
+    assert set(warm.values()) <= {1}
     assert same == source
-    assert tmp_path in source.parents
-    assert warm == cold
+    assert all(tmp_path in file.parents for file in source)
+    assert again == result
     # Nothing was written again, and no half-written file is left.
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*") if p.is_file()} == written
     assert not [path for path in written if path.suffix == ".tmp"]
+
+
+def test_all_dynamic_models_run_in_the_same_loops(standard) -> None:
+    vehicle = dynamic.build("independent_suspension_vehicle")
+    other = standard()
+    assert vehicle.loops is other.loops
+    assert vehicle.kernel_hash != other.kernel_hash
+    quiet = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
+    x = vehicle.start()
+    vehicle.simulate(component("maneuver", "straight_ahead"), tolerance=1e-3)
+    compiled = len(vehicle.loops.run.signatures)
+    for solver in dynamic.SOLVERS:
+        other.simulate(quiet, solver=solver, tolerance=1)
+    x.flags.writeable = False
+    space = full_space(len(vehicle.coordinates))
+    vehicle.integrate(
+        component("maneuver", "straight_ahead"), x, space, "ros34pw2", 1e-3, longest_step=1
+    )
+    assert len(vehicle.loops.run.signatures) == compiled == 1
+
+
+def test_hash_of_a_dynamic_model_follows_its_loops(
+    standard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = standard().kernel_hash
+    text = dynamic._loops_text()
+    dynamic._compiled.cache_clear()
+    assert standard().kernel_hash == before
+    dynamic._compiled.cache_clear()
+    monkeypatch.setattr(dynamic, "_loops_text", lambda: f"{text}# changed\n")
+    assert standard().kernel_hash != before
+    dynamic._compiled.cache_clear()
+
+
+@pytest.mark.parametrize("lacking", ["second_order", "speeds"])
+def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking: str) -> None:
+    whole = standard()
+    program = whole.equations.program
+    functions = {k: v for k, v in program.functions.items() if k != lacking}
+    program = replace(program, functions=functions)
+    model = replace(whole, equations=replace(whole.equations, program=program))
+    settings = {"rank": 1, "snapshots": 2, "formulation": "state", "inner_product": "range"}
+    check_subspace(model, settings)
+    for wrong in ({"formulation": "coordinates"}, {"inner_product": "energy"}):
+        with pytest.raises(InputError, match=f"has no {lacking}"):
+            check_subspace(model, settings | wrong)
+    nothing = np.zeros((1, 1, 4))
+    edges, rank = np.array([0.0, 9.0]), np.array([2])
+    spaces = Spaces(COORDINATES, edges, np.zeros((1, 4)), nothing, nothing, rank)
+    quiet = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
+    with pytest.raises(InputError, match=f"has no {lacking}"):
+        model.integrate(quiet, model.start(), spaces, "explicit", 1e-3)
+    function = model.mass_matrix if lacking == "second_order" else model.speeds_of_rates
+    with pytest.raises(InputError, match=f"has no {lacking}"):
+        function(model.start())
+
+
+def test_machine_code_follows_the_source_that_writes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def sources() -> tuple[str, str]:
+        kernels = "def f(_q, _work, _result):\n    _result[0] = _q[0]\n"
+        return kernels_source(kernels, {}, "a test"), loops_source([system_loops], "a test")
+
+    first = sources()
+    assert first == sources()
+    monkeypatch.setattr(straight_line, "source_hash", lambda: "another")
+    assert all(old != new for old, new in zip(first, sources(), strict=True))
 
 
 def test_hash_follows_source_and_versions(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -76,7 +76,7 @@ def test_compiled_loops_read_the_polynomials(standard, rng):
     signal = signal_of(man)
     for t in rng.uniform(0.0, 8.0, 60):
         u = np.full(3, np.nan)
-        model.kernels.input_at(t, int(t > 2.5), signal.arrays, u)
+        model.loops.input_at(t, int(t > 2.5), signal.arrays, u)
         np.testing.assert_allclose(u, man.at(np.array([t]))[0], rtol=0, atol=1e-10)
         np.testing.assert_allclose(u, value(signal, t), rtol=0, atol=1e-15)
 

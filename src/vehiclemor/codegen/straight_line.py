@@ -2,20 +2,22 @@
 
 A kernel of a vehicle has thousands of scalar operations.  The compiler spends seconds on the types
 of these, though all are floats, and once more in every loop that calls the kernel.  Here its text
-becomes LLVM instructions directly, and its machine code has one place that all loops call.  Batches
-of elementary functions become vector instructions, from the text of the same scalar functions.
+becomes LLVM instructions directly, and its machine code has one place.  Loops call it by its
+address, which they get at run time: they are compiled once for all models.  Batches of elementary
+functions become vector instructions, from the text of the same scalar functions.
 """
 
 import ast
+import ctypes
 import hashlib
 import inspect
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import ModuleType
 from typing import Any
 
-import llvmlite.binding as llvm
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -35,6 +37,7 @@ VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
 POINTER = types.CPointer(types.float64)
+FLOATS = ctypes.POINTER(ctypes.c_double)
 SOURCES: dict[str, ModuleType] = {
     "sincos": sincos,
     "atan": arctangent,
@@ -224,6 +227,12 @@ class _Kernel:
         self.dimensions = max((len(place) for place in places), default=1)
         # Every place of a result is written, so the largest tells its shape.
         self.columns = 1 + max((place[-1] for place in places), default=0)
+        self.sizes = dict.fromkeys(self.arguments, 0)
+        for node in ast.walk(tree[0]):
+            if isinstance(node, ast.Subscript) and (name := ast.unparse(node.value)) in self.sizes:
+                place = _places(node)
+                flat = place[0] if len(place) == 1 else place[0] * self.columns + place[1]
+                self.sizes[name] = max(self.sizes[name], flat + 1)
 
     @property
     def pointers(self) -> list[str]:
@@ -368,15 +377,8 @@ def straight_line(text: str) -> Any:
     return execute
 
 
-# Machine code that compiled loops call by name lives as long as the process.
-_alive: list[Any] = []
-
-
-def caller(text: str, machine: Any) -> Any:
-    """Function for compiled code that calls a kernel's machine code, given a tuple of arrays.
-
-    The code is found by a name made from the kernel's text, so that loops which are taken from the
-    cache find it too.
+def python_kernel(text: str, machine: Any) -> Callable[..., None]:
+    """A kernel as a function of arrays, to be called from Python.
 
     Parameters
     ----------
@@ -386,47 +388,65 @@ def caller(text: str, machine: Any) -> Any:
         The C function that `straight_line` was compiled into.
     """
     kernel = _kernel(text)
-    digest = hashlib.sha256(f"{source_hash()}\n{text}".encode()).hexdigest()[:16]
-    symbol = f"vehiclemor_{kernel.name}_{digest}"
-    llvm.add_symbol(symbol, machine.address)
-    _alive.append(machine)
+    # The machine code lives as long as its owner.
+    alive: tuple[Callable[..., None], Any] = machine.ctypes, machine
 
-    @intrinsic
-    def call(typing_context: Any, arrays: Any) -> Any:
-        del typing_context
-        _check(kernel, arrays)
-
-        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            pointers = []
-            for name, kind, array in zip(
-                kernel.arguments,
-                sig.args[0],
-                cgutils.unpack_tuple(builder, args[0], len(sig.args[0])),
-                strict=True,
-            ):
-                if name != "_work":
-                    pointers.append(context.make_array(kind)(context, builder, array).data)
-            kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
-            function = cgutils.get_or_insert_function(builder.module, kind, symbol)
-            function.attributes.add("nounwind")
-            builder.call(function, pointers)
-            return context.get_dummy_value()
-
-        return types.void(arrays), generate
-
-    return call
-
-
-def _check(kernel: _Kernel, arrays: Iterable[Any]) -> None:
-    for name, kind in zip(kernel.arguments, arrays, strict=True):
+    def checked(name: str, array: np.ndarray) -> Any:
         dimensions = kernel.dimensions if name == "_result" else 1
         if not (
-            isinstance(kind, types.Array)
-            and kind.dtype == types.float64
-            and kind.layout == "C"
-            and kind.ndim == dimensions
+            isinstance(array, np.ndarray)
+            and array.dtype == np.float64
+            and array.flags.c_contiguous
+            and array.ndim == dimensions
+            and array.size >= kernel.sizes[name]
+            and (name != "_result" or array.flags.writeable)
         ):
-            raise TypingError(
-                f"{kernel.name}: {name.removeprefix('_')} must be a C-contiguous array of floats "
-                f"with {dimensions} dimension(s), not {kind}"
+            kind = f"{array.dtype}{array.shape}" if hasattr(array, "dtype") else type(array)
+            raise TypeError(
+                f"{kernel.name}: {name.removeprefix('_')} must be a C-contiguous array of at least "
+                f"{kernel.sizes[name]} floats with {dimensions} dimension(s), not {kind}"
             )
+        return array.ctypes.data_as(FLOATS)
+
+    def execute(*arrays: np.ndarray) -> None:
+        given = zip(kernel.arguments, arrays, strict=True)
+        alive[0](*[checked(name, array) for name, array in given if name != "_work"])
+
+    execute.__name__ = kernel.name
+    return execute
+
+
+@intrinsic
+def call_machine(typing_context: Any, model: Any, place: Any, x: Any, u: Any, result: Any) -> Any:
+    """Call the kernel of a model whose address has a place in the model's list, from loops.
+
+    `model` is (constants, addresses); the arrays must be as long as the kernel wants them.  Nothing
+    is taken out of a tuple by the caller: counting references would cost as much as the call.
+    """
+    del typing_context
+    constants, addresses = model
+    for kind in (x, u, constants, result):
+        if not _is_plain(kind, types.float64):
+            raise TypingError(f"a kernel needs C-contiguous arrays of floats, not {kind}")
+    if not result.mutable or not _is_plain(addresses, types.int64):
+        raise TypingError(f"a kernel can't be called at {addresses}, or write to {result}")
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        def data(kind: Any, array: Any) -> Any:
+            return context.make_array(kind)(context, builder, array).data
+
+        given = cgutils.unpack_tuple(builder, args[0], 2)
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        address = builder.load(builder.gep(data(addresses, given[1]), [index]))
+        pointers = [data(x, args[2]), data(u, args[3]), data(constants, given[0])]
+        pointers.append(data(result, args[4]))
+        kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
+        function = builder.inttoptr(address, kind.as_pointer())
+        builder.call(function, pointers, attrs=("nounwind",))
+        return context.get_dummy_value()
+
+    return types.void(model, place, x, u, result), generate
+
+
+def _is_plain(kind: Any, number: Any) -> bool:
+    return isinstance(kind, types.Array) and kind.dtype == number and kind.layout == "C"

@@ -41,16 +41,6 @@ def residual_tangent(
     raise NotImplementedError("runs only in a linked module")
 
 
-def derivative(x: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
-    """State derivative f(x, u) into result (2 N,)."""
-    raise NotImplementedError("runs only in a linked module")
-
-
-def second_order(x: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
-    """Mass matrix into result[:, :N] and forces into result[:, N]; result is (N, N + 1)."""
-    raise NotImplementedError("runs only in a linked module")
-
-
-def speeds(x: Array, u: Array, constants: Array, work: Array, result: Array) -> None:
-    """Speeds into result (N,), where x holds rates of the coordinates in place of speeds."""
+def call_machine(model: tuple[Array, Array], place: int, x: Array, u: Array, result: Array) -> None:
+    """Call a kernel's machine code; see `straight_line.call_machine`."""
     raise NotImplementedError("runs only in a linked module")

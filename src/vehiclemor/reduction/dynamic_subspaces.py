@@ -259,7 +259,12 @@ def _spaces(
 
 
 def check_subspace(model: DynamicModel, settings: Mapping[str, Value]) -> None:
-    """Raise `InputError` if rank and snapshots don't fit the model."""
+    """Raise `InputError` if the settings don't fit the model."""
+    formulation, energy = settings["formulation"], settings["inner_product"] == "energy"
+    if formulation == "coordinates" or energy:
+        model.require("second_order")
+    if formulation != "state" or energy:
+        model.require("speeds")
     rank, snapshots = int(settings["rank"]), int(settings["snapshots"])
     states = len(model.coordinates) * (2 if settings["formulation"] == "state" else 1)
     if rank > states:

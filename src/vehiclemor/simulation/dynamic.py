@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 
 from vehiclemor.codegen.cache import kernel_hash, load_module
 from vehiclemor.codegen.emit import kernel_source, operation_counts, reference_source, work_size
-from vehiclemor.codegen.link import linked_source
+from vehiclemor.codegen.link import kernels_source, loops_source
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.equations import DynamicEquations, Quantity
@@ -35,6 +35,13 @@ MOST_CALLS = 100_000
 RESTART = 0.05
 # Step sizes (s) for which inverses are stored.
 LADDER = 2.0 ** (0.5 * np.arange(-32, 7))
+# Kernels that the loops call, in the order of their addresses.
+KERNELS = ("derivative", "outputs", "second_order", "speeds")
+NEEDED_FOR = {
+    "second_order": "equations of motion can't be projected in the coordinates, nor weighed by "
+    "energy",
+    "speeds": "rates of the coordinates can't be turned into speeds",
+}
 REASONS = {
     1: f"more than {MOST_CALLS} evaluations of the right-hand side",
     2: "a state is not finite",
@@ -56,9 +63,11 @@ class DynamicModel:
     parameters
         Validated parameter set.
     kernels
-        Linked module of compiled kernels and loops.
+        Module of the model's compiled kernels.
+    loops
+        Module of compiled loops, the same for all dynamic models.
     kernel_hash
-        Hash of the kernels' source and of the compiler's versions.
+        Hash of the source of kernels and loops, and of the compiler's versions.
     constants
         Hoisted constants of the parameter set.
     initial
@@ -79,6 +88,7 @@ class DynamicModel:
     equations: DynamicEquations
     parameters: ParameterSet
     kernels: ModuleType
+    loops: ModuleType
     kernel_hash: str
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
@@ -116,6 +126,19 @@ class DynamicModel:
         return tuple(self.initial)
 
     @cached_property
+    def _machine(self) -> tuple[np.ndarray, np.ndarray]:
+        """What the loops call: constants and addresses of kernels, zero where there is none."""
+        machines = [getattr(self.kernels, f"_{name}_machine", None) for name in KERNELS]
+        addresses = [0 if machine is None else machine.address for machine in machines]
+        return self.constants, np.array(addresses, dtype=np.int64)
+
+    def require(self, *functions: str) -> None:
+        """Raise `InputError` if the model's equations lack one of these functions."""
+        for name in functions:
+            if name not in self.equations.program.functions:
+                raise InputError(f"{self.name} has no {name}: {NEEDED_FOR[name]}")
+
+    @cached_property
     def operation_counts(self) -> dict[str, dict[str, int]]:
         """Operations of each generated function, by kind and in total."""
         return operation_counts(reference_source(self.equations.program))
@@ -134,17 +157,14 @@ class DynamicModel:
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
         result = np.empty((len(states), len(self.outputs)))
-        self.kernels.output_path(
-            np.ascontiguousarray(states), np.ascontiguousarray(inputs), self.constants, result
-        )
+        self.loops.output_path(*self._paths(states, inputs), self._machine, result)
         return result
 
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
-        result = np.empty_like(states)
-        self.kernels.derivative_path(
-            np.ascontiguousarray(states), np.ascontiguousarray(inputs), self.constants, result
-        )
+        states, inputs = self._paths(states, inputs)
+        result = np.empty(states.shape)
+        self.loops.derivative_path(states, inputs, self._machine, result)
         return result
 
     def mass_matrix(self, x: Any) -> np.ndarray:
@@ -171,7 +191,7 @@ class DynamicModel:
         dim = len(y)
         nothing = np.zeros((1, len(self.inputs), 6))
         signal = (np.array([0.0, 1.0]), np.array([0, 1]), nothing)
-        space = (spaces.means[window], spaces.lifts[window], spaces.drops[window])
+        space = tuple(loop_array(part[window]) for part in spaces.arrays[:3])
         columns = []
         for j in range(dim):
             step = 1e-6 * max(1.0, abs(y[j]))
@@ -179,8 +199,8 @@ class DynamicModel:
             for sign in (1.0, -1.0):
                 shifted, image = y.copy(), np.empty(dim)
                 shifted[j] += sign * step
-                self.kernels.reduced_slope(
-                    spaces.form, 0.0, 0, shifted, dim, signal, *space, self.constants, image
+                self.loops.reduced_slope(
+                    spaces.form, 0.0, 0, shifted, dim, signal, *space, self._machine, image
                 )
                 sides.append(image)
             columns.append((sides[0] - sides[1]) / (2.0 * step))
@@ -190,7 +210,7 @@ class DynamicModel:
         """df/dx (2 n, 2 n) by central differences; columns of cyclic states are zero."""
         x, u = self._checked(x, 2 * len(self.coordinates), "x"), self._inputs(u)
         result = np.empty((len(x), len(x)))
-        self.kernels.jacobian_at(x, u, self.constants, self.active, result)
+        self.loops.jacobian_at(x, u, self._machine, self.active, result)
         return result
 
     @cached_property
@@ -203,9 +223,8 @@ class DynamicModel:
         jacobian = self.jacobian(x, np.zeros(len(self.inputs)))
         identity = np.eye(len(x))
         gamma = ROS34PW2.gamma
-        return np.stack(
-            [np.linalg.inv(identity - gamma * h * jacobian)[:, self.active].T for h in LADDER]
-        )
+        inverses = [np.linalg.inv(identity - gamma * h * jacobian) for h in LADDER]
+        return loop_array(np.stack([inverse[:, self.active].T for inverse in inverses]))
 
     def simulate(
         self,
@@ -284,6 +303,8 @@ class DynamicModel:
         frozen = solver == "ros34pw2"
         if frozen and spaces.form != system_loops.FULL:
             raise InputError("ros34pw2 freezes the full model's Jacobian: not for a reduced model")
+        if spaces.form == system_loops.COORDINATES:
+            self.require("second_order", "speeds")
         tableau = ROS34PW2 if frozen else RODAS4
         times = maneuver.times if times is None else np.asarray(times, dtype=float)
         signal = signal_of(maneuver)
@@ -297,27 +318,27 @@ class DynamicModel:
         arguments = (
             spaces.form,
             solver == "explicit",
-            np.ascontiguousarray(state, dtype=float),
-            edges,
+            loop_array(state),
+            loop_array(edges),
             segments,
             windows,
             *spaces.arrays,
             signal.arrays,
-            self.constants,
+            self._machine,
             self.typical,
-            (tolerance, longest_step or np.inf, MOST_CALLS),
+            (float(tolerance), float(longest_step or np.inf), MOST_CALLS),
             RESTART,
             tableau.arguments,
             frozen,
             active,
             LADDER,
             inverses,
-            times,
+            loop_array(times),
             path,
             counts,
         )
         began = time.perf_counter()
-        status, reached = self.kernels.run(*arguments)
+        status, reached = self.loops.run(*arguments)
         seconds = time.perf_counter() - began
         failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
         return self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
@@ -378,7 +399,17 @@ class DynamicModel:
         wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
         return f"off the ground for a time: {wheels}"
 
+    def _paths(self, states: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Paths as the loops want them; they read as many numbers as the model has."""
+        paths = loop_array(states), loop_array(inputs)
+        expected = 2 * len(self.coordinates), len(self.inputs)
+        for path, name, size in zip(paths, ("states", "inputs"), expected, strict=True):
+            if path.shape != (len(states), size):
+                raise InputError(f"{name} have shape {path.shape}, not ({len(states)}, {size})")
+        return paths
+
     def _call(self, function: str, x: Any, u: Any) -> np.ndarray:
+        self.require(function)
         x, u = self._checked(x, 2 * len(self.coordinates), "x"), self._inputs(u)
         result = np.empty(self.equations.program.functions[function].shape)
         work = np.zeros(self.kernels.WORK)
@@ -389,13 +420,18 @@ class DynamicModel:
         return self._checked(np.atleast_1d(u), len(self.inputs), "u")
 
     def _checked(self, value: Any, size: int, name: str) -> np.ndarray:
-        array = np.ascontiguousarray(value, dtype=float)
+        array = loop_array(value)
         if array.shape != (size,):
             raise InputError(f"{name} has shape {array.shape}, {self.name} needs ({size},)")
         if not np.isfinite(array).all():
             index = int(np.flatnonzero(~np.isfinite(array))[0])
             raise InputError(f"{name}[{index}] is not finite")
         return array
+
+
+def loop_array(values: Any) -> np.ndarray:
+    """Floats in the one kind of array that the loops are compiled for."""
+    return np.require(values, float, ("C", "A", "W"))
 
 
 def _names(quantities: Sequence[Quantity]) -> tuple[str, ...]:
@@ -406,17 +442,22 @@ def _names(quantities: Sequence[Quantity]) -> tuple[str, ...]:
 def _compiled(name: str) -> tuple[DynamicEquations, ModuleType, str]:
     """Equations and compiled kernels of a registered model; parameters play no part here."""
     equations: DynamicEquations = component("model", name).derive()
-    sizes = {
-        "N": len(equations.coordinates),
-        "INPUTS": len(equations.inputs),
-        "OUTPUTS": len(equations.outputs),
-        "WORK": work_size(equations.program),
-    }
-    loops = [system_loops, explicit_loops, rosenbrock_loops, run_loops]
-    source = linked_source(
-        kernel_source(equations.program), loops, sizes, f"model {name}", False, direct=True
-    )
-    return equations, load_module(name, source), kernel_hash(source)
+    sizes = {"WORK": work_size(equations.program)}
+    source = kernels_source(kernel_source(equations.program), sizes, f"model {name}")
+    digest = kernel_hash(f"{source}\n{_loops_text()}")
+    return equations, load_module(name, source), digest
+
+
+@cache
+def _loops_text() -> str:
+    modules = [system_loops, explicit_loops, rosenbrock_loops, run_loops]
+    return loops_source(modules, "the loops of dynamic models")
+
+
+@cache
+def loops_module() -> ModuleType:
+    """Compiled loops that run every dynamic model."""
+    return load_module("dynamic_loops", _loops_text())
 
 
 def build(
@@ -448,6 +489,7 @@ def build(
         equations,
         parameters,
         kernels,
+        loops_module(),
         digest,
         constants,
         definition.starts(values),

@@ -4,10 +4,18 @@ import math
 
 import numpy as np
 
-from vehiclemor.codegen.stubs import INPUTS, WORK, N, derivative, outputs
 from vehiclemor.simulation.explicit_loops import explicit_span
 from vehiclemor.simulation.rosenbrock_loops import rosenbrock_span
-from vehiclemor.simulation.system_loops import COORDINATES, input_at, lifted, projected, slope
+from vehiclemor.simulation.system_loops import (
+    COORDINATES,
+    derivative,
+    input_at,
+    lifted,
+    outputs,
+    projected,
+    scratch_space,
+    slope,
+)
 
 
 def run(
@@ -42,7 +50,7 @@ def run(
     span_edges, span_segments, span_windows
         Edges (spans + 1,) in s, and for each span its segment of the signal and its window.
     means, lifts, drops, ranks
-        Windows' means (W, 2 N), bases (W, R, 2 N) by rows, projections (W, R, 2 N), dimensions (W).
+        Windows' means (W, 2 n), bases (W, R, 2 n) by rows, projections (W, R, 2 n), dimensions (W).
     restart
         Longest first step (s) of a span that begins at a break point of the inputs.
 
@@ -51,15 +59,9 @@ def run(
     tuple
         Status (0 if all went well) and the time that was reached.
     """
-    x = np.empty(2 * N)
-    scratch = (
-        np.empty(2 * N),
-        np.zeros(INPUTS),
-        np.empty(2 * N),
-        np.zeros(WORK),
-        np.empty((N, N + 1)),
-        np.empty((N, N + 1)),
-    )
+    states = len(start)
+    x = np.empty(states)
+    scratch = scratch_space(states, signal[2].shape[1])
     largest = 0
     for w in range(len(ranks)):
         if ranks[w] > largest:
@@ -73,7 +75,7 @@ def run(
         np.empty(largest, dtype=np.int64),
     )
     y = np.empty(largest)
-    for i in range(2 * N):
+    for i in range(states):
         x[i] = start[i]
     sample, window, step, segment = 0, -1, 0.0, -1
     space, dim = (means[0], lifts[0], drops[0]), ranks[0]
@@ -90,7 +92,7 @@ def run(
             if sample == 0:
                 while sample < len(samples) and samples[sample] <= t:
                     lifted(form, y, dim, space, model, scratch, scratch[0])
-                    for i in range(2 * N):
+                    for i in range(states):
                         path[sample, i] = scratch[0][i]
                     sample += 1
         if segment >= 0 and span_segments[span] != segment:
@@ -146,67 +148,45 @@ def run(
         if status != 0:
             return status, t
         lifted(form, y, dim, space, model, scratch, x)
-        for i in range(2 * N):
+        for i in range(states):
             if not math.isfinite(x[i]):
                 return 2, t
     return 0, t
 
 
 def output_path(path, inputs, model, result):
-    """Outputs at every sample of a path of states into result (samples, OUTPUTS)."""
-    work = np.zeros(WORK)
+    """Outputs at every sample of a path of states into result (samples, outputs)."""
     for sample in range(len(path)):
-        x, u = path[sample], inputs[sample]
-        outputs(x, u, model, result[sample])
+        outputs(path[sample], inputs[sample], model, result[sample])
 
 
 def derivative_path(path, inputs, model, result):
-    """State derivatives at every sample of a path into result (samples, 2 N)."""
-    work = np.zeros(WORK)
+    """State derivatives at every sample of a path into result (samples, 2 n)."""
     for sample in range(len(path)):
         derivative(path[sample], inputs[sample], model, result[sample])
 
 
 def jacobian_at(x, u, model, active, result):
-    """Columns of df/dx (2 N, 2 N) by central differences; inactive ones are zero."""
-    work, shifted = np.zeros(WORK), np.empty(2 * N)
-    above, below = np.empty(2 * N), np.empty(2 * N)
-    for i in range(2 * N):
-        for j in range(2 * N):
+    """Columns of df/dx (2 n, 2 n) by central differences; inactive ones are zero."""
+    size = len(x)
+    vectors = np.empty((3, size))
+    shifted, above, below = vectors[0], vectors[1], vectors[2]
+    for i in range(size):
+        for j in range(size):
             result[i, j] = 0.0
     for column in active:
         change = 6e-6 * max(abs(x[column]), 1.0)
-        for i in range(2 * N):
+        for i in range(size):
             shifted[i] = x[i]
         shifted[column] = x[column] + change
         derivative(shifted, u, model, above)
         shifted[column] = x[column] - change
         derivative(shifted, u, model, below)
-        for i in range(2 * N):
+        for i in range(size):
             result[i, column] = (above[i] - below[i]) / (2.0 * change)
 
 
 def reduced_slope(form, t, segment, y, dim, signal, mean, lift, drop, model, dy):
     """Right-hand side of one window's reduced system at reduced coordinates y (dim)."""
-    scratch = (
-        np.empty(2 * N),
-        np.zeros(INPUTS),
-        np.empty(2 * N),
-        np.zeros(WORK),
-        np.empty((N, N + 1)),
-        np.empty((N, N + 1)),
-    )
+    scratch = scratch_space(len(mean), signal[2].shape[1])
     slope(form, t, segment, y, dim, signal, (mean, lift, drop), model, scratch, dy)
-
-
-def reduced_coordinates(form, x, dim, u, mean, lift, drop, model, y):
-    """Reduced coordinates y (dim) of a state x in one window."""
-    scratch = (
-        np.empty(2 * N),
-        u,
-        np.empty(2 * N),
-        np.zeros(WORK),
-        np.empty((N, N + 1)),
-        np.empty((N, N + 1)),
-    )
-    projected(form, x, dim, (mean, lift, drop), model, scratch, y)

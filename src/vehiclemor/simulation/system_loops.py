@@ -11,9 +11,9 @@ COORDINATES
     mass matrix, V the first rows of `lift`.
 
 `model` is (constants, addresses): the parameters' constants, and where the machine code of the
-model's kernels begins, zero where it has none.  So these loops are compiled once for all models, and
-sizes are lengths of arrays.  `signal` is (edges, first, coefficients) of the inputs, `space` (mean,
-lift, drop) of the window, `scratch` (x, u, dx, matrix, small).
+model's kernels begins, zero where it has none.  So these loops are compiled once for all models,
+and sizes are lengths of arrays.  `signal` is (edges, first, coefficients) of the inputs, `space`
+(mean, lift, drop) of the window, `scratch` (x, u, dx, matrix, small).
 """
 
 import math
@@ -29,22 +29,22 @@ COORDINATES = 2
 
 def derivative(x, u, model, result):
     """State derivative f(x, u) into result (2 n,)."""
-    call_machine(model[1][0], (x, u, model[0], result))
+    call_machine(model, 0, x, u, result)
 
 
 def outputs(x, u, model, result):
     """Outputs y(x, u) into result."""
-    call_machine(model[1][1], (x, u, model[0], result))
+    call_machine(model, 1, x, u, result)
 
 
 def second_order(x, u, model, result):
     """Mass matrix into result[:, :n] and forces into result[:, n]; result is (n, n + 1)."""
-    call_machine(model[1][2], (x, u, model[0], result))
+    call_machine(model, 2, x, u, result)
 
 
 def speeds(x, u, model, result):
     """Speeds into result (n,) or longer, where x holds rates of the coordinates in their place."""
-    call_machine(model[1][3], (x, u, model[0], result))
+    call_machine(model, 3, x, u, result)
 
 
 def scratch_space(states, inputs):
@@ -82,49 +82,51 @@ def input_at(t, segment, signal, u):
 
 
 def lifted(form, y, dim, space, model, scratch, x):
-    """State x (2 N) of reduced coordinates y (dim)."""
+    """State x (2 n) of reduced coordinates y (dim)."""
     mean, lift, _ = space
+    n = len(x) // 2
     if form == FULL:
         for i in range(dim):
             x[i] = y[i]
         return
     if form == STATE:
-        for i in range(2 * N):
+        for i in range(2 * n):
             x[i] = mean[i]
         for j in range(dim):
-            for i in range(2 * N):
+            for i in range(2 * n):
                 x[i] += lift[j, i] * y[j]
         return
     positions_and_rates(y, dim, space, x)
     _, u, dx, _, _ = scratch
     speeds(x, u, model, dx)
-    for i in range(N):
-        x[N + i] = dx[i]
+    for i in range(n):
+        x[n + i] = dx[i]
 
 
 def positions_and_rates(y, dim, space, x):
-    """Coordinates and their rates, in place of the speeds, of y = (a, b) into x (2 N)."""
+    """Coordinates and their rates, in place of the speeds, of y = (a, b) into x (2 n)."""
     mean, lift, _ = space
-    r = dim // 2
-    for i in range(N):
+    n, r = len(x) // 2, dim // 2
+    for i in range(n):
         x[i] = mean[i]
-        x[N + i] = 0.0
+        x[n + i] = 0.0
     for j in range(r):
-        for i in range(N):
+        for i in range(n):
             x[i] += lift[j, i] * y[j]
-            x[N + i] += lift[j, i] * y[r + j]
+            x[n + i] += lift[j, i] * y[r + j]
 
 
 def projected(form, x, dim, space, model, scratch, y):
-    """Reduced coordinates y (dim) of a state x (2 N); one derivative in form COORDINATES."""
+    """Reduced coordinates y (dim) of a state x (2 n); one derivative in form COORDINATES."""
     mean, _, drop = space
+    n = len(x) // 2
     if form == FULL:
         for i in range(dim):
             y[i] = x[i]
     elif form == STATE:
         for j in range(dim):
             total = 0.0
-            for i in range(2 * N):
+            for i in range(2 * n):
                 total += drop[j, i] * (x[i] - mean[i])
             y[j] = total
     else:
@@ -133,7 +135,7 @@ def projected(form, x, dim, space, model, scratch, y):
         derivative(x, u, model, dx)
         for j in range(r):
             total, rate = 0.0, 0.0
-            for i in range(N):
+            for i in range(n):
                 total += drop[j, i] * (x[i] - mean[i])
                 rate += drop[j, i] * dx[i]
             y[j] = total
@@ -152,7 +154,7 @@ def slope(form, t, segment, y, dim, signal, space, model, scratch, dy):
         drop = space[2]
         for j in range(dim):
             total = 0.0
-            for i in range(2 * N):
+            for i in range(len(dx)):
                 total += drop[j, i] * dx[i]
             dy[j] = total
     else:
@@ -167,21 +169,22 @@ def slope(form, t, segment, y, dim, signal, space, model, scratch, dy):
 
 def galerkin(r, lift, matrix, image, small):
     """Solve (V^T M V) a = V^T F; V^T are the rows of lift; a replaces column r of small."""
+    n = len(matrix)
     for k in range(r):
-        for i in range(N):
+        for i in range(n):
             image[i] = 0.0
         # M is symmetric: its rows are its columns.
-        for j in range(N):
+        for j in range(n):
             weight = lift[k, j]
-            for i in range(N):
+            for i in range(n):
                 image[i] += matrix[j, i] * weight
         total = 0.0
-        for i in range(N):
-            total += lift[k, i] * matrix[i, N]
+        for i in range(n):
+            total += lift[k, i] * matrix[i, n]
         small[k, r] = total
         for j in range(k + 1):
             total = 0.0
-            for i in range(N):
+            for i in range(n):
                 total += lift[j, i] * image[i]
             small[k, j] = total
     # Cholesky: V^T M V is positive definite.
@@ -214,6 +217,7 @@ def error_norm(form, error, y, dim, space, typical, tolerance):
     In a subspace the error is lifted first, so that a tolerance means the same in every form.
     """
     mean, lift, _ = space
+    n = len(typical) // 2
     largest = 0.0
     if form == FULL:
         for i in range(dim):
@@ -221,7 +225,7 @@ def error_norm(form, error, y, dim, space, typical, tolerance):
             if not ratio <= largest:
                 largest = ratio
     elif form == STATE:
-        for i in range(2 * N):
+        for i in range(2 * n):
             value, change = mean[i], 0.0
             for j in range(dim):
                 value += lift[j, i] * y[j]
@@ -231,7 +235,7 @@ def error_norm(form, error, y, dim, space, typical, tolerance):
                 largest = ratio
     else:
         r = dim // 2
-        for i in range(N):
+        for i in range(n):
             value, change, rate, drift = mean[i], 0.0, 0.0, 0.0
             for j in range(r):
                 value += lift[j, i] * y[j]
@@ -241,7 +245,7 @@ def error_norm(form, error, y, dim, space, typical, tolerance):
             ratio = abs(change) / (typical[i] + abs(value))
             if not ratio <= largest:
                 largest = ratio
-            ratio = abs(drift) / (typical[N + i] + abs(rate))
+            ratio = abs(drift) / (typical[n + i] + abs(rate))
             if not ratio <= largest:
                 largest = ratio
     return largest / tolerance
