@@ -63,7 +63,9 @@ def test_every_published_number_has_a_row(rows):
 
 
 def test_verdicts_follow_from_the_numbers(rows):
-    errors = rows[rows["item"].str.contains("RMS error of the") & (rows["verdict"] != "not_comparable")]
+    errors = rows[
+        rows["item"].str.contains("RMS error of the") & (rows["verdict"] != "not_comparable")
+    ]
     assert len(errors) == 4 + 8
     for row in errors.to_dict("records"):
         assert (row["verdict"] == "met") == (row["reproduced"] <= row["published"])

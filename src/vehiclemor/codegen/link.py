@@ -58,7 +58,8 @@ def linked_source(
 def loops_source(loops: Sequence[ModuleType], origin: str) -> str:
     """Source text of a module with loops that call kernels by their addresses.
 
-    Only the functions of one line, which call the kernels, are inlined by order: with others,
+    Functions of one line, which call the kernels, are inlined by order, and those that a module of
+    loops names in `INLINED`: arrays cost more to pass than short functions take.  With others,
     machine code and compile time would multiply.
     """
     lines = [
@@ -67,7 +68,7 @@ def loops_source(loops: Sequence[ModuleType], origin: str) -> str:
         "from vehiclemor.codegen.straight_line import call_machine",
         *_writer(),
         "",
-        *(_decorated(_functions(module), 1) for module in loops),
+        *(_decorated(_functions(module), 1, getattr(module, "INLINED", ())) for module in loops),
     ]
     return "\n".join(lines) + "\n"
 
@@ -139,11 +140,12 @@ def _is_number(value: ast.expr) -> bool:
     return all(isinstance(node, allowed) for node in ast.walk(value))
 
 
-def _decorated(text: str, longest: int) -> str:
+def _decorated(text: str, longest: int, inlined: Sequence[str] = ()) -> str:
     parts: list[str] = []
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
-            parts.append(f"@{COMPILE}{_inlining(node, longest)})")
+            lines = len(node.body) if node.name in inlined else longest
+            parts.append(f"@{COMPILE}{_inlining(node, max(lines, longest))})")
         parts.append(ast.unparse(node))
     return "\n".join(parts) + "\n"
 

@@ -337,6 +337,10 @@ class DynamicModel:
             path,
             counts,
         )
+        if not self.loops.run.signatures:
+            # Compile, or load machine code, outside of the time that is measured.
+            moment = (loop_array(np.array([0.0, 1e-9])), segments[:1].copy(), windows[:1].copy())
+            self.loops.run(*arguments[:3], *moment, *arguments[6:-2], path.copy(), counts.copy())
         began = time.perf_counter()
         status, reached = self.loops.run(*arguments)
         seconds = time.perf_counter() - began

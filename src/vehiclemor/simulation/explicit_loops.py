@@ -5,7 +5,7 @@ J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Compu
 Ordinary Differential Equations I (2nd ed., Springer 1993), sections II.4 to II.6.
 """
 
-from vehiclemor.simulation.system_loops import error_norm, lifted, slope
+from vehiclemor.simulation.system_loops import error_norm, lifted, slope, slope_apart
 
 A21 = 1 / 5
 A31, A32 = 3 / 40, 9 / 40
@@ -68,19 +68,11 @@ def explicit_span(
     """
     t, end = times
     tolerance, longest, most_calls = limits
-    k1, k2, k3, k4, k5, k6, k7, mid, new = (
-        vectors[0],
-        vectors[1],
-        vectors[2],
-        vectors[3],
-        vectors[4],
-        vectors[5],
-        vectors[6],
-        vectors[7],
-        vectors[8],
-    )
+    k1, k7, mid, new = vectors[0], vectors[6], vectors[7], vectors[8]
+    # Stages as rows of one array: so the compiler sees few arrays that might overlap.
+    k = vectors
     state = scratch[0]
-    slope(form, t, segment, y, dim, signal, space, model, scratch, k1)
+    slope_apart(form, t, segment, y, dim, signal, space, model, scratch, k1)
     counts[0] += 1
     if step <= 0.0:
         # The slope changes the state by a hundredth of its typical size, at most.
@@ -98,30 +90,53 @@ def explicit_span(
             h = end - t
         if not h > 1e-14 * (1.0 + abs(t)):
             return 4, t, step, sample
+        for stage in range(1, 7):
+            if stage == 1:
+                moment = t + 0.2 * h
+                for i in range(dim):
+                    mid[i] = y[i] + h * (A21 * k[0, i])
+            elif stage == 2:
+                moment = t + 0.3 * h
+                for i in range(dim):
+                    mid[i] = y[i] + h * (A31 * k[0, i] + A32 * k[1, i])
+            elif stage == 3:
+                moment = t + 0.8 * h
+                for i in range(dim):
+                    mid[i] = y[i] + h * (A41 * k[0, i] + A42 * k[1, i] + A43 * k[2, i])
+            elif stage == 4:
+                moment = t + 8 / 9 * h
+                for i in range(dim):
+                    mid[i] = y[i] + h * (
+                        A51 * k[0, i] + A52 * k[1, i] + A53 * k[2, i] + A54 * k[3, i]
+                    )
+            elif stage == 5:
+                moment = t + h
+                for i in range(dim):
+                    mid[i] = y[i] + h * (
+                        A61 * k[0, i]
+                        + A62 * k[1, i]
+                        + A63 * k[2, i]
+                        + A64 * k[3, i]
+                        + A65 * k[4, i]
+                    )
+            else:
+                moment = t + h
+                for i in range(dim):
+                    mid[i] = y[i] + h * (
+                        B1 * k[0, i] + B3 * k[2, i] + B4 * k[3, i] + B5 * k[4, i] + B6 * k[5, i]
+                    )
+            slope(form, moment, segment, mid, dim, signal, space, model, scratch, vectors[stage])
         for i in range(dim):
-            mid[i] = y[i] + h * (A21 * k1[i])
-        slope(form, t + 0.2 * h, segment, mid, dim, signal, space, model, scratch, k2)
-        for i in range(dim):
-            mid[i] = y[i] + h * (A31 * k1[i] + A32 * k2[i])
-        slope(form, t + 0.3 * h, segment, mid, dim, signal, space, model, scratch, k3)
-        for i in range(dim):
-            mid[i] = y[i] + h * (A41 * k1[i] + A42 * k2[i] + A43 * k3[i])
-        slope(form, t + 0.8 * h, segment, mid, dim, signal, space, model, scratch, k4)
-        for i in range(dim):
-            mid[i] = y[i] + h * (A51 * k1[i] + A52 * k2[i] + A53 * k3[i] + A54 * k4[i])
-        slope(form, t + 8 / 9 * h, segment, mid, dim, signal, space, model, scratch, k5)
-        for i in range(dim):
-            mid[i] = y[i] + h * (
-                A61 * k1[i] + A62 * k2[i] + A63 * k3[i] + A64 * k4[i] + A65 * k5[i]
-            )
-        slope(form, t + h, segment, mid, dim, signal, space, model, scratch, k6)
-        for i in range(dim):
-            new[i] = y[i] + h * (B1 * k1[i] + B3 * k3[i] + B4 * k4[i] + B5 * k5[i] + B6 * k6[i])
-        slope(form, t + h, segment, new, dim, signal, space, model, scratch, k7)
+            new[i] = mid[i]
         counts[0] += 6
         for i in range(dim):
             mid[i] = h * (
-                E1 * k1[i] + E3 * k3[i] + E4 * k4[i] + E5 * k5[i] + E6 * k6[i] + E7 * k7[i]
+                E1 * k[0, i]
+                + E3 * k[2, i]
+                + E4 * k[3, i]
+                + E5 * k[4, i]
+                + E6 * k[5, i]
+                + E7 * k[6, i]
             )
         error = error_norm(form, mid, new, dim, space, typical, tolerance)
         if not error <= 1.0:
@@ -140,10 +155,15 @@ def explicit_span(
             z = (samples[sample] - t) / h
             for i in range(dim):
                 difference = new[i] - y[i]
-                bend = h * k1[i] - difference
-                back = difference - h * k7[i] - bend
+                bend = h * k[0, i] - difference
+                back = difference - h * k[6, i] - bend
                 last = h * (
-                    D1 * k1[i] + D3 * k3[i] + D4 * k4[i] + D5 * k5[i] + D6 * k6[i] + D7 * k7[i]
+                    D1 * k[0, i]
+                    + D3 * k[2, i]
+                    + D4 * k[3, i]
+                    + D5 * k[4, i]
+                    + D6 * k[5, i]
+                    + D7 * k[6, i]
                 )
                 mid[i] = y[i] + z * (difference + (1 - z) * (bend + z * (back + (1 - z) * last)))
             lifted(form, mid, dim, space, model, scratch, state)
@@ -160,7 +180,7 @@ def explicit_span(
             rejected = False
         for i in range(dim):
             y[i] = new[i]
-            k1[i] = k7[i]
+            k[0, i] = k[6, i]
         whole = t + 1.0001 * h <= end
         t += h
         # A step that was cut at the end of the span says nothing against longer ones.

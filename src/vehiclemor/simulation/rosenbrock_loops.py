@@ -6,7 +6,7 @@ Differential Equations II (2nd ed., Springer 1996), section IV.7:
     (I / (gamma h) - A) U_i = f(t + alpha_i h, y + sum a_ij U_j) + sum c_ij / h U_j + d_i h f_t
 """
 
-from vehiclemor.simulation.system_loops import FULL, error_norm, lifted, slope
+from vehiclemor.simulation.system_loops import FULL, error_norm, lifted, slope, slope_apart
 
 
 def difference_jacobian(
@@ -24,7 +24,7 @@ def difference_jacobian(
         change = 1.5e-8 * max(abs(y[column]), 1.0)
         shifted[column] = y[column] + change
         change = shifted[column] - y[column]
-        slope(form, t, segment, shifted, dim, signal, space, model, scratch, image)
+        slope_apart(form, t, segment, shifted, dim, signal, space, model, scratch, image)
         for i in range(dim):
             jacobian[i, column] = (image[i] - f[i]) / change
 
@@ -135,7 +135,7 @@ def rosenbrock_span(
         vectors[6],
     )
     state = scratch[0]
-    slope(form, t, segment, y, dim, signal, space, model, scratch, f)
+    slope_apart(form, t, segment, y, dim, signal, space, model, scratch, f)
     counts[0] += 1
     if step <= 0.0:
         size = error_norm(form, f, y, dim, space, typical, 1.0)
@@ -180,7 +180,7 @@ def rosenbrock_span(
                     jacobian,
                 )
                 later = 1e-7 * (1.0 + abs(t))
-                slope(form, t + later, segment, y, dim, signal, space, model, scratch, f_t)
+                slope_apart(form, t + later, segment, y, dim, signal, space, model, scratch, f_t)
                 for i in range(dim):
                     f_t[i] = (f_t[i] - f[i]) / later
                 counts[0] += min(len(active), dim) + 1
@@ -247,7 +247,7 @@ def rosenbrock_span(
             continue
         counts[1] += 1
         whole = t + 1.0001 * h <= end
-        slope(form, t + h, segment, new, dim, signal, space, model, scratch, f_new)
+        slope_apart(form, t + h, segment, new, dim, signal, space, model, scratch, f_new)
         counts[0] += 1
         # Cubic Hermite interpolation between the ends of the step.
         while sample < len(samples) and samples[sample] <= t + h + 1e-12 * (1.0 + abs(t)):

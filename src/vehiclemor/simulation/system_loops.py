@@ -22,6 +22,8 @@ import numpy as np
 
 from vehiclemor.codegen.stubs import call_machine
 
+# One place in each integrator calls them for all stages of a step.
+INLINED = ("slope", "lifted", "input_at", "positions_and_rates", "galerkin", "product")
 FULL = 0
 STATE = 1
 COORDINATES = 2
@@ -167,17 +169,37 @@ def slope(form, t, segment, y, dim, signal, space, model, scratch, dy):
             dy[r + j] = small[j, r]
 
 
+def slope_apart(form, t, segment, y, dim, signal, space, model, scratch, dy):
+    """The same as `slope`, not inlined: for places that are not in every stage."""
+    slope(form, t, segment, y, dim, signal, space, model, scratch, dy)
+
+
+def product(n, matrix, row, lift, image):
+    """Product of the first n columns of a symmetric matrix with a row of lift into image (n)."""
+    for i in range(n):
+        image[i] = 0.0
+    # Four rows at a time: a loop over a dozen places costs as much to enter as to run.
+    j = 0
+    while j + 3 < n:
+        a, b, c, d = lift[row, j], lift[row, j + 1], lift[row, j + 2], lift[row, j + 3]
+        for i in range(n):
+            image[i] += (matrix[j, i] * a + matrix[j + 1, i] * b) + (
+                matrix[j + 2, i] * c + matrix[j + 3, i] * d
+            )
+        j += 4
+    while j < n:
+        a = lift[row, j]
+        for i in range(n):
+            image[i] += matrix[j, i] * a
+        j += 1
+
+
 def galerkin(r, lift, matrix, image, small):
     """Solve (V^T M V) a = V^T F; V^T are the rows of lift; a replaces column r of small."""
     n = len(matrix)
     for k in range(r):
-        for i in range(n):
-            image[i] = 0.0
         # M is symmetric: its rows are its columns.
-        for j in range(n):
-            weight = lift[k, j]
-            for i in range(n):
-                image[i] += matrix[j, i] * weight
+        product(n, matrix, k, lift, image)
         total = 0.0
         for i in range(n):
             total += lift[k, i] * matrix[i, n]
