@@ -115,8 +115,8 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
     size = full.outputs.max(axis=0) - full.outputs.min(axis=0)
     moving = size > 0.0
     error = np.abs(run.outputs - full.outputs).max(axis=0)
-    # In equations of motion errors accumulate; vertical speed, tire forces and slips follow the fast
-    # modes, which three vectors don't hold.
+    # In equations of motion errors accumulate; vertical speed, tire forces and slips follow the
+    # fast modes, which three vectors don't hold.
     bound = 0.01 if pair.model.kind == "ae" else 0.05
     fast = ("vertical_speed", "_FL", "_FR", "_RL", "_RR")
     chosen = moving & np.array([not name.endswith(fast) for name in pair.model.outputs])

@@ -93,7 +93,7 @@ def test_published_bounds_of_the_suspension_are_met(rows):
 
 
 def test_published_bounds_of_the_vehicle_are_met_by_the_default(rows):
-    vehicle = rows[(rows["model"] == "independent_suspension_vehicle")]
+    vehicle = rows[rows["model"] == "independent_suspension_vehicle"]
     errors = vehicle[vehicle["item"].str.contains("RMS error of the")]
     default = errors[errors["item"].str.contains("default")]
     assert len(default) == 4
@@ -140,8 +140,8 @@ def test_break_even_is_the_training_over_what_a_run_saves(results_folder, model)
 
 def test_counts_of_the_vehicle(results_folder):
     table = cost_table("independent_suspension_vehicle", results_folder)
-    for start, rows in table.groupby("start"):
-        rows = rows.set_index("contestant")
+    for start, part in table.groupby("start"):
+        rows = part.set_index("contestant")
         explicit, best = rows.loc["full order, explicit"], rows.loc["full order, strongest"]
         assert rows.loc["pod r=3", "rhs_calls"] < 0.25 * explicit["rhs_calls"], start
         assert best["rhs_calls"] < 0.05 * explicit["rhs_calls"], start

@@ -1,4 +1,4 @@
-"""Projected equations of motion: exact in the whole space, energy kept, only the subspace counts."""
+"""Projected equations of motion: exact in the whole space; only the subspace counts."""
 
 from dataclasses import replace
 

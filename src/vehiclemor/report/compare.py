@@ -65,7 +65,7 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     for number in published.numbers.values():
         if number.kind not in ("rms_error", "time_reduction"):
             continue
-        if number.model not in names("model"):
+        if number.model is None or number.model not in NOMINAL:
             rows.append(_absent_row(number))
         elif number.kind == "rms_error":
             rows += _error_rows(number, results)

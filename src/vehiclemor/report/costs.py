@@ -88,8 +88,8 @@ def _printed(model: str, folder: Path) -> str:
     for start in starts:
         if len(starts) > 1:
             lines.append(f"start {start}")
-        for row in table[table["start"] == start].to_dict("records"):
-            lines.append(_line(row, race.counts, race.errors))
+        rows = table.loc[table["start"] == start].to_dict(orient="records")
+        lines += [_line(dict(row), race.counts, race.errors) for row in rows]
     return "\n".join(lines)
 
 

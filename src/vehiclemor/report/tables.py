@@ -85,7 +85,7 @@ def settings_table(results: Path, jobs: int = 1) -> pd.DataFrame:
 def _flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:
     """One row for each cell of a study: its place in the grid, errors, counts, status."""
     grid = list(dataset["status"].dims)
-    kept = ["effective_rank", *DYNAMIC_COUNTS, *ALGEBRAIC_COUNTS, "growth_rate"]
+    kept = ["effective_rank", *(DYNAMIC_COUNTS | ALGEBRAIC_COUNTS), "growth_rate"]
     scalars = [name for name in kept if name in dataset]
     table = dataset[[*scalars, "status", "message"]].to_dataframe().reset_index()
     for output in outputs:

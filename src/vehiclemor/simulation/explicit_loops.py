@@ -68,7 +68,7 @@ def explicit_span(
     """
     t, end = times
     tolerance, longest, most_calls = limits
-    k1, k7, mid, new = vectors[0], vectors[6], vectors[7], vectors[8]
+    k1, mid, new = vectors[0], vectors[7], vectors[8]
     # Stages as rows of one array: so the compiler sees few arrays that might overlap.
     k = vectors
     state = scratch[0]

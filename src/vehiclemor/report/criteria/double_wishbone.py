@@ -8,8 +8,10 @@ import numpy as np
 from scipy.linalg import subspace_angles
 
 from vehiclemor.reduction import pod
+from vehiclemor.reduction.projected import fit_windows
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.windows import window_edges
 from vehiclemor.registry import component
 from vehiclemor.report.criteria.finding import (
     INDISTINGUISHABLE,
@@ -23,7 +25,7 @@ from vehiclemor.report.criteria.finding import (
     not_visible,
     relative_rms,
 )
-from vehiclemor.simulation.model import build
+from vehiclemor.simulation.algebraic import build
 
 # Largest principal angle (rad) up to which two subspaces count as similar.
 SIMILAR_SUBSPACES = 0.1
@@ -90,10 +92,11 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     model = build("double_wishbone")
     maneuver = component("maneuver", component("model", model.name).MANEUVER)
     settings = validated("pod", pod.settings(model.kind), {"rank": 3})
+    edges = window_edges(maneuver.duration, float(settings["control_period"]))
     bases = {}
     for name, factors in {"nominal": (1, 1), "amplitude": (1, 1.2), "frequency": (1.2, 1)}.items():
         runs = training_runs(model, maneuver.perturbed(*factors), model.starts[0], "matched")
-        bases[name] = pod.fit(model, runs, settings).bases
+        bases[name] = fit_windows(model, runs, edges, settings).bases
 
     def angle(other: str) -> float:
         pairs = zip(bases["nominal"], bases[other], strict=True)
