@@ -1,6 +1,7 @@
 """Small reference results of the 14-DOF vehicle, and how they are made.
 
-`python -m tests.reference.vehicle_results` writes it anew (`data/reference`).  Do that only when a change of results is meant, and say so in the commit and the changelog.
+`python -m tests.reference.vehicle_results` writes the file in `data/reference` anew.  Do that only
+when a change of results is meant, and say so in the commit and the changelog.
 """
 
 import json

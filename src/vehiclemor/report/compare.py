@@ -77,7 +77,7 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
         if name in CRITERIA:
             rows += [_claim_row(name, claim, results, label) for label in VARIANTS]
         elif name == "dw_fig14_six_slower_than_three":
-            rows.append(_six_slower_row(claim, _of_start(costs[claim.model])))
+            rows.append(_six_slower_row(claim, _of_start(costs["double_wishbone"])))
         elif claim.model in names("model") and claim.kind != "setup":
             rows.append(_untested_row(claim))
     return pd.DataFrame(rows, columns=list(COLUMNS))
