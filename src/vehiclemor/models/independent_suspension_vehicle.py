@@ -161,8 +161,7 @@ def derived(p: Mapping[str, Any]) -> Derived:
 def check(p: Mapping[str, Any]) -> None:
     """Raise `GeometryError` if the vehicle can't stand on its four wheels."""
     d = derived(p)
-    for name, distance, other in zip(("front", "rear"), d.sprung_distance, "rb", strict=True):
-        del other
+    for name, distance in zip(("front", "rear"), d.sprung_distance, strict=True):
         if distance <= 0.0:
             away = "rear" if name == "front" else "front"
             raise GeometryError(

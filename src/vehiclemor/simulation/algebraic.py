@@ -27,6 +27,7 @@ from vehiclemor.models.equations import AlgebraicEquations
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import newton_loops, projected_loops
+from vehiclemor.simulation.checks import check_inputs, checked_array
 from vehiclemor.simulation.reach import reachable_range
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
 
@@ -133,21 +134,21 @@ class AlgebraicModel:
 
     def residual(self, q: Any, u: Any) -> np.ndarray:
         """Residual Phi(q; u), shape (n,)."""
-        q, u = self._checked(q, len(self.coordinates), "q"), self._checked(u, len(self.inputs), "u")
+        q, u = self._coordinates(q), self._inputs(u)
         result = np.empty(len(q))
         self.kernels.residual(q, u, self.constants, self._work(), result)
         return result
 
     def jacobian(self, q: Any, u: Any) -> np.ndarray:
         """Analytic Jacobian of the residual with respect to q, shape (n, n)."""
-        q, u = self._checked(q, len(self.coordinates), "q"), self._checked(u, len(self.inputs), "u")
+        q, u = self._coordinates(q), self._inputs(u)
         result = np.empty((len(q), len(q) + 1))
         self.kernels.residual_jacobian(q, u, self.constants, self._work(), result)
         return result[:, :-1].copy()
 
     def newton_step(self, q: Any, u: Any) -> np.ndarray:
         """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
-        q, u = self._checked(q, len(self.coordinates), "q"), self._checked(u, len(self.inputs), "u")
+        q, u = self._coordinates(q), self._inputs(u)
         result = np.empty(len(q))
         self.kernels.newton_step(q, u, self.constants, self._work(), result)
         return result
@@ -163,7 +164,7 @@ class AlgebraicModel:
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
         result = np.empty(self.equations.program.functions["joints"].shape)
-        q, u = self._checked(q, len(self.coordinates), "q"), np.zeros(len(self.inputs))
+        q, u = self._coordinates(q), np.zeros(len(self.inputs))
         self.kernels.joints(q, u, self.constants, self._work(), result)
         return dict(zip(self.equations.joints, result, strict=True))
 
@@ -175,7 +176,7 @@ class AlgebraicModel:
         UnreachableError
             If the mechanism can't reach the height; the reachable range is named.
         """
-        inputs = self._checked(u, len(self.inputs), "u")[None, :]
+        inputs = self._inputs(u)[None, :]
         return self.solve_path(np.zeros(1), inputs).coordinates[0]
 
     def reach(self, rack: float = 0.0) -> tuple[float, float]:
@@ -217,11 +218,7 @@ class AlgebraicModel:
         ConvergenceError
             If an iteration fails; time and reachable range are named.
         """
-        if maneuver.inputs != self.inputs:
-            raise InputError(
-                f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
-                f"{self.name} needs {', '.join(self.inputs)}"
-            )
+        check_inputs(maneuver, self.name, self.inputs)
         self.start(STARTS[0] if start is None else start)
         times = maneuver.times if times is None else np.asarray(times, dtype=float)
         return self.solve_path(
@@ -343,14 +340,11 @@ class AlgebraicModel:
     def _work(self) -> np.ndarray:
         return np.empty(self.kernels.WORK)
 
-    def _checked(self, value: Any, size: int, name: str) -> np.ndarray:
-        array = np.ascontiguousarray(value, dtype=float)
-        if array.shape != (size,):
-            raise InputError(f"{name} has shape {array.shape}, {self.name} needs ({size},)")
-        if not np.isfinite(array).all():
-            index = int(np.flatnonzero(~np.isfinite(array))[0])
-            raise InputError(f"{name}[{index}] is not finite")
-        return array
+    def _coordinates(self, q: Any) -> np.ndarray:
+        return checked_array(q, len(self.coordinates), "q", self.name)
+
+    def _inputs(self, u: Any) -> np.ndarray:
+        return checked_array(u, len(self.inputs), "u", self.name)
 
 
 @lru_cache(maxsize=8)

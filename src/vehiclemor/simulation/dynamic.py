@@ -21,6 +21,12 @@ from vehiclemor.models.equations import DynamicEquations, Quantity
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import explicit_loops, rosenbrock_loops, run_loops, system_loops
+from vehiclemor.simulation.checks import (
+    check_inputs,
+    checked_array,
+    left_validity,
+    lifted_wheels,
+)
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
 from vehiclemor.simulation.signals import signal_of
 from vehiclemor.simulation.spaces import Spaces, full_space
@@ -208,7 +214,7 @@ class DynamicModel:
 
     def jacobian(self, x: Any, u: Any) -> np.ndarray:
         """df/dx (2 n, 2 n) by central differences; columns of cyclic states are zero."""
-        x, u = self._checked(x, 2 * len(self.coordinates), "x"), self._inputs(u)
+        x, u = checked_array(x, 2 * len(self.coordinates), "x", self.name), self._inputs(u)
         result = np.empty((len(x), len(x)))
         self.loops.jacobian_at(x, u, self._machine, self.active, result)
         return result
@@ -293,11 +299,7 @@ class DynamicModel:
         spaces
             Form of the system and its subspaces by window.
         """
-        if maneuver.inputs != self.inputs:
-            raise InputError(
-                f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
-                f"{self.name} needs {', '.join(self.inputs)}"
-            )
+        check_inputs(maneuver, self.name, self.inputs)
         if solver not in SOLVERS:
             raise unknown("solver", solver, SOLVERS)
         frozen = solver == "ros34pw2"
@@ -360,7 +362,7 @@ class DynamicModel:
         outputs = self.outputs_at(states, inputs)
         message, sample = failure, len(times)
         if not failure:
-            message, sample = self._left_validity(times, outputs)
+            message, sample = left_validity(self.validity, self.outputs, times, outputs)
             # What follows means nothing.
             states[sample:], outputs[sample:] = np.nan, np.nan
         status = "diverged" if message else "ok"
@@ -375,33 +377,8 @@ class DynamicModel:
             seconds,
             status,
             message,
-            self._lifted_wheels(times, outputs),
+            lifted_wheels(self.loads, self.outputs, times, outputs),
         )
-
-    def _left_validity(self, times: np.ndarray, outputs: np.ndarray) -> tuple[str, int]:
-        """What has left its range of validity, and at which sample first."""
-        first, message = len(times), ""
-        for name, (low, high) in self.validity.items():
-            values = outputs[:, self.outputs.index(name)]
-            outside = np.flatnonzero(~((values >= low) & (values <= high)))
-            if len(outside) and outside[0] < first:
-                first = int(outside[0])
-                message = (
-                    f"{name} is {values[first]:.4g} at t = {times[first]:.6g} s; the model holds "
-                    f"from {low:g} to {high:g}"
-                )
-        return message, first
-
-    def _lifted_wheels(self, times: np.ndarray, outputs: np.ndarray) -> str:
-        off = {}
-        for name in self.loads:
-            lifted = np.flatnonzero(outputs[:, self.outputs.index(name)] <= 0.0)
-            if len(lifted):
-                off[name.removeprefix("Fz_")] = float(times[lifted[0]])
-        if not off:
-            return ""
-        wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
-        return f"off the ground for a time: {wheels}"
 
     def _paths(self, states: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Paths as the loops want them; they read as many numbers as the model has."""
@@ -414,23 +391,14 @@ class DynamicModel:
 
     def _call(self, function: str, x: Any, u: Any) -> np.ndarray:
         self.require(function)
-        x, u = self._checked(x, 2 * len(self.coordinates), "x"), self._inputs(u)
+        x, u = checked_array(x, 2 * len(self.coordinates), "x", self.name), self._inputs(u)
         result = np.empty(self.equations.program.functions[function].shape)
         work = np.zeros(self.kernels.WORK)
         getattr(self.kernels, function)(x, u, self.constants, work, result)
         return result
 
     def _inputs(self, u: Any) -> np.ndarray:
-        return self._checked(np.atleast_1d(u), len(self.inputs), "u")
-
-    def _checked(self, value: Any, size: int, name: str) -> np.ndarray:
-        array = loop_array(value)
-        if array.shape != (size,):
-            raise InputError(f"{name} has shape {array.shape}, {self.name} needs ({size},)")
-        if not np.isfinite(array).all():
-            index = int(np.flatnonzero(~np.isfinite(array))[0])
-            raise InputError(f"{name}[{index}] is not finite")
-        return array
+        return checked_array(np.atleast_1d(u), len(self.inputs), "u", self.name)
 
 
 def loop_array(values: Any) -> np.ndarray:

@@ -1,0 +1,81 @@
+"""Checks at the border of a model that is ready to run, and of what its runs give."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+
+
+def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
+    """A finite array (size,) of floats, as compiled functions want it.
+
+    Raises
+    ------
+    InputError
+        If the shape is another one or an entry isn't finite.
+    """
+    try:
+        array = np.require(value, float, ("C", "A", "W"))
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is {value!r}, {model} needs {size} numbers") from None
+    if array.shape != (size,):
+        raise InputError(f"{name} has shape {array.shape}, {model} needs ({size},)")
+    if not np.isfinite(array).all():
+        index = int(np.flatnonzero(~np.isfinite(array))[0])
+        raise InputError(f"{name}[{index}] is not finite")
+    return array
+
+
+def check_inputs(maneuver: Maneuver, model: str, inputs: Sequence[str]) -> None:
+    """Raise `InputError` if a maneuver gives other inputs than a model has."""
+    if tuple(maneuver.inputs) != tuple(inputs):
+        raise InputError(
+            f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
+            f"{model} needs {', '.join(inputs)}"
+        )
+
+
+def left_validity(
+    validity: Mapping[str, tuple[float, float]],
+    names: Sequence[str],
+    times: np.ndarray,
+    outputs: np.ndarray,
+) -> tuple[str, int]:
+    """What has left its range of validity first, and at which sample; nothing: ("", samples).
+
+    Parameters
+    ----------
+    validity
+        Output -> (smallest, largest) value at which the model means anything.
+    names, times, outputs
+        Names of the outputs, times (samples,) in s, histories (samples, outputs).
+    """
+    first, message = len(times), ""
+    for name, (low, high) in validity.items():
+        values = outputs[:, names.index(name)]
+        outside = np.flatnonzero(~((values >= low) & (values <= high)))
+        if len(outside) and outside[0] < first:
+            first = int(outside[0])
+            message = (
+                f"{name} is {values[first]:.4g} at t = {times[first]:.6g} s; the model holds "
+                f"from {low:g} to {high:g}"
+            )
+    return message, first
+
+
+def lifted_wheels(
+    loads: Sequence[str], names: Sequence[str], times: np.ndarray, outputs: np.ndarray
+) -> str:
+    """Which wheels have been off the ground, and when first; empty if none."""
+    off = {}
+    for name in loads:
+        lifted = np.flatnonzero(outputs[:, names.index(name)] <= 0.0)
+        if len(lifted):
+            off[name.removeprefix("Fz_")] = float(times[lifted[0]])
+    if not off:
+        return ""
+    wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
+    return f"off the ground for a time: {wheels}"
