@@ -38,6 +38,15 @@ def check_inputs(maneuver: Maneuver, model: str, inputs: Sequence[str]) -> None:
         )
 
 
+def check_times(times: np.ndarray, maneuver: Maneuver) -> None:
+    """Raise `InputError` if output times (samples,) in s don't increase within the maneuver."""
+    slack = 1e-9 * maneuver.duration
+    if not (np.isfinite(times).all() and np.all(np.diff(times) > 0.0)):
+        raise InputError("output times must be finite and increasing")
+    if len(times) == 0 or times[0] < 0.0 or times[-1] > maneuver.duration + slack:
+        raise InputError(f"output times must lie within the maneuver, 0 to {maneuver.duration:g} s")
+
+
 def left_validity(
     validity: Mapping[str, tuple[float, float]],
     names: Sequence[str],

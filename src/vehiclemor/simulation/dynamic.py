@@ -23,6 +23,7 @@ from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import explicit_loops, rosenbrock_loops, run_loops, system_loops
 from vehiclemor.simulation.checks import (
     check_inputs,
+    check_times,
     checked_array,
     left_validity,
     lifted_wheels,
@@ -258,7 +259,7 @@ class DynamicModel:
         tolerance
             Largest local error of a state relative to its typical size plus its own.
         longest_step
-            In s; unlimited by default, but for the W-method.
+            In s; unlimited by default.
 
         Raises
         ------
@@ -299,6 +300,33 @@ class DynamicModel:
         spaces
             Form of the system and its subspaces by window.
         """
+        times = maneuver.times if times is None else loop_array(times)
+        arguments = self.loop_arguments(
+            maneuver, state, spaces, solver, tolerance, times, longest_step
+        )
+        path, counts = arguments[-2:]
+        if not self.loops.run.signatures:
+            # Compile, or load machine code, outside of the time that is measured.
+            edges, one = np.array([0.0, 1e-9]), np.zeros(1, dtype=np.int64)
+            copies = path.copy(), counts.copy()
+            self.loops.run(*arguments[:3], edges, one, one, *arguments[6:-2], *copies)
+        began = time.perf_counter()
+        status, reached = self.loops.run(*arguments)
+        seconds = time.perf_counter() - began
+        failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
+        return self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
+
+    def loop_arguments(
+        self,
+        maneuver: Maneuver,
+        state: np.ndarray,
+        spaces: Spaces,
+        solver: str,
+        tolerance: float,
+        times: np.ndarray,
+        longest_step: float | None = None,
+    ) -> tuple:
+        """Arguments of the compiled `run`, for which see `integrate`; path and counts come last."""
         check_inputs(maneuver, self.name, self.inputs)
         if solver not in SOLVERS:
             raise unknown("solver", solver, SOLVERS)
@@ -308,7 +336,7 @@ class DynamicModel:
         if spaces.form == system_loops.COORDINATES:
             self.require("second_order", "speeds")
         tableau = ROS34PW2 if frozen else RODAS4
-        times = maneuver.times if times is None else np.asarray(times, dtype=float)
+        check_times(times, maneuver)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
         edges, segments, windows = spaces.spans(signal.edges, end)
@@ -317,7 +345,7 @@ class DynamicModel:
         full = spaces.form == system_loops.FULL
         active = self.active if full else np.arange(spaces.ranks.max())
         inverses = self.frozen_inverses if frozen else np.zeros((1, 1, 1))
-        arguments = (
+        return (
             spaces.form,
             solver == "explicit",
             loop_array(state),
@@ -335,19 +363,10 @@ class DynamicModel:
             active,
             LADDER,
             inverses,
-            loop_array(times),
+            times,
             path,
             counts,
         )
-        if not self.loops.run.signatures:
-            # Compile, or load machine code, outside of the time that is measured.
-            moment = (loop_array(np.array([0.0, 1e-9])), segments[:1].copy(), windows[:1].copy())
-            self.loops.run(*arguments[:3], *moment, *arguments[6:-2], path.copy(), counts.copy())
-        began = time.perf_counter()
-        status, reached = self.loops.run(*arguments)
-        seconds = time.perf_counter() - began
-        failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
-        return self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
 
     def trajectory(
         self,

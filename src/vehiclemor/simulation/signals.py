@@ -5,6 +5,7 @@ doubled until the error at the midpoints is below `ACCURACY` times the input's l
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -43,6 +44,7 @@ class Signal:
         return self.edges, self.first, self.coefficients
 
 
+@lru_cache(maxsize=64)
 def signal_of(maneuver: Maneuver) -> Signal:
     """Piecewise polynomial inputs of a maneuver.
 
