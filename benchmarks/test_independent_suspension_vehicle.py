@@ -71,7 +71,13 @@ def test_full_order(benchmark, model, reference, label):
     arguments = model.loop_arguments(
         lane_change, model.start(), whole, solver, tolerance, lane_change.times
     )
-    status, _ = benchmark(model.loops.run, *arguments)
+
+    def whole_run():
+        # The loop stops at a number of calls, which its counts add up.
+        arguments[-1][:] = 0
+        return model.loops.run(*arguments)
+
+    status, _ = benchmark(whole_run)
     assert status == 0
     error = np.abs(run.outputs - reference.outputs).max(axis=0)
     lateral, yaw = (model.outputs.index(name) for name in ("lateral_position", "yaw"))
