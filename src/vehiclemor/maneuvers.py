@@ -90,6 +90,11 @@ LANE_CHANGE_LENGTH = 2.5
 LANE_CHANGE_AMPLITUDE = 0.0300768
 LANE_CHANGE_DURATION = 25.0
 LANE_CHANGE_SAMPLES = 1251
+# The same pulse of the steering rack (m), negative to the left; calibrated on the high-fidelity
+# vehicle: 3.5 m to the left after 10 s at 20 m/s.
+RACK_AMPLITUDE = -0.0046903
+RACK_DURATION = 10.0
+RACK_SAMPLES = 501
 
 
 def _sine_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
@@ -163,5 +168,45 @@ straight_ahead = Maneuver(
     ("delta",),
     duration=LANE_CHANGE_DURATION,
     samples=LANE_CHANGE_SAMPLES,
+    corners=_smooth,
+)
+
+
+def _rack_lane_change(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    part = (times - LANE_CHANGE_START) * frequency / LANE_CHANGE_LENGTH
+    angle, rate = 2.0 * np.pi * np.clip(part, 0.0, 1.0), 2.0 * np.pi * frequency / LANE_CHANGE_LENGTH
+    pulse = np.column_stack(
+        [
+            np.sin(angle) - 0.5 * np.sin(2.0 * angle),
+            rate * (np.cos(angle) - np.cos(2.0 * angle)),
+            rate**2 * (2.0 * np.sin(2.0 * angle) - np.sin(angle)),
+        ]
+    )
+    inside = (part > 0.0) & (part < 1.0)
+    return amplitude * RACK_AMPLITUDE * np.where(inside[:, None], pulse, 0.0)
+
+
+def _rack_held(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    del frequency, amplitude
+    return np.zeros((len(times), 3))
+
+
+rack_lane_change = Maneuver(
+    "rack_lane_change",
+    "single lane change of 3.5 m at 20 m/s, a pulse of the rack of 2.5 s from 1 s on, 10 s",
+    _rack_lane_change,
+    ("s", "s_dot", "s_ddot"),
+    duration=RACK_DURATION,
+    samples=RACK_SAMPLES,
+    corners=_lane_change_corners,
+)
+
+rack_straight_ahead = Maneuver(
+    "rack_straight_ahead",
+    "rack held in the middle, 10 s",
+    _rack_held,
+    ("s", "s_dot", "s_ddot"),
+    duration=RACK_DURATION,
+    samples=RACK_SAMPLES,
     corners=_smooth,
 )

@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from vehiclemor import registry
-from vehiclemor.simulation import dynamic
+from vehiclemor.simulation import dynamic_build
 
 
 @pytest.fixture(scope="session")
@@ -20,6 +20,6 @@ def standard():
             patch.setattr(
                 registry, "_entries", lambda kind: known if kind == "model" else real(kind)
             )
-            return dynamic.build("standard_problems", overrides=values)
+            return dynamic_build.build("standard_problems", overrides=values)
 
     return build

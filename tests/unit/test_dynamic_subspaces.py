@@ -12,7 +12,7 @@ from vehiclemor.reduction import pod
 from vehiclemor.reduction.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
-from vehiclemor.simulation.dynamic import build
+from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import Spaces, full_space
 from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
@@ -147,8 +147,8 @@ def test_weighted_basis_spans_what_pymor_finds(model):
 def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = whole_space(STATE, [0.0, 25.0])
-    jacobian = model.reduced_jacobian(whole, 0, model.start())
-    expected = np.linalg.eigvals(model.jacobian(model.start(), [0.0]))
+    jacobian = linearisation.reduced_jacobian(model, whole, 0, model.start())
+    expected = np.linalg.eigvals(linearisation.jacobian(model, model.start(), [0.0]))
     found = np.linalg.eigvals(jacobian)
     fast = expected.real < -1.0
     assert np.sort(found.real)[: fast.sum()] == pytest.approx(

@@ -16,7 +16,7 @@ from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.dynamic_subspaces import check_subspace
 from vehiclemor.registry import component
-from vehiclemor.simulation import dynamic, newton_loops, system_loops
+from vehiclemor.simulation import dynamic_build, newton_loops, system_loops
 from vehiclemor.simulation.spaces import Spaces, full_space
 from vehiclemor.simulation.system_loops import COORDINATES
 
@@ -108,7 +108,7 @@ def test_second_process_compiles_nothing(tmp_path: Path, script: str, functions:
 
 
 def test_all_dynamic_models_run_in_the_same_loops(standard) -> None:
-    vehicle = dynamic.build("independent_suspension_vehicle")
+    vehicle = dynamic_build.build("independent_suspension_vehicle")
     other = standard()
     assert vehicle.loops is other.loops
     assert vehicle.kernel_hash != other.kernel_hash
@@ -131,12 +131,12 @@ def test_hash_of_a_dynamic_model_follows_its_loops(
 ) -> None:
     before = standard().kernel_hash
     text = dynamic._loops_text()
-    dynamic._compiled.cache_clear()
+    dynamic_build.compiled.cache_clear()
     assert standard().kernel_hash == before
-    dynamic._compiled.cache_clear()
+    dynamic_build.compiled.cache_clear()
     monkeypatch.setattr(dynamic, "_loops_text", lambda: f"{text}# changed\n")
     assert standard().kernel_hash != before
-    dynamic._compiled.cache_clear()
+    dynamic_build.compiled.cache_clear()
 
 
 @pytest.mark.parametrize("lacking", ["second_order", "speeds"])

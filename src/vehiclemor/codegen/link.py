@@ -83,25 +83,29 @@ def kernels_source(kernels: str, sizes: Mapping[str, int], origin: str) -> str:
         *_head(origin),
         "from numba import cfunc",
         "from vehiclemor.codegen.straight_line import (",
-        "    machine_signature, python_kernel, straight_line",
+        "    KernelShape, machine_signature, python_kernel, straight_line",
         ")",
         *_writer(),
         "",
         *(f"{name} = {value}" for name, value in sizes.items()),
     ]
+    from vehiclemor.codegen.straight_line import kernel_shape
+
     for node in ast.parse(kernels).body:
         if not isinstance(node, ast.FunctionDef):
             raise ValueError(f"{ast.unparse(node)}: not a kernel")
-        name, arguments = node.name, [argument.arg for argument in node.args.args]
-        pointers = ", ".join(argument for argument in arguments if argument != "_work")
+        name, text = node.name, f"{ast.unparse(node)}\n"
+        shape = kernel_shape(text)
+        pointers = [argument for argument in shape.arguments if argument != "_work"]
+        given = ", ".join(pointers)
         lines += [
             "",
-            f'_{name}_text = """\\\n{ast.unparse(node)}\n"""',
+            f'_{name}_text = """\\\n{text}"""',
             f"_{name}_lines = straight_line(_{name}_text)",
-            f"@cfunc(machine_signature(_{name}_text), cache=True)",
-            f"def _{name}_machine({pointers}):",
-            f"    _{name}_lines(({pointers},))",
-            f"{name} = python_kernel(_{name}_text, _{name}_machine)",
+            f"@cfunc(machine_signature({len(pointers)}), cache=True)",
+            f"def _{name}_machine({given}):",
+            f"    _{name}_lines(({given},))",
+            f"{name} = python_kernel({shape!r}, _{name}_machine)",
         ]
     return "\n".join(lines) + "\n"
 

@@ -13,6 +13,7 @@ import hashlib
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -342,9 +343,37 @@ def _batch(builder: Any, expressions: _Expressions, name: str, lanes: Sequence[A
     ]
 
 
-def machine_signature(text: str) -> Any:
-    """Signature of a kernel's machine code: a pointer for each argument."""
-    return types.void(*[POINTER] * len(_kernel(text).pointers))
+def machine_signature(pointers: int) -> Any:
+    """Signature of a kernel's machine code with a number of pointers."""
+    return types.void(*[POINTER] * pointers)
+
+
+@dataclass(frozen=True)
+class KernelShape:
+    """What a kernel wants of its arrays.
+
+    Attributes
+    ----------
+    name
+        Of the kernel.
+    arguments
+        Names of its arguments, scratch space included.
+    sizes
+        Argument -> smallest number of floats.
+    dimensions
+        Of the result.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    sizes: dict[str, int]
+    dimensions: int
+
+
+def kernel_shape(text: str) -> KernelShape:
+    """Read off a kernel's text what it wants of its arrays."""
+    kernel = _kernel(text)
+    return KernelShape(kernel.name, tuple(kernel.arguments), kernel.sizes, kernel.dimensions)
 
 
 def straight_line(text: str) -> Any:
@@ -377,17 +406,16 @@ def straight_line(text: str) -> Any:
     return execute
 
 
-def python_kernel(text: str, machine: Any) -> Callable[..., None]:
+def python_kernel(kernel: KernelShape, machine: Any) -> Callable[..., None]:
     """A kernel as a function of arrays, to be called from Python.
 
     Parameters
     ----------
-    text
-        Source of the kernel.
+    kernel
+        What it wants of its arrays.
     machine
         The C function that `straight_line` was compiled into.
     """
-    kernel = _kernel(text)
     # The machine code lives as long as its owner.
     alive: tuple[Callable[..., None], Any] = machine.ctypes, machine
 

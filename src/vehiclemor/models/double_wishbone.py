@@ -12,9 +12,8 @@ from typing import cast
 import numpy as np
 import sympy as sp
 
-from vehiclemor.errors import GeometryError
+from vehiclemor.models import double_wishbone_linkage
 from vehiclemor.models.equations import AlgebraicEquations, Quantity
-from vehiclemor.parameters import point
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.program import assemble
@@ -57,17 +56,7 @@ EQUATIONS = (
     Quantity("wheel_height", "m", "prescribed wheel-centre height"),
     Quantity("rack_displacement", "m", "prescribed rack displacement"),
 )
-PARAMETERS = {
-    "upper_arm_front_pivot": point(),
-    "upper_arm_rear_pivot": point(),
-    "upper_ball_joint": point(),
-    "lower_arm_front_pivot": point(),
-    "lower_arm_rear_pivot": point(),
-    "lower_ball_joint": point(),
-    "tie_rod_inner": point(),
-    "tie_rod_outer": point(),
-    "wheel_centre": point(),
-}
+PARAMETERS = double_wishbone_linkage.POINTS
 
 
 def derive() -> AlgebraicEquations:
@@ -134,37 +123,16 @@ JOINTS = (
 
 def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> dict[str, g.Vector]:
     """Moving points in the chassis frame, each ball joint as seen from both of its bodies."""
-    zeta, eta, xi, theta_u, theta_l, alpha, beta, s = q
-
-    def arm_end(arm: str, angle: sp.Symbol) -> g.Vector:
-        rear, front = points[f"{arm}_arm_rear_pivot"], points[f"{arm}_arm_front_pivot"]
-        along = g.named(tape, g.subtract(front, rear))
-        axis = g.named(tape, g.scale(1 / g.length(tape, along), along))
-        lever = g.named(tape, g.subtract(points[f"{arm}_ball_joint"], rear))
-        turned = g.rotate_about_axis(tape, lever, axis, angle)
-        return g.named(tape, g.add(rear, turned))
-
-    upper = arm_end("upper", theta_u)
-    carrier = g.euler_321(tape, zeta, eta, xi)
-
-    def on_carrier(name: str) -> g.Vector:
-        lever = g.named(tape, g.subtract(points[name], points["upper_ball_joint"]))
-        return g.named(tape, g.add(upper, g.rotate(tape, carrier, lever)))
-
-    inner, outer = points["tie_rod_inner"], points["tie_rod_outer"]
-    rod_length = g.length(tape, g.named(tape, g.subtract(outer, inner)))
-    cos_beta = tape.let(sp.cos(beta))
-    rod = g.vector((-sp.sin(alpha) * cos_beta, sp.cos(alpha) * cos_beta, sp.sin(beta)))
-    rack_end = g.named(tape, (inner[0], inner[1] + s, inner[2]))
+    linkage = double_wishbone_linkage.assembled(tape, q[:7], q[7], points)
     return {
-        "upper_ball_joint": upper,
-        "lower_ball_joint": on_carrier("lower_ball_joint"),
-        "lower_ball_joint_arm": arm_end("lower", theta_l),
-        "tie_rod_inner": rack_end,
-        "tie_rod_outer": on_carrier("tie_rod_outer"),
-        "tie_rod_outer_rod": g.named(tape, g.add(rack_end, g.scale(rod_length, rod))),
-        "wheel_centre": on_carrier("wheel_centre"),
-        "axle_direction": (carrier[0][1], carrier[1][1], carrier[2][1]),
+        "upper_ball_joint": linkage.upper_ball_joint,
+        "lower_ball_joint": linkage.on_carrier(tape, points["lower_ball_joint"]),
+        "lower_ball_joint_arm": linkage.on_lower_arm(tape, points["lower_ball_joint"]),
+        "tie_rod_inner": linkage.rack_end,
+        "tie_rod_outer": linkage.on_carrier(tape, points["tie_rod_outer"]),
+        "tie_rod_outer_rod": g.named(tape, linkage.rod_end),
+        "wheel_centre": linkage.on_carrier(tape, points["wheel_centre"]),
+        "axle_direction": (linkage.carrier[0][1], linkage.carrier[1][1], linkage.carrier[2][1]),
     }
 
 
@@ -176,27 +144,9 @@ def design_coordinates(points: Mapping[str, np.ndarray]) -> np.ndarray:
     GeometryError
         If two joints of one body coincide, so that the mechanism can't be assembled.
     """
-    rigid_links = {
-        "upper arm axis": ("upper_arm_front_pivot", "upper_arm_rear_pivot"),
-        "lower arm axis": ("lower_arm_front_pivot", "lower_arm_rear_pivot"),
-        "tie rod": ("tie_rod_inner", "tie_rod_outer"),
-        "wheel carrier": ("upper_ball_joint", "lower_ball_joint"),
-    }
-    for link, (start, end) in rigid_links.items():
-        if np.linalg.norm(points[end] - points[start]) < 1e-6:
-            raise GeometryError(
-                f"the geometry can't be assembled: {start} and {end} coincide ({link} of length 0)"
-            )
-    for arm in ("upper", "lower"):
-        rear, front = points[f"{arm}_arm_rear_pivot"], points[f"{arm}_arm_front_pivot"]
-        lever = np.cross(front - rear, points[f"{arm}_ball_joint"] - rear)
-        if np.linalg.norm(lever) < 1e-6 * np.linalg.norm(front - rear):
-            raise GeometryError(
-                f"the geometry can't be assembled: {arm}_ball_joint lies on the axis of its arm"
-            )
-    rod = points["tie_rod_outer"] - points["tie_rod_inner"]
-    direction = rod / np.linalg.norm(rod)
+    double_wishbone_linkage.check_linkage(points)
     design = np.zeros(len(COORDINATES))
-    design[5] = np.arctan2(-direction[0], direction[1])
-    design[6] = np.arcsin(direction[2])
+    design[5:7] = double_wishbone_linkage.tie_rod_angles(
+        points["tie_rod_inner"], points["tie_rod_outer"]
+    )
     return design

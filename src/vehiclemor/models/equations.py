@@ -53,8 +53,13 @@ class DynamicEquations:
     program
         Functions over the arguments `x` (2 n) and `u`: `derivative` (2 n) and `outputs`; for
         mechanical models also `second_order` (n x (n + 1): mass matrix M and forces F of
-        M q'' = F in the coordinates), and `speeds` (n: the speeds where x holds the rates of the
-        coordinates in their place).
+        M q'' = F in the coordinates, forces of constraints included), and `speeds` (n: the speeds
+        where x holds the rates of the coordinates in their place).  Constrained models have
+        `descriptor` ((n + c) x (n + 1): mass matrix and applied forces, less inertial ones, below
+        them Jacobian and right side of the c stabilised constraints on q'') and `violations`
+        (c x 2: constraints and their rates).
+    constraints
+        The c constraints of a model of kind `dae`.
     """
 
     coordinates: tuple[Quantity, ...]
@@ -62,3 +67,4 @@ class DynamicEquations:
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
     program: Program
+    constraints: tuple[Quantity, ...] = ()

@@ -19,7 +19,7 @@ from vehiclemor.models.equations import DynamicEquations, Quantity
 from vehiclemor.models.tires import MAGIC_FORMULA, TireForces, magic_formula
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
-from vehiclemor.symbolic import mechanics
+from vehiclemor.symbolic import joints, mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
@@ -275,7 +275,7 @@ def _bodies(
         )
         steer = (tape.let(sp.sin(delta)), tape.let(sp.cos(delta)))
         axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
-        centre = frame.point(tape, place, slide=(6 + wheel, rate, mechanics.UNIT[2]))
+        centre = frame.point(tape, place, joints.along(joints.free_rate(6 + wheel, rate), mechanics.UNIT[2]))
         about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
         rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
         contact = body.contact(

@@ -1,5 +1,8 @@
 """Tire forces as symbolic expressions, for any set of coefficients.
 
+Fiala: E. Fiala, Seitenkraefte am rollenden Luftreifen, VDI-Zeitschrift 96 (1954), in the form of
+MSC Adams/Tire and of the MapleSim Tire Library: friction falls with the combined slip.
+
 Magic Formula in the form of PAC2002 without shifts, inclination and residual torque: H. B. Pacejka,
 Tire and Vehicle Dynamics (3rd ed., Butterworth-Heinemann 2012), chapter 4; MSC Adams/Tire manual,
 PAC2002.  Signs are those of ISO 8855 with a slip angle that is positive when the contact point
@@ -20,6 +23,16 @@ MAGIC_FORMULA = (
     *("QBZ1", "QBZ2", "QBZ3", "QCZ1", "QDZ1", "QDZ2", "QEZ1", "QEZ2", "QEZ3"),
     *("RBX1", "RBX2", "RCX1", "REX1", "RBY1", "RBY2", "RCY1", "REY1"),
 )
+# Coefficients that the Fiala model needs.
+FIALA = (
+    "longitudinal_slip_stiffness",
+    "cornering_stiffness",
+    "largest_friction",
+    "smallest_friction",
+    "tire_width",
+)
+# Keeps 0/0 from a wheel without load and slip; nothing else notices it.
+NOTHING = sp.Float(1e-300)
 
 
 @dataclass(frozen=True)
@@ -97,3 +110,57 @@ def _arc(tape: Tape, x: sp.Expr, curvature: sp.Expr) -> sp.Expr:
     """Inner part of every formula: arctan(x - E (x - arctan x))."""
     inner = tape.let(x - curvature * (x - sp.atan(x)))
     return tape.let(sp.atan(inner))
+
+
+def fiala(
+    tape: Tape,
+    coefficients: Mapping[str, sp.Expr],
+    load: sp.Expr,
+    slip_ratio: sp.Expr,
+    tan_slip: sp.Expr,
+) -> TireForces:
+    """Forces of the Fiala model; zero where the load is zero.
+
+    Each force grows with its own slip until the contact slides; the slips act on each other through
+    the friction coefficient alone.
+
+    Parameters
+    ----------
+    coefficients
+        `FIALA` name -> value.
+    load
+        Vertical force in N.
+    slip_ratio, tan_slip
+        kappa, and the tangent of the slip angle.
+    """
+    c, let = coefficients, tape.let
+    combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))
+    sliding = let(minimum(tape, combined, sp.Integer(1)))
+    fall = let(c["largest_friction"] - c["smallest_friction"])
+    limit = let(load * let(c["largest_friction"] - fall * sliding))
+
+    # With w = kappa / max(|kappa|, kappa*) both cases of the law are one expression.
+    critical = let(limit / (2 * c["longitudinal_slip_stiffness"]))
+    inverse = let(1 / (maximum(tape, let(sp.Abs(slip_ratio)), critical) + NOTHING))
+    longitudinal = let(
+        let(limit * let(slip_ratio * inverse)) * let(1 - critical * inverse / 2)
+    )
+
+    # With y = C tan(alpha) / max(3 U, C |tan(alpha)|) as well; H = 1 - |y|.
+    drive, most = let(c["cornering_stiffness"] * tan_slip), let(3 * limit)
+    y = let(drive / (maximum(tape, most, let(sp.Abs(drive))) + NOTHING))
+    size = let(sp.Abs(y))
+    share, left = let(limit * y), let(1 - size)
+    lateral = let(-share * let(3 - 3 * size + size * size))
+    aligning = let(share * c["tire_width"] * let(left * left * left))
+    return TireForces(longitudinal, lateral, aligning)
+
+
+def maximum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+    """The larger of two values, without a branch."""
+    return tape.let((a + b + sp.Abs(tape.let(a - b))) / 2)
+
+
+def minimum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+    """The smaller of two values, without a branch."""
+    return tape.let((a + b - sp.Abs(tape.let(a - b))) / 2)

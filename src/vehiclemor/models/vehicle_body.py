@@ -89,10 +89,26 @@ def attitude(tape: Tape, q: Sequence[sp.Symbol]) -> Attitude:
 def rates(tape: Tape, chassis: Attitude, nu: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Rates of X, Y, Z, yaw, pitch and roll from the speeds."""
     position = g.rotate(tape, chassis.rotation, g.vector(nu[:3]))
-    p, q, r = nu[3:6]
+    return [*position, *angle_rates(tape, chassis, g.vector(nu[3:6]))]
+
+
+def angle_rates(tape: Tape, chassis: Attitude, turning: Vector) -> list[sp.Expr]:
+    """Rates of yaw, pitch and roll that go with an angular velocity, chassis components."""
+    p, q, r = turning
     yaw = tape.let((q * chassis.sin_roll + r * chassis.cos_roll) / chassis.cos_pitch)
     pitch = tape.let(q * chassis.cos_roll - r * chassis.sin_roll)
-    return [*position, yaw, pitch, tape.let(p + yaw * chassis.sin_pitch)]
+    return [yaw, pitch, tape.let(p + yaw * chassis.sin_pitch)]
+
+
+def angle_bias(tape: Tape, chassis: Attitude, turning: Vector) -> Vector:
+    """Rate of the angular velocity where yaw, pitch and roll have no second derivatives."""
+    yaw, pitch, roll = angle_rates(tape, chassis, turning)
+    s, c, sp_, cp = chassis.sin_roll, chassis.cos_roll, chassis.sin_pitch, chassis.cos_pitch
+    return (
+        tape.let(-yaw * cp * pitch),
+        tape.let(yaw * (c * cp * roll - s * sp_ * pitch) - pitch * s * roll),
+        tape.let(yaw * (-s * cp * roll - c * sp_ * pitch) - pitch * c * roll),
+    )
 
 
 def _speeds_per_rates(chassis: Attitude) -> tuple[Rotation, Rotation]:
@@ -123,6 +139,7 @@ def in_coordinates(
     nu: Sequence[sp.Expr],
     mass: Sequence[Sequence[sp.Expr]],
     force: Sequence[sp.Expr],
+    velocity_bias: Vector | None = None,
 ) -> list[sp.Expr]:
     """Second-order form M_q q'' = F_q, row by row: n entries of M_q, then F_q.
 
@@ -130,18 +147,17 @@ def in_coordinates(
     ----------
     mass, force
         M and F of M d(nu)/dt = F, the chassis speeds first; the others are rates of coordinates.
+    velocity_bias
+        What d(nu)/dt has in its first three entries where X, Y, Z have no second derivatives;
+        by default that of chassis components, which turn with the chassis.
     """
     linear, angular = _speeds_per_rates(chassis)
     # nu = P q', so that d(nu)/dt = P q'' + bias and P^T (M P q'' + M bias - F) = 0.
-    _, _, _, yaw, pitch, roll = rates(tape, chassis, nu)
-    s, c, sp_, cp = chassis.sin_roll, chassis.cos_roll, chassis.sin_pitch, chassis.cos_pitch
-    turning = g.cross(g.vector(nu[3:6]), g.vector(nu[:3]))
-    bias = [
-        *(tape.let(-component) for component in turning),
-        tape.let(-yaw * cp * pitch),
-        tape.let(yaw * (c * cp * roll - s * sp_ * pitch) - pitch * s * roll),
-        tape.let(yaw * (-s * cp * roll - c * sp_ * pitch) - pitch * c * roll),
-    ]
+    turning = g.vector(nu[3:6])
+    if velocity_bias is None:
+        swept = g.cross(turning, g.vector(nu[:3]))
+        velocity_bias = g.named(tape, [-component for component in swept])
+    bias = [*velocity_bias, *angle_bias(tape, chassis, turning)]
     n = len(mass)
     free = [
         tape.let(force[j] - sp.Add(*[mass[j][k] * bias[k] for k in range(6)])) for j in range(n)

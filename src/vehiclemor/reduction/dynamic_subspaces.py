@@ -27,6 +27,7 @@ from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.windows import first_samples
+from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.spaces import Spaces
 from vehiclemor.simulation.system_loops import COORDINATES, STATE
@@ -148,7 +149,7 @@ class ReducedDynamicModel:
         rates = np.empty(len(self.bases))
         for k, dim in enumerate(spaces.ranks):
             y = self._at_mean(k)
-            rates[k] = np.linalg.eigvals(model.reduced_jacobian(spaces, k, y[:dim])).real.max()
+            rates[k] = np.linalg.eigvals(linearisation.reduced_jacobian(model, spaces, k, y[:dim])).real.max()
         return rates
 
     def _at_mean(self, window: int) -> np.ndarray:
@@ -245,7 +246,7 @@ def _spaces(
     lifts, drops = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
     ranks = np.empty(windows, dtype=np.int64)
     # The speeds that go with rates of the coordinates, where angles are small.
-    turn = model.speeds_per_rates(model.start()) if formulation == "paired" else np.eye(n)
+    turn = linearisation.speeds_per_rates(model, model.start()) if formulation == "paired" else np.eye(n)
     back = np.linalg.inv(turn)
     for k, basis in enumerate(bases):
         r, width = basis.rank, len(basis.mean)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 
 INNER_PRODUCTS = ("euclidean", "energy", "range")
@@ -46,7 +47,7 @@ def state_weight(
     mass = model.mass_matrix(model.start())
     weight = np.zeros((2 * n, 2 * n))
     weight[:n, :n] = mass / time_scale**2
-    inverse = np.linalg.inv(model.speeds_per_rates(model.start()))
+    inverse = np.linalg.inv(linearisation.speeds_per_rates(model, model.start()))
     weight[n:, n:] = inverse.T @ mass @ inverse
     return weight
 

@@ -88,3 +88,8 @@ def lifted_wheels(
         return ""
     wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
     return f"off the ground for a time: {wheels}"
+
+
+def loop_array(values: Any) -> np.ndarray:
+    """Floats in the one kind of array that the loops are compiled for."""
+    return np.require(values, float, ("C", "A", "W"))

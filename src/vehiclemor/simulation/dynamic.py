@@ -5,29 +5,28 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
-from pathlib import Path
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import kernel_hash, load_module
-from vehiclemor.codegen.emit import kernel_source, operation_counts, reference_source, work_size
-from vehiclemor.codegen.link import kernels_source, loops_source
+from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.equations import DynamicEquations, Quantity
-from vehiclemor.parameters import ParameterSet, load_parameters
-from vehiclemor.registry import component, unknown
-from vehiclemor.simulation import explicit_loops, rosenbrock_loops, run_loops, system_loops
+from vehiclemor.models.equations import Quantity
+from vehiclemor.parameters import ParameterSet
+from vehiclemor.registry import unknown
+from vehiclemor.simulation import linearisation, system_loops
 from vehiclemor.simulation.checks import (
     check_inputs,
     check_times,
     checked_array,
     left_validity,
     lifted_wheels,
+    loop_array,
 )
+from vehiclemor.simulation.linearisation import LADDER
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
 from vehiclemor.simulation.signals import signal_of
 from vehiclemor.simulation.spaces import Spaces, full_space
@@ -40,8 +39,6 @@ REFERENCE_TOLERANCE = 1e-9
 MOST_CALLS = 100_000
 # First step (s) of a frozen-Jacobian run after a break point of the inputs.
 RESTART = 0.05
-# Step sizes (s) for which inverses are stored.
-LADDER = 2.0 ** (0.5 * np.arange(-32, 7))
 # Kernels that the loops call, in the order of their addresses.
 KERNELS = ("derivative", "outputs", "second_order", "speeds")
 NEEDED_FOR = {
@@ -66,7 +63,7 @@ class DynamicModel:
     name, summary, kind
         Registered name, one line, and `ode` or `dae`.
     equations
-        Named quantities and symbolic program.
+        Named quantities and what was derived.
     parameters
         Validated parameter set.
     kernels
@@ -87,12 +84,15 @@ class DynamicModel:
         Output -> (smallest, largest) value at which the model means anything.
     loads
         Outputs that are zero where a wheel has left the road.
+    turning
+        Numbers of the heading angle and of the pairs of states that turn with it; empty where the
+        states are components in the vehicle.
     """
 
     name: str
     summary: str
     kind: str
-    equations: DynamicEquations
+    equations: Derivation
     parameters: ParameterSet
     kernels: ModuleType
     loops: ModuleType
@@ -103,6 +103,7 @@ class DynamicModel:
     typical: np.ndarray
     validity: Mapping[str, tuple[float, float]]
     loads: tuple[str, ...]
+    turning: np.ndarray
 
     counts = DYNAMIC_COUNTS
     evaluations = "rhs_calls"
@@ -133,7 +134,7 @@ class DynamicModel:
         return tuple(self.initial)
 
     @cached_property
-    def _machine(self) -> tuple[np.ndarray, np.ndarray]:
+    def machine(self) -> tuple[np.ndarray, np.ndarray]:
         """What the loops call: constants and addresses of kernels, zero where there is none."""
         machines = [getattr(self.kernels, f"_{name}_machine", None) for name in KERNELS]
         addresses = [0 if machine is None else machine.address for machine in machines]
@@ -142,13 +143,13 @@ class DynamicModel:
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""
         for name in functions:
-            if name not in self.equations.program.functions:
+            if name not in self.equations.shapes:
                 raise InputError(f"{self.name} has no {name}: {NEEDED_FOR[name]}")
 
-    @cached_property
+    @property
     def operation_counts(self) -> dict[str, dict[str, int]]:
         """Operations of each generated function, by kind and in total."""
-        return operation_counts(reference_source(self.equations.program))
+        return self.equations.operations
 
     def start(self, name: str | None = None) -> np.ndarray:
         """First-order state (2 n,) of a named initial condition; the first one by default."""
@@ -164,14 +165,14 @@ class DynamicModel:
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
         result = np.empty((len(states), len(self.outputs)))
-        self.loops.output_path(*self._paths(states, inputs), self._machine, result)
+        self.loops.output_path(*self._paths(states, inputs), self.machine, result)
         return result
 
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
         states, inputs = self._paths(states, inputs)
         result = np.empty(states.shape)
-        self.loops.derivative_path(states, inputs, self._machine, result)
+        self.loops.derivative_path(states, inputs, self.machine, result)
         return result
 
     def mass_matrix(self, x: Any) -> np.ndarray:
@@ -182,56 +183,10 @@ class DynamicModel:
         """Speeds (n,) where x (2 n,) holds the rates of the coordinates in their place."""
         return self._call("speeds", x, np.zeros(len(self.inputs)))
 
-    def speeds_per_rates(self, x: Any) -> np.ndarray:
-        """Matrix (n, n) that turns rates of the coordinates into speeds at the state x."""
-        n = len(self.coordinates)
-        place = np.concatenate([np.asarray(x, dtype=float)[:n], np.zeros(n)])
-        columns = []
-        for j in range(n):
-            place[n:] = 0.0
-            place[n + j] = 1.0
-            columns.append(self.speeds_of_rates(place))
-        return np.column_stack(columns)
-
-    def reduced_jacobian(self, spaces: Spaces, window: int, y: np.ndarray) -> np.ndarray:
-        """Jacobian of one window's reduced system at y (dim,), all inputs zero."""
-        dim = len(y)
-        nothing = np.zeros((1, len(self.inputs), 6))
-        signal = (np.array([0.0, 1.0]), np.array([0, 1]), nothing)
-        space = tuple(loop_array(part[window]) for part in spaces.arrays[:3])
-        columns = []
-        for j in range(dim):
-            step = 1e-6 * max(1.0, abs(y[j]))
-            sides = []
-            for sign in (1.0, -1.0):
-                shifted, image = y.copy(), np.empty(dim)
-                shifted[j] += sign * step
-                self.loops.reduced_slope(
-                    spaces.form, 0.0, 0, shifted, dim, signal, *space, self._machine, image
-                )
-                sides.append(image)
-            columns.append((sides[0] - sides[1]) / (2.0 * step))
-        return np.column_stack(columns)
-
-    def jacobian(self, x: Any, u: Any) -> np.ndarray:
-        """df/dx (2 n, 2 n) by central differences; columns of cyclic states are zero."""
-        x, u = checked_array(x, 2 * len(self.coordinates), "x", self.name), self._inputs(u)
-        result = np.empty((len(x), len(x)))
-        self.loops.jacobian_at(x, u, self._machine, self.active, result)
-        return result
-
     @cached_property
     def frozen_inverses(self) -> np.ndarray:
-        """Transposed active columns of (I - gamma h J)^-1 on the ladder of step sizes.
-
-        J belongs to the first start with all inputs zero: straight running.
-        """
-        x = self.start()
-        jacobian = self.jacobian(x, np.zeros(len(self.inputs)))
-        identity = np.eye(len(x))
-        gamma = ROS34PW2.gamma
-        inverses = [np.linalg.inv(identity - gamma * h * jacobian) for h in LADDER]
-        return loop_array(np.stack([inverse[:, self.active].T for inverse in inverses]))
+        """Inverses for the W-method, see `linearisation.frozen_inverses`."""
+        return linearisation.frozen_inverses(self)
 
     def simulate(
         self,
@@ -354,13 +309,14 @@ class DynamicModel:
             windows,
             *spaces.arrays,
             signal.arrays,
-            self._machine,
+            self.machine,
             self.typical,
             (float(tolerance), float(longest_step or np.inf), MOST_CALLS),
             RESTART,
             tableau.arguments,
             frozen,
             active,
+            self.turning,
             LADDER,
             inverses,
             times,
@@ -411,7 +367,7 @@ class DynamicModel:
     def _call(self, function: str, x: Any, u: Any) -> np.ndarray:
         self.require(function)
         x, u = checked_array(x, 2 * len(self.coordinates), "x", self.name), self._inputs(u)
-        result = np.empty(self.equations.program.functions[function].shape)
+        result = np.empty(self.equations.shapes[function])
         work = np.zeros(self.kernels.WORK)
         getattr(self.kernels, function)(x, u, self.constants, work, result)
         return result
@@ -420,72 +376,5 @@ class DynamicModel:
         return checked_array(np.atleast_1d(u), len(self.inputs), "u", self.name)
 
 
-def loop_array(values: Any) -> np.ndarray:
-    """Floats in the one kind of array that the loops are compiled for."""
-    return np.require(values, float, ("C", "A", "W"))
-
-
 def _names(quantities: Sequence[Quantity]) -> tuple[str, ...]:
     return tuple(quantity.name for quantity in quantities)
-
-
-@lru_cache(maxsize=8)
-def _compiled(name: str) -> tuple[DynamicEquations, ModuleType, str]:
-    """Equations and compiled kernels of a registered model; parameters play no part here."""
-    equations: DynamicEquations = component("model", name).derive()
-    sizes = {"WORK": work_size(equations.program)}
-    source = kernels_source(kernel_source(equations.program), sizes, f"model {name}")
-    digest = kernel_hash(f"{source}\n{_loops_text()}")
-    return equations, load_module(name, source), digest
-
-
-@cache
-def _loops_text() -> str:
-    modules = [system_loops, explicit_loops, rosenbrock_loops, run_loops]
-    return loops_source(modules, "the loops of dynamic models")
-
-
-@cache
-def loops_module() -> ModuleType:
-    """Compiled loops that run every dynamic model."""
-    return load_module("dynamic_loops", _loops_text())
-
-
-def build(
-    name: str,
-    parameter_file: Path | None = None,
-    overrides: Mapping[str, object] | None = None,
-) -> DynamicModel:
-    """Derive (or fetch), compile and parametrise a registered dynamic model.
-
-    Raises
-    ------
-    VehiclemorError
-        If a parameter is wrong or the vehicle can't stand.
-    """
-    definition = component("model", name)
-    path = parameter_file or getattr(definition, "PARAMETER_FILE", None)
-    parameters = load_parameters(name, definition.PARAMETERS, path, overrides)
-    values = {key: float(parameters[key]) for key in parameters.entries}
-    definition.check(values)
-    equations, kernels, digest = _compiled(name)
-    constants = np.empty(len(equations.program.constant_symbols))
-    kernels.constants(parameters.flat(), np.empty(kernels.WORK), constants)
-    states = [q.name for q in (*equations.coordinates, *equations.speeds)]
-    typical = dict.fromkeys(states, 1.0) | dict(getattr(definition, "TYPICAL", {}))
-    return DynamicModel(
-        name,
-        definition.SUMMARY,
-        definition.KIND,
-        equations,
-        parameters,
-        kernels,
-        loops_module(),
-        digest,
-        constants,
-        definition.starts(values),
-        np.array([i for i, state in enumerate(states) if state not in definition.CYCLIC]),
-        np.array([typical[state] for state in states]),
-        getattr(definition, "VALIDITY", {}),
-        tuple(getattr(definition, "LOADS", ())),
-    )

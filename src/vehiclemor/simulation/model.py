@@ -136,7 +136,7 @@ def build(
 
         return algebraic.build(name, parameter_file, overrides)
     if kind in ("ode", "dae"):
-        from vehiclemor.simulation import dynamic
+        from vehiclemor.simulation import dynamic_build
 
-        return dynamic.build(name, parameter_file, overrides)
+        return dynamic_build.build(name, parameter_file, overrides)
     raise InputError(f"model {name!r} is of kind {kind!r}; allowed: {', '.join(KINDS)}")

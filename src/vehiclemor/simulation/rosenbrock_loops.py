@@ -6,6 +6,8 @@ Differential Equations II (2nd ed., Springer 1996), section IV.7:
     (I / (gamma h) - A) U_i = f(t + alpha_i h, y + sum a_ij U_j) + sum c_ij / h U_j + d_i h f_t
 """
 
+import math
+
 from vehiclemor.simulation.system_loops import FULL, error_norm, lifted, slope, slope_apart
 
 
@@ -81,6 +83,14 @@ def frozen_solve(inverse, dim, active, b, result):
             result[i] += inverse[place, i] * weight
 
 
+def turn(vector, turning, cosine, sine):
+    """Rotate the pairs of states that turn with the heading, in place."""
+    for k in range(1, len(turning), 2):
+        a, b = vector[turning[k]], vector[turning[k + 1]]
+        vector[turning[k]] = cosine * a - sine * b
+        vector[turning[k + 1]] = sine * a + cosine * b
+
+
 def rosenbrock_span(
     form,
     times,
@@ -99,6 +109,7 @@ def rosenbrock_span(
     tableau,
     frozen,
     active,
+    turning,
     ladder,
     inverses,
     samples,
@@ -117,6 +128,9 @@ def rosenbrock_span(
         Whether stored inverses are used instead of fresh Jacobians.
     active
         Numbers of the states that the right-hand side depends on.
+    turning
+        Numbers of the heading and of pairs of states that turn with it: the stored inverses belong
+        to heading zero.  May be empty.
     ladder, inverses
         Step sizes (L) in s and transposed active columns of (I - gamma h J)^-1 (L, active, dim).
     """
@@ -156,7 +170,10 @@ def rosenbrock_span(
         if not h > 1e-14 * (1.0 + abs(t)):
             return 4, t, step, sample
         rung = 0
+        cosine, sine = 1.0, 0.0
         if frozen:
+            if len(turning) > 0:
+                cosine, sine = math.cos(y[turning[0]]), math.sin(y[turning[0]])
             while rung < len(ladder) - 1 and ladder[rung] < 0.999 * h:
                 rung += 1
             for i in range(dim):
@@ -220,7 +237,9 @@ def rosenbrock_span(
             if frozen:
                 for i in range(dim):
                     b[i] *= gamma * h
+                turn(b, turning, cosine, -sine)
                 frozen_solve(inverses[rung], dim, active, b, image)
+                turn(image, turning, cosine, sine)
                 for i in range(dim):
                     stages[stage, i] = image[i]
             else:

@@ -1,15 +1,12 @@
 """Where a result comes from: versions, machine, and the source that computed it."""
 
-import hashlib
-import inspect
 import os
 import platform
-import sys
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import ModuleType
 
+from vehiclemor.codegen.sources import source_digest
 from vehiclemor.registry import component
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
@@ -51,30 +48,5 @@ def code_digest(model: str, method: str) -> str:
     These are the layers of this package and, for a plug-in, all of its top-level package and its
     version.  Results computed by other source are never taken for finished cells.
     """
-    package = Path(__file__).resolve().parents[1]
-    paths = [path for layer in LAYERS for path in sorted((package / layer).rglob("*.py"))]
-    paths += [package / name for name in FILES]
-    digest = hashlib.sha256()
-    for path in paths:
-        digest.update(path.relative_to(package).as_posix().encode())
-        digest.update(path.read_bytes())
-    for kind, name in (("model", model), ("method", method)):
-        for text in _plug_in_source(component(kind, name)):
-            digest.update(text)
-    return digest.hexdigest()[:16]
-
-
-def _plug_in_source(thing: object) -> list[bytes]:
-    """Source texts of the package, or single file, that a component comes from."""
-    module = thing if isinstance(thing, ModuleType) else inspect.getmodule(thing)
-    if module is None:
-        module = inspect.getmodule(type(thing))
-    if module is None or module.__file__ is None:
-        return [repr(thing).encode()]
-    top = module.__name__.split(".")[0]
-    if top == "vehiclemor":
-        return []
-    origin = getattr(sys.modules.get(top), "__file__", None)
-    if origin is None or Path(origin).name != "__init__.py":
-        return [Path(module.__file__).read_bytes()]
-    return [path.read_bytes() for path in sorted(Path(origin).parent.rglob("*.py"))]
+    parts = (component("model", model), component("method", method))
+    return source_digest(LAYERS, FILES, parts)

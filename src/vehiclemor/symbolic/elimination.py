@@ -83,8 +83,24 @@ def eliminate(
     list of sympy.Expr
         The n unknowns, all intermediate results named on the tape.
     """
+    return eliminate_several(tape, matrix, [right_side], pivots)[0]
+
+
+def eliminate_several(
+    tape: Tape,
+    matrix: Sequence[Sequence[sp.Expr]],
+    right_sides: Sequence[Sequence[sp.Expr]],
+    pivots: Pivots,
+) -> list[list[sp.Expr]]:
+    """Solve matrix x = right_side for several right sides, see `eliminate`.
+
+    Returns
+    -------
+    list of list
+        The n unknowns of each right side.
+    """
     a = [[sp.sympify(e) for e in row] for row in matrix]
-    b = [sp.sympify(e) for e in right_side]
+    b = [[sp.sympify(e) for e in right_side] for right_side in right_sides]
     rows, columns = list(range(len(a))), list(range(len(a)))
     inverses: dict[int, sp.Expr] = {}
     for row, column in pivots:
@@ -99,12 +115,16 @@ def eliminate(
             for k in columns:
                 if a[row][k] != 0:
                     a[other][k] = tape.let(a[other][k] - factor * a[row][k])
-            b[other] = tape.let(b[other] - factor * b[row])
-    solution: dict[int, sp.Expr] = {}
-    for row, column in reversed(pivots):
-        known = sp.Add(*[a[row][k] * x for k, x in solution.items() if a[row][k] != 0])
-        solution[column] = tape.let(tape.let(b[row] - known) * inverses[row])
-    return [solution[column] for column in range(len(a))]
+            for right in b:
+                right[other] = tape.let(right[other] - factor * right[row])
+    solutions: list[list[sp.Expr]] = []
+    for right in b:
+        solution: dict[int, sp.Expr] = {}
+        for row, column in reversed(pivots):
+            known = sp.Add(*[a[row][k] * x for k, x in solution.items() if a[row][k] != 0])
+            solution[column] = tape.let(tape.let(right[row] - known) * inverses[row])
+        solutions.append([solution[column] for column in range(len(a))])
+    return solutions
 
 
 def eliminate_symmetric(

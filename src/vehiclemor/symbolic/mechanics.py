@@ -1,12 +1,13 @@
 """Kane's equations of rigid bodies, assembled from geometric partial velocities on a tape.
 
 Every velocity is linear in the speeds; its columns (partial velocities) follow from geometry, so
-nothing is differentiated.  All vectors are components in one moving frame, the chassis.
+nothing is differentiated.  All vectors are components in one moving frame, the chassis.  What moves
+in the frame has motions relative to it: see `joints.py`.
 
 T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications (McGraw-Hill 1985), chapters 4 to 6.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -14,6 +15,9 @@ import sympy as sp
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.tape import Tape
+
+Tensor = tuple[Vector, Vector, Vector]
+Matrix = Sequence[Sequence[sp.Expr]]
 
 ZERO: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(0))
 UNIT: tuple[Vector, Vector, Vector] = (
@@ -43,6 +47,29 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Rotor:
+    """A body of revolution that spins in another body, to which its mass and tensor are counted.
+
+    Attributes
+    ----------
+    number, speed
+        Number of its speed, and the speed: the spin relative to the body in rad/s.
+    axis
+        Unit axis, fixed in the body.
+    inertia
+        Moment of inertia about the axis in kg m^2.
+    moment
+        Applied moment about the axis in N m.
+    """
+
+    number: int
+    speed: sp.Expr
+    axis: Vector
+    inertia: sp.Expr
+    moment: sp.Expr
+
+
+@dataclass(frozen=True)
 class Body:
     """A rigid body or point mass with its resultant loads.
 
@@ -60,15 +87,21 @@ class Body:
     inertia
         Tensor about the centre of mass (three rows) in kg m^2.
     moment
-        Resultant applied moment about the centre of mass in N m.
+        Resultant applied moment about the centre of mass in N m; that on a rotor included.
+    rotor
+        What spins in it.
+    acceleration
+        Angular acceleration where the derivatives of all speeds are zero; a rotor needs it.
     """
 
     mass: sp.Expr
     centre: Motion
     force: Vector
     rotation: Motion | None = None
-    inertia: tuple[Vector, Vector, Vector] | None = None
+    inertia: Tensor | None = None
     moment: Vector = ZERO
+    rotor: Rotor | None = None
+    acceleration: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -81,26 +114,31 @@ class MovingFrame:
         Components in the frame.
     first
         Number of the first of its six speeds.
+    acceleration
+        Acceleration of the origin where the derivatives of all speeds are zero; None where the
+        first three speeds are the components of its velocity in this frame.  Gravity can be
+        counted here, as an acceleration upwards.
     """
 
     velocity: Vector
     angular_velocity: Vector
     first: int
+    acceleration: Vector | None = None
 
     def origin(self, tape: Tape) -> Motion:
         """Motion of the origin."""
-        bias = g.named(tape, g.cross(self.angular_velocity, self.velocity))
+        bias = self.acceleration
+        if bias is None:
+            bias = g.named(tape, g.cross(self.angular_velocity, self.velocity))
         return Motion(self.velocity, {self.first + i: UNIT[i] for i in range(3)}, bias)
 
-    def point(
-        self, tape: Tape, place: Vector, slide: tuple[int, sp.Expr, Vector] | None = None
-    ) -> Motion:
+    def point(self, tape: Tape, place: Vector, relative: Motion | None = None) -> Motion:
         """Motion of a point at a place in the frame.
 
         Parameters
         ----------
-        slide
-            (number of the speed, the speed, direction) of a translation relative to the frame.
+        relative
+            Motion of the point relative to the frame; its bias is the relative acceleration.
         """
         origin, turn = self.origin(tape), self.angular_velocity
         velocity = g.add(self.velocity, g.cross(turn, place))
@@ -108,18 +146,32 @@ class MovingFrame:
         columns |= {self.first + 3 + i: g.cross(UNIT[i], place) for i in range(3)}
         lever = g.named(tape, g.cross(turn, place))
         bias = g.add(origin.bias, g.cross(turn, lever))
-        if slide is not None:
-            number, speed, direction = slide
-            velocity = g.add(velocity, g.scale(speed, direction))
-            columns[number] = direction
-            # Coriolis acceleration; the direction is fixed in the frame.
-            bias = g.add(bias, g.scale(2 * speed, g.cross(turn, direction)))
+        if relative is not None:
+            velocity = g.add(velocity, relative.value)
+            columns |= relative.columns
+            coriolis = g.scale(sp.Integer(2), g.cross(turn, relative.value))
+            bias = g.add(bias, g.add(coriolis, relative.bias))
         return Motion(g.named(tape, velocity), columns, g.named(tape, bias))
+
+    def turning(self, tape: Tape, relative: Motion) -> Motion:
+        """Angular velocity of a body that turns relative to the frame.
+
+        Parameters
+        ----------
+        relative
+            Relative angular velocity; its bias, as that of the result, is the angular acceleration.
+        """
+        turn = self.angular_velocity
+        columns = {self.first + 3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
+        bias = g.add(g.cross(turn, relative.value), relative.bias)
+        return Motion(
+            g.named(tape, g.add(turn, relative.value)), columns, g.named(tape, bias)
+        )
 
     def rotation(
         self,
         tape: Tape,
-        inertia: tuple[Vector, Vector, Vector],
+        inertia: Tensor,
         spin: tuple[int, sp.Expr, Vector] | None = None,
     ) -> Motion:
         """Rotation of a body whose inertia tensor is constant in the frame.
@@ -142,14 +194,27 @@ class MovingFrame:
         return Motion(value, columns, g.named(tape, g.cross(turn, momentum)))
 
 
-def product(tensor: tuple[Vector, Vector, Vector], a: Vector) -> Vector:
+def with_inertia(tape: Tape, inertia: Tensor, turning: Motion) -> Motion:
+    """Rotation of a `Body` from its angular velocity and acceleration, see `MovingFrame.turning`.
+
+    Parameters
+    ----------
+    inertia
+        Tensor about the centre of mass, components in the frame at this moment.
+    """
+    momentum = g.named(tape, product(inertia, turning.value))
+    bias = g.add(product(inertia, turning.bias), g.cross(turning.value, momentum))
+    return Motion(turning.value, turning.columns, g.named(tape, bias))
+
+
+def product(tensor: Tensor, a: Vector) -> Vector:
     """Product of a tensor and a vector."""
     return g.dot(tensor[0], a), g.dot(tensor[1], a), g.dot(tensor[2], a)
 
 
 def axisymmetric_inertia(
     about_axis: sp.Expr, across: sp.Expr, axis: Vector
-) -> tuple[Vector, Vector, Vector]:
+) -> Tensor:
     """Inertia tensor of a body of revolution about a unit axis."""
     excess = about_axis - across
 
@@ -174,8 +239,10 @@ def kane(
         if body.rotation is not None and body.inertia is not None:
             columns = body.rotation.columns
             images.append((columns, {k: product(body.inertia, c) for k, c in columns.items()}))
-            turning = g.named(tape, g.subtract(body.moment, body.rotation.bias))
-            loads.append((columns, turning))
+            turning = g.subtract(body.moment, body.rotation.bias)
+            if body.rotor is not None:
+                turning = g.subtract(turning, _add_rotor(tape, body, mass, force))
+            loads.append((columns, g.named(tape, turning)))
         for columns, weighted in images:
             for k, image in weighted.items():
                 for j, other in columns.items():
@@ -187,3 +254,81 @@ def kane(
     lower = [[tape.let(mass[j][k]) for k in range(j + 1)] for j in range(speeds)]
     full = [[lower[max(j, k)][min(j, k)] for k in range(speeds)] for j in range(speeds)]
     return full, [tape.let(f) for f in force]
+
+
+def _add_rotor(
+    tape: Tape, body: Body, mass: list[list[sp.Expr]], force: list[sp.Expr]
+) -> Vector:
+    """Add the row of a rotor; the rate of its momentum that is due to the body's turning."""
+    rotor, rotation = body.rotor, body.rotation
+    assert rotor is not None and rotation is not None and body.acceleration is not None
+    momentum = g.named(tape, g.scale(rotor.inertia, rotor.axis))
+    for k, column in rotation.columns.items():
+        mass[max(rotor.number, k)][min(rotor.number, k)] += g.dot(momentum, column)
+    mass[rotor.number][rotor.number] += rotor.inertia
+    force[rotor.number] += rotor.moment - g.dot(momentum, body.acceleration)
+    spin = g.named(tape, g.scale(rotor.speed, momentum))
+    return g.cross(rotation.value, spin)
+
+
+def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: sp.Expr) -> Tensor:
+    """Tensor R T R^T of a body that has turned about a unit axis by an angle in rad.
+
+    A polynomial in sine and cosine whose coefficients, where tensor and axis are parameters, are
+    hoisted out of the kernel.
+    """
+    along = [[tape.let(a * b) for b in axis] for a in axis]
+    across = [[(1 if i == j else 0) - along[i][j] for j in range(3)] for i in range(3)]
+    x, y, z = axis
+    quarter = [[sp.Integer(0), -z, y], [z, sp.Integer(0), -x], [-y, x, sp.Integer(0)]]
+
+    def sandwich(left: Matrix, right: Matrix) -> list[list[sp.Expr]]:
+        """left T right^T."""
+        inner = [[tape.let(g.dot(row, g.vector(column))) for column in right] for row in tensor]
+        return [
+            [tape.let(g.dot(g.vector(row), g.vector([inner[k][j] for k in range(3)]))) for j in range(3)]
+            for row in left
+        ]
+
+    sine, cosine = tape.let(sp.sin(angle)), tape.let(sp.cos(angle))
+    both, square = tape.let(sine * cosine), tape.let(sine * sine)
+    still, full, turned = sandwich(along, along), sandwich(across, across), sandwich(quarter, quarter)
+    first, second, third = (
+        sandwich(along, across),
+        sandwich(along, quarter),
+        sandwich(across, quarter),
+    )
+
+    def entry(i: int, j: int) -> sp.Expr:
+        return tape.let(
+            tape.let(still[i][j] + full[i][j])
+            + cosine * tape.let(first[i][j] + first[j][i])
+            + sine * tape.let(second[i][j] + second[j][i])
+            + both * tape.let(third[i][j] + third[j][i])
+            + square * tape.let(turned[i][j] - full[i][j])
+        )
+
+    return _symmetric(entry)
+
+
+def rotated_tensor(tape: Tape, tensor: Tensor, rotation: Tensor) -> Tensor:
+    """Tensor R T R^T."""
+    inner = [g.named(tape, product(tensor, row)) for row in rotation]
+    return _symmetric(lambda i, j: tape.let(g.dot(rotation[i], inner[j])))
+
+
+def point_mass_tensor(mass: sp.Expr, lever: Vector) -> Tensor:
+    """Tensor of a point mass about a point from which the lever leads to it."""
+    square = g.dot(lever, lever)
+    return _symmetric(
+        lambda i, j: mass * ((square if i == j else sp.Integer(0)) - lever[i] * lever[j])
+    )
+
+
+def _symmetric(entry: Callable[[int, int], sp.Expr]) -> Tensor:
+    e = {(i, j): entry(i, j) for i in range(3) for j in range(i + 1)}
+    return (
+        (e[0, 0], e[1, 0], e[2, 0]),
+        (e[1, 0], e[1, 1], e[2, 1]),
+        (e[2, 0], e[2, 1], e[2, 2]),
+    )

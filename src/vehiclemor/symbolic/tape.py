@@ -44,12 +44,15 @@ class Tape:
             returned as they are: a name for them would only cost a line.
         """
         expression = sp.sympify(expression)
-        if expression.is_Atom or (-expression).is_Atom:
+        if expression.is_Atom:
             return expression
         known = self._symbols.get(expression)
         if known is not None:
             return known
-        negated = self._symbols.get(-expression)
+        negative = -expression
+        if negative.is_Atom:
+            return expression
+        negated = self._symbols.get(negative)
         if negated is not None:
             return -negated
         symbol = sp.Symbol(f"_v{len(self._definitions)}", real=True)
@@ -102,7 +105,7 @@ class Tape:
 
 def free_symbols(expression: sp.Expr) -> list[sp.Symbol]:
     """Free symbols of an expression, sorted by name."""
-    return cast("list[sp.Symbol]", sorted(expression.free_symbols, key=str))
+    return sorted(cast("set[sp.Symbol]", expression.free_symbols), key=lambda symbol: symbol.name)
 
 
 def dependencies(

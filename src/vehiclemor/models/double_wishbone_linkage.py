@@ -1,0 +1,178 @@
+"""Geometry of a double-wishbone corner with its tie rod: bodies as seen from their joints.
+
+Shared by the kinematic suspension model and by the vehicle that has two of these corners.  Joint
+coordinates: Uchida and McPhee (2012), Multibody Syst. Dyn. 28(4), 331-347.  On the right side the
+points are mirrored and the rotations follow the same right-hand rules.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from vehiclemor.errors import GeometryError
+from vehiclemor.parameters import Declared, point
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic.tape import Tape
+
+# Hard points at the design position, left side.
+POINTS: dict[str, Declared] = {
+    "upper_arm_front_pivot": point(),
+    "upper_arm_rear_pivot": point(),
+    "upper_ball_joint": point(),
+    "lower_arm_front_pivot": point(),
+    "lower_arm_rear_pivot": point(),
+    "lower_ball_joint": point(),
+    "tie_rod_inner": point(),
+    "tie_rod_outer": point(),
+    "wheel_centre": point(),
+}
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Control arm that turns about the axis from its rear to its front pivot.
+
+    Attributes
+    ----------
+    rear, front
+        Pivots on the chassis.
+    angle
+        Rotation from the design position in rad.
+    """
+
+    rear: g.Vector
+    front: g.Vector
+    angle: sp.Symbol
+
+    def axis(self, tape: Tape) -> g.Vector:
+        """Unit axis."""
+        between = g.named(tape, g.subtract(self.front, self.rear))
+        return g.named(tape, g.scale(1 / g.length(tape, between), between))
+
+    def lever(self, tape: Tape, place: g.Vector) -> g.Vector:
+        """From the rear pivot to where a point has moved, given its design position."""
+        axis = self.axis(tape)
+        design = g.named(tape, g.subtract(place, self.rear))
+        return g.rotate_about_axis(tape, design, axis, self.angle)
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """Bodies of a corner in their present position, components in the chassis frame.
+
+    Attributes
+    ----------
+    upper, lower
+        Control arms.
+    upper_ball_joint
+        On the upper arm; the wheel carrier's reference point.
+    carrier
+        Orientation of the wheel carrier.
+    design_ball_joint
+        The upper ball joint at the design position.
+    rack_end
+        Inner end of the tie rod.
+    rod
+        Vector from the inner to the outer end of the tie rod.
+    rod_direction
+        Unit vector along the tie rod: outwards on the left side, inwards on the right.
+    """
+
+    upper: Arm
+    lower: Arm
+    upper_ball_joint: g.Vector
+    carrier: g.Rotation
+    design_ball_joint: g.Vector
+    rack_end: g.Vector
+    rod: g.Vector
+    rod_direction: g.Vector
+
+    def carrier_lever(self, tape: Tape, place: g.Vector) -> g.Vector:
+        """From the upper ball joint to a point of the carrier, given its design position."""
+        design = g.named(tape, g.subtract(place, self.design_ball_joint))
+        return g.rotate(tape, self.carrier, design)
+
+    def on_carrier(self, tape: Tape, place: g.Vector) -> g.Vector:
+        """Where a point of the carrier has moved, given its design position."""
+        return g.named(tape, g.add(self.upper_ball_joint, self.carrier_lever(tape, place)))
+
+    def on_lower_arm(self, tape: Tape, place: g.Vector) -> g.Vector:
+        """Where a point of the lower arm has moved, given its design position."""
+        return g.named(tape, g.add(self.lower.rear, self.lower.lever(tape, place)))
+
+    @property
+    def rod_end(self) -> g.Vector:
+        """Outer end of the tie rod; not named on a tape."""
+        return g.add(self.rack_end, self.rod)
+
+
+def assembled(
+    tape: Tape,
+    q: Sequence[sp.Symbol],
+    rack: sp.Symbol,
+    points: Mapping[str, g.Vector],
+    side: int = 1,
+) -> Linkage:
+    """Bodies of a corner.
+
+    Parameters
+    ----------
+    q
+        zeta, eta, xi (3-2-1 Euler angles of the carrier), theta_u, theta_l (arms), alpha, beta
+        (universal joint of the tie rod), rad.
+    rack
+        Displacement of the rack, positive to the left, in m.
+    points
+        `POINTS` of this side.
+    side
+        1 for the left, -1 for the right side.
+    """
+    zeta, eta, xi, theta_u, theta_l, alpha, beta = q
+
+    def arm(name: str, angle: sp.Symbol) -> Arm:
+        return Arm(points[f"{name}_arm_rear_pivot"], points[f"{name}_arm_front_pivot"], angle)
+
+    upper = arm("upper", theta_u)
+    ball = points["upper_ball_joint"]
+    ball_joint = g.named(tape, g.add(upper.rear, upper.lever(tape, ball)))
+    carrier = g.euler_321(tape, zeta, eta, xi)
+    inner, outer = points["tie_rod_inner"], points["tie_rod_outer"]
+    rod_length = g.length(tape, g.named(tape, g.subtract(outer, inner)))
+    cos_beta = tape.let(sp.cos(beta))
+    direction = g.vector((-sp.sin(alpha) * cos_beta, sp.cos(alpha) * cos_beta, sp.sin(beta)))
+    rack_end = g.named(tape, (inner[0], inner[1] + rack, inner[2]))
+    rod = g.scale(side * rod_length, direction)
+    return Linkage(
+        upper, arm("lower", theta_l), ball_joint, carrier, ball, rack_end, rod, direction
+    )
+
+
+def tie_rod_angles(inner: np.ndarray, outer: np.ndarray, side: int = 1) -> tuple[float, float]:
+    """Angles alpha and beta (rad) of the tie rod's universal joint at the design position."""
+    rod = outer - inner
+    direction = side * rod / np.linalg.norm(rod)
+    return float(np.arctan2(-direction[0], direction[1])), float(np.arcsin(direction[2]))
+
+
+def check_linkage(points: Mapping[str, np.ndarray]) -> None:
+    """Raise `GeometryError` if two joints of one body coincide: nothing could be assembled."""
+    rigid_links = {
+        "upper arm axis": ("upper_arm_front_pivot", "upper_arm_rear_pivot"),
+        "lower arm axis": ("lower_arm_front_pivot", "lower_arm_rear_pivot"),
+        "tie rod": ("tie_rod_inner", "tie_rod_outer"),
+        "wheel carrier": ("upper_ball_joint", "lower_ball_joint"),
+    }
+    for link, (start, end) in rigid_links.items():
+        if np.linalg.norm(points[end] - points[start]) < 1e-6:
+            raise GeometryError(
+                f"the geometry can't be assembled: {start} and {end} coincide ({link} of length 0)"
+            )
+    for arm in ("upper", "lower"):
+        rear, front = points[f"{arm}_arm_rear_pivot"], points[f"{arm}_arm_front_pivot"]
+        lever = np.cross(front - rear, points[f"{arm}_ball_joint"] - rear)
+        if np.linalg.norm(lever) < 1e-6 * np.linalg.norm(front - rear):
+            raise GeometryError(
+                f"the geometry can't be assembled: {arm}_ball_joint lies on the axis of its arm"
+            )

@@ -1,0 +1,120 @@
+"""Builds dynamic models (kinds `ode` and `dae`): derives, compiles, checks and parametrises them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.codegen.cache import kernel_hash, load_module
+from vehiclemor.codegen.derivation import Derivation, derivation
+from vehiclemor.codegen.link import loops_source
+from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.registry import component
+from vehiclemor.simulation import explicit_loops, rosenbrock_loops, run_loops, system_loops
+from vehiclemor.simulation.dynamic import DynamicModel
+
+
+def build(
+    name: str,
+    parameter_file: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> DynamicModel:
+    """Derive (or fetch), compile and parametrise a registered dynamic model.
+
+    Raises
+    ------
+    VehiclemorError
+        If a parameter is wrong or the vehicle can't stand.
+    """
+    definition = component("model", name)
+    path = parameter_file or getattr(definition, "PARAMETER_FILE", None)
+    parameters = load_parameters(name, definition.PARAMETERS, path, overrides)
+    values = {
+        key: parameters[key] if declared.size > 1 else float(parameters[key])
+        for key, declared in definition.PARAMETERS.items()
+    }
+    definition.check(values)
+    equations, kernels, digest = compiled(name, definition)
+    values |= _solved(definition, values, parameters, kernels)
+    constants = _constants(kernels, parameters, [values[key] for key in _to_solve(definition)])
+    states = [q.name for q in (*equations.coordinates, *equations.speeds)]
+    typical = dict.fromkeys(states, 1.0) | dict(getattr(definition, "TYPICAL", {}))
+    return DynamicModel(
+        name,
+        definition.SUMMARY,
+        definition.KIND,
+        equations,
+        parameters,
+        kernels,
+        loops_module(),
+        digest,
+        constants,
+        definition.starts(values),
+        np.array([i for i, state in enumerate(states) if state not in definition.CYCLIC]),
+        np.array([typical[state] for state in states]),
+        getattr(definition, "VALIDITY", {}),
+        tuple(getattr(definition, "LOADS", ())),
+        _turning(definition, states),
+    )
+
+
+def compiled(name: str, definition: Any) -> tuple[Derivation, ModuleType, str]:
+    """Derivation and compiled kernels of a model, and their hash; parameters play no part here."""
+    made = derivation(name, definition)
+    digest = kernel_hash(f"{made.source}\n{_loops_text()}")
+    return made, load_module(name, made.source), digest
+
+
+@cache
+def _loops_text() -> str:
+    modules = [system_loops, explicit_loops, rosenbrock_loops, run_loops]
+    return loops_source(modules, "the loops of dynamic models")
+
+
+@cache
+def loops_module() -> ModuleType:
+    """Compiled loops that run every dynamic model."""
+    return load_module("dynamic_loops", _loops_text())
+
+
+def _to_solve(definition: Any) -> tuple[str, ...]:
+    """Parameters of the kernels that a model solves for: they follow the declared ones."""
+    return tuple(getattr(definition, "SOLVED", ()))
+
+
+def _constants(kernels: ModuleType, parameters: ParameterSet, solved: list[float]) -> np.ndarray:
+    """Hoisted constants of a parameter set."""
+    constants = np.empty(kernels.CONSTANTS)
+    flat = np.concatenate([parameters.flat(), solved])
+    kernels.constants(flat, np.empty(kernels.WORK), constants)
+    return constants
+
+
+def _solved(
+    definition: Any, values: Mapping[str, Any], parameters: ParameterSet, kernels: ModuleType
+) -> dict[str, float]:
+    """What a model solves for before it can start, by name."""
+    if not _to_solve(definition):
+        return {}
+    work = np.zeros(kernels.WORK)
+
+    def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        result = np.empty(len(x))
+        kernels.derivative(x, u, _constants(kernels, parameters, solved), work, result)
+        return result
+
+    return definition.settle(values, derivative)
+
+
+def _turning(definition: Any, states: list[str]) -> np.ndarray:
+    """Numbers of the heading and of the pairs of states that turn with it; empty if none do."""
+    heading, pairs = getattr(definition, "HEADING", (None, ()))
+    if heading is None:
+        return np.zeros(0, dtype=np.int64)
+    numbers = [states.index(name) for name in (heading, *(n for pair in pairs for n in pair))]
+    return np.array(numbers, dtype=np.int64)

@@ -1,0 +1,349 @@
+"""The high-fidelity vehicle's numbers, points, tensors, steering input, tyre and random states.
+
+Written from the text of the vehicle's specification alone; `high_fidelity_vehicle` and
+`high_fidelity_pinocchio` use it.  Numbers are of the left side; the right side is mirrored.
+Arrays over two sides are in the order left, right.  SI units throughout.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+Numbers = Mapping[str, float | list]
+
+CORNER = ("zeta", "eta", "xi", "theta_u", "theta_l", "alpha", "beta")
+COORDINATES = (
+    *("x", "y", "z", "psi", "theta", "phi"),
+    *(f"{name}_FL" for name in CORNER),
+    *(f"{name}_FR" for name in CORNER),
+    *("a_RL", "a_RR"),
+    *("spin_FL", "spin_FR", "spin_RL", "spin_RR"),
+)
+BODIES = (
+    "chassis",
+    *("upper_arm_FL", "upper_arm_FR", "lower_arm_FL", "lower_arm_FR", "carrier_FL", "carrier_FR"),
+    *("tie_rod_FL", "tie_rod_FR", "wheel_FL", "wheel_FR"),
+    *("arm_RL", "arm_RR", "wheel_RL", "wheel_RR"),
+)
+WHEELS = [BODIES.index(f"wheel_{corner}") for corner in ("FL", "FR", "RL", "RR")]
+# what a wheel turns on: the front carriers and the rear arms
+HOLDERS = [BODIES.index(name) for name in ("carrier_FL", "carrier_FR", "arm_RL", "arm_RR")]
+AXLES = ("front", "front", "rear", "rear")  # of the wheels and springs in the order FL to RR
+DEPENDENT = [k for k in range(6, 20) if k not in {10, 17}]  # corner coordinates but theta_l
+
+PARAMETERS = {
+    "general.gravity": 9.81,
+    "general.baumgarte_a": 50.0,
+    "general.baumgarte_b": 50.0,
+    "general.initial_speed": 20.0,
+    "frames.S_origin_in_V": [1.388, 0.0, 0.1199],
+    "frames.R_origin_in_V": [-1.388, 0.7979, 0.0],
+    "frames.C_origin_in_V": [0.0, 0.0, 0.2277],
+    "chassis.mass": 1515.0,
+    "chassis.inertia_diag": [460.0, 2580.0, 2800.0],
+    "front.points.upper_pivot_front": [-0.1, 0.47, 0.105],
+    "front.points.upper_pivot_rear": [-0.25, 0.51, 0.11],
+    "front.points.upper_ball": [-0.04, 0.695, 0.105],
+    "front.points.lower_pivot_front": [0.2, 0.42, -0.27],
+    "front.points.lower_pivot_rear": [-0.2, 0.47, -0.265],
+    "front.points.lower_ball": [0.0, 0.77, -0.32],
+    "front.points.rack_end": [-0.2, 0.4921, -0.0962],
+    "front.points.tie_rod_outer": [-0.15, 0.77, -0.12],
+    "front.points.wheel_centre": [0.0, 0.7979, -0.1199],
+    "front.points.spring_chassis": [-0.04, 0.52, 0.23],
+    "front.points.spring_arm": [0.0, 0.62, -0.27],
+    "front.upper_arm.mass": 1.032,
+    "front.upper_arm.cg": [-0.1083, 0.5972, 0.1063],
+    "front.upper_arm.inertia_arm_frame": [0.00591, 0.0019, 0.00769],
+    "front.lower_arm.mass": 1.611,
+    "front.lower_arm.cg": [0.0048, 0.6112, -0.2932],
+    "front.lower_arm.inertia_arm_frame": [0.0151, 0.0207, 0.0355],
+    "front.upright.mass": 1.397,
+    "front.upright.cg": [-0.0224, 0.747, -0.1118],
+    "front.upright.inertia_diag": [0.0138, 0.0146, 0.00283],
+    "front.tie_rod.mass": 0.55,
+    "front.tie_rod.inertia_transverse": 0.0057,
+    "front.tie_rod.inertia_axial": 2e-05,
+    "front.wheel.mass": 25.803,
+    "front.wheel.inertia_spin": 1.099496,
+    "front.wheel.inertia_transverse": 0.396478,
+    "front.spring.stiffness": 73574.10163,
+    "front.spring.damping": 15054.53731,
+    "front.spring.free_length": 0.6093460427981641,
+    "rear.pivot": [0.45, -0.25, -0.03],
+    "rear.arm.mass": 14.25,
+    "rear.arm.cg": [0.069614, -0.135789, -0.053421],
+    "rear.arm.inertia": [
+        [0.268112, 0.058977, 0.068806],
+        [0.058977, 0.359839, -0.033655],
+        [0.068806, -0.033655, 0.349422],
+    ],
+    "rear.wheel.mass": 24.7,
+    "rear.wheel.inertia_spin": 1.099,
+    "rear.wheel.inertia_transverse": 0.396,
+    "rear.spring.chassis_point": [0.17, -0.2075, 0.335],
+    "rear.spring.arm_point": [0.09, -0.23, -0.045],
+    "rear.spring.stiffness": 43780.0,
+    "rear.spring.damping": 4000.0,
+    "rear.spring.free_length": 0.4990957602849919,
+    "tyre.unloaded_radius": 0.3266,
+    "tyre.vertical_stiffness": 280835.2941,
+    "tyre.vertical_damping": 2000.0,
+    "tyre.c_long": 115000.0,
+    "tyre.c_alpha": 117000.0,
+    "tyre.mu_max": 0.75,
+    "tyre.mu_min": 0.2,
+    "tyre.width": 0.32,
+    "tyre.v_low": 0.5,
+    "steering.amplitude": -0.0046903,
+    "steering.start": 1.0,
+    "steering.period": 2.5,
+    "steering.duration": 10.0,
+    "dropped_start.dz": 0.03,
+    "dropped_start.dpitch": 0.015,
+}
+NO_DAMPERS = {"front.spring.damping": 0.0, "rear.spring.damping": 0.0}
+NO_TYRES = {"tyre.vertical_stiffness": 0.0, "tyre.vertical_damping": 0.0}
+
+
+class State(NamedTuple):
+    """Coordinates, their rates, and the rack's position, velocity and acceleration."""
+
+    q: np.ndarray
+    qd: np.ndarray
+    s: float
+    sd: float
+    sdd: float
+
+
+def both_sides(point: np.ndarray) -> np.ndarray:
+    """A left point and its mirror image (2, 3)."""
+    return np.array([point, point * [1, -1, 1]])
+
+
+def front_points(p: Numbers = PARAMETERS) -> dict[str, np.ndarray]:
+    """Front points and centres of gravity at design, C-coordinates (2, 3) in m."""
+    shift = np.subtract(p["frames.S_origin_in_V"], p["frames.C_origin_in_V"])
+    given = {k.removeprefix("front.points."): p[k] for k in p if k.startswith("front.points.")}
+    given |= {f"{body}_cg": p[f"front.{body}.cg"] for body in ("upper_arm", "lower_arm", "upright")}
+    return {name: both_sides(np.add(point, shift)) for name, point in given.items()}
+
+
+def rear_points(p: Numbers = PARAMETERS) -> dict[str, np.ndarray]:
+    """Rear points at design, C-coordinates (2, 3) in m."""
+    shift = np.subtract(p["frames.R_origin_in_V"], p["frames.C_origin_in_V"])
+    given = {
+        "wheel_centre": [0.0, 0.0, 0.0],
+        "pivot": p["rear.pivot"],
+        "arm_cg": p["rear.arm.cg"],
+        "spring_chassis": p["rear.spring.chassis_point"],
+        "spring_arm": p["rear.spring.arm_point"],
+    }
+    return {name: both_sides(np.add(point, shift)) for name, point in given.items()}
+
+
+def arm_axis(arm: str, points: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Unit axes (2, 3) of the front "upper" or "lower" arms, rear to front pivot."""
+    axis = points[f"{arm}_pivot_front"] - points[f"{arm}_pivot_rear"]
+    return axis / np.linalg.norm(axis, axis=1, keepdims=True)
+
+
+def tie_rod_length(points: Mapping[str, np.ndarray]) -> float:
+    """Length of a tie rod in m, from the front points."""
+    return np.linalg.norm(points["tie_rod_outer"][0] - points["rack_end"][0])
+
+
+def arm_tensor(arm: str, p: Numbers = PARAMETERS) -> np.ndarray:
+    """Inertia (3, 3) of the left front arm about its centre of gravity, C axes, in kg m^2."""
+    points = front_points(p)
+    first = arm_axis(arm, points)[0]
+    third = np.cross(first, points[f"{arm}_ball"][0] - points[f"{arm}_pivot_rear"][0])
+    third /= np.linalg.norm(third)
+    axes = np.array([first, np.cross(third, first), third]).T
+    return axes @ np.diag(p[f"front.{arm}_arm.inertia_arm_frame"]) @ axes.T
+
+
+def masses_and_tensors(p: Numbers = PARAMETERS) -> tuple[np.ndarray, np.ndarray]:
+    """Masses (15,) in kg and body-fixed inertia tensors (15, 3, 3) in kg m^2, order of BODIES.
+
+    Axes are the body's own, which are the chassis' at design, but the tie rods': along them is y.
+    """
+
+    def slender(part: str, axial: str) -> np.ndarray:
+        across = p[f"{part}.inertia_transverse"]
+        return np.diag([across, p[f"{part}.{axial}"], across])
+
+    left = [
+        (p["front.upper_arm.mass"], arm_tensor("upper", p)),
+        (p["front.lower_arm.mass"], arm_tensor("lower", p)),
+        (p["front.upright.mass"], np.diag(p["front.upright.inertia_diag"])),
+        (p["front.tie_rod.mass"], slender("front.tie_rod", "inertia_axial")),
+        (p["front.wheel.mass"], slender("front.wheel", "inertia_spin")),
+        (p["rear.arm.mass"], np.array(p["rear.arm.inertia"])),
+        (p["rear.wheel.mass"], slender("rear.wheel", "inertia_spin")),
+    ]
+    mirror = np.diag([1.0, -1.0, 1.0])
+    masses, tensors = [p["chassis.mass"]], [np.diag(p["chassis.inertia_diag"])]
+    for mass, tensor in left:
+        masses += [mass, mass]
+        tensors += [tensor, mirror @ tensor @ mirror]
+    return np.array(masses), np.array(tensors)
+
+
+def design(p: Numbers = PARAMETERS) -> np.ndarray:
+    """Coordinates (26,) of the joints at design, with the chassis at the world's origin."""
+    points = front_points(p)
+    d = (points["tie_rod_outer"][0] - points["rack_end"][0]) / tie_rod_length(points)
+    angles = np.array([np.arctan2(-d[0], d[1]), np.arcsin(d[2])])
+    q = np.zeros(26)
+    q[11:13], q[18:20] = angles, -angles
+    return q
+
+
+def lane_change(
+    t: float, amplitude: float = 1.0, frequency: float = 1.0, p: Numbers = PARAMETERS
+) -> tuple[float, float, float]:
+    """Position in m, velocity and acceleration of the rack at time t in s."""
+    rate = frequency / p["steering.period"]
+    tau = (t - p["steering.start"]) * rate
+    if not 0 <= tau <= 1:
+        return 0.0, 0.0, 0.0
+    a, w = amplitude * p["steering.amplitude"], 2 * np.pi
+    return (
+        a * (np.sin(w * tau) - np.sin(2 * w * tau) / 2),
+        a * w * rate * (np.cos(w * tau) - np.cos(2 * w * tau)),
+        a * (w * rate) ** 2 * (2 * np.sin(2 * w * tau) - np.sin(w * tau)),
+    )
+
+
+def fiala(fz: float, kappa: float, t: float, p: Numbers) -> tuple[float, float, float]:
+    """Longitudinal and lateral force in N, aligning moment in N m, by load and slips."""
+    if fz == 0:
+        return 0.0, 0.0, 0.0
+    slip = min(1.0, np.sqrt(kappa**2 + t**2))
+    grip = (p["tyre.mu_max"] - (p["tyre.mu_max"] - p["tyre.mu_min"]) * slip) * fz
+    stiff = p["tyre.c_long"]
+    if abs(kappa) <= grip / (2 * stiff):
+        fx = stiff * kappa
+    else:
+        fx = np.sign(kappa) * (grip - grip**2 / (4 * abs(kappa) * stiff))
+    pull = p["tyre.c_alpha"] * abs(t)
+    if pull > 3 * grip:
+        return fx, -np.sign(t) * grip, 0.0
+    h = 1 - pull / (3 * grip)
+    fy = -np.sign(t) * grip * (1 - h**3)
+    return fx, fy, np.sign(t) * grip * p["tyre.width"] * (1 - h) * h**3
+
+
+def random_states(
+    count: int, seed: int = 0, speeds: tuple[float, float] = (5.0, 30.0), p: Numbers = PARAMETERS
+) -> list[State]:
+    """States over the reachable range; the seed fixes them.
+
+    In states of even number the loops are closed (Phi = Phi' = 0); in the others the corner
+    coordinates are off by up to 1e-3 and their rates are independent of each other.  Every third
+    state moves gently, so that tyres slip little.  Wheels are in the air or on the road.
+
+    Parameters
+    ----------
+    count
+        How many states.
+    seed
+        Seed of the generator.
+    speeds
+        Range of the forward speed in m/s.  Small ones reach the lower bound of |V_x|.
+    p
+        The vehicle's numbers.
+    """
+    rng = np.random.default_rng(seed)
+    states = []
+    while len(states) < count:
+        closed, gentle = len(states) % 2 == 0, len(states) % 3 == 2
+        state = random_state(rng, speeds, p, closed=closed, gentle=gentle)
+        if state is not None:
+            states.append(state)
+    return states
+
+
+def random_state(
+    rng: np.random.Generator,
+    speeds: tuple[float, float],
+    p: Numbers,
+    *,
+    closed: bool,
+    gentle: bool,
+) -> State | None:
+    """One state, or None if a wheel would be deep in the road."""
+    from tests.oracles.high_fidelity_vehicle import tyres
+
+    scale = rng.uniform()  # postures near design are as likely as far ones
+    s = rng.uniform(-0.03, 0.03)
+    q = design(p)
+    q[[10, 17]] = scale * rng.uniform(-0.35, 0.35, 2)
+    q = close_corners(q, s, p)
+    q[20:22] = scale * rng.uniform(-0.25, 0.25, 2)
+    if not closed:
+        q[6:22] += rng.uniform(-1e-3, 1e-3, 16)
+    q[:2] = rng.uniform(-50, 50, 2)
+    q[3] = rng.uniform(-np.pi, np.pi)
+    q[4:6] = scale * rng.uniform(-0.2, 0.2, 2)
+    q[22:] = rng.uniform(-np.pi, np.pi, 4)
+
+    # one of the wheels is near the road; radii at z = 0 differ but for camber as at the right z
+    below = tyres(q, np.zeros(26), p)[rng.integers(4)]["r"]
+    q[2] = p["tyre.unloaded_radius"] - rng.uniform(-0.003, 0.03) - below
+    radii = np.array([tyre["r"] for tyre in tyres(q, np.zeros(26), p)])
+    if radii.min() < p["tyre.unloaded_radius"] - 0.1:
+        return None
+
+    vivid = 0.02 if gentle else 1.0
+    forward = rng.uniform(*speeds)
+    sideward, upward = vivid * rng.uniform(-2, 2), vivid * rng.uniform(-1, 1)
+    cos, sin = np.cos(q[3]), np.sin(q[3])
+    qd = np.zeros(26)
+    qd[:3] = cos * forward - sin * sideward, sin * forward + cos * sideward, upward
+    qd[3:6] = vivid * rng.uniform(-1, 1, 3)
+    qd[6:22] = vivid * rng.uniform(-2, 2, 16)
+    qd[22:] = forward / radii * (1 + vivid * rng.uniform(-0.2, 0.2, 4))
+    sd, sdd = vivid * rng.uniform(-0.1, 0.1), rng.uniform(-1, 1)
+    if closed:
+        qd = consistent_rates(q, qd, s, sd, p)
+    return State(q, qd, s, sd, sdd)
+
+
+def close_corners(q: np.ndarray, s: float, p: Numbers = PARAMETERS, steps: int = 2) -> np.ndarray:
+    """The coordinates with both front loops closed, at the given theta_l and rack position.
+
+    The corners' other coordinates follow from the design position by continuation.
+    """
+    # that module uses this one's numbers, so it cannot be imported at the top
+    from tests.oracles.high_fidelity_vehicle import constraints
+
+    target, rest = np.array(q, dtype=float), design(p)
+    closed = target.copy()
+    closed[6:20] = rest[6:20]
+    for share in np.arange(1, steps + 1) / steps:
+        closed[[10, 17]] = share * target[[10, 17]]
+        for _ in range(20):
+            phi, _, jacobian, _ = constraints(closed, np.zeros(26), share * s, 0.0, 0.0, p)
+            change = np.linalg.solve(jacobian[:, DEPENDENT], phi)
+            closed[DEPENDENT] -= change
+            if np.abs(change).max() < 1e-12:  # converges quadratically: the next would be rounding
+                break
+        else:
+            raise ValueError("front loops cannot be closed")
+    return closed
+
+
+def consistent_rates(
+    q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS
+) -> np.ndarray:
+    """The rates with Phi' = 0: those of the corners' dependent coordinates are replaced."""
+    from tests.oracles.high_fidelity_vehicle import constraints
+
+    rates = np.array(qd, dtype=float)
+    rates[DEPENDENT] = 0.0
+    _, rest, jacobian, _ = constraints(q, rates, s, sd, 0.0, p)
+    rates[DEPENDENT] = -np.linalg.solve(jacobian[:, DEPENDENT], rest)
+    return rates
