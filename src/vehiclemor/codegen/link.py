@@ -60,15 +60,21 @@ def loops_source(loops: Sequence[ModuleType], origin: str) -> str:
 
     Functions of one line, which call the kernels, are inlined by order, and those that a module of
     loops names in `INLINED`: arrays cost more to pass than short functions take.  With others,
-    machine code and compile time would multiply.
+    machine code and compile time would multiply.  Functions that allocate nothing don't count
+    references: atomic increments took two thirds of an integrator's own time.
     """
+    texts = [_functions(module) for module in loops]
+    allocating = _allocating("\n".join(texts))
     lines = [
         *_head(origin),
         "from numba import njit",
         "from vehiclemor.codegen.straight_line import call_machine",
         *_writer(),
         "",
-        *(_decorated(_functions(module), 1, getattr(module, "INLINED", ())) for module in loops),
+        *(
+            _decorated(text, 1, getattr(module, "INLINED", ()), allocating)
+            for text, module in zip(texts, loops, strict=True)
+        ),
     ]
     return "\n".join(lines) + "\n"
 
@@ -144,12 +150,33 @@ def _is_number(value: ast.expr) -> bool:
     return all(isinstance(node, allowed) for node in ast.walk(value))
 
 
-def _decorated(text: str, longest: int, inlined: Sequence[str] = ()) -> str:
+def _allocating(text: str) -> frozenset[str]:
+    """Functions that make arrays, or call others that do."""
+    found: set[str] = {"empty", "zeros"}
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.FunctionDef) and any(
+            ast.unparse(call.func).removeprefix("np.") in found
+            for call in ast.walk(node)
+            if isinstance(call, ast.Call)
+        ):
+            found.add(node.name)
+    return frozenset(found)
+
+
+def _decorated(
+    text: str,
+    longest: int,
+    inlined: Sequence[str] = (),
+    counting: frozenset[str] | None = None,
+) -> str:
+    """Functions with their decorators; those not `counting` references, if given, don't."""
     parts: list[str] = []
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
             lines = len(node.body) if node.name in inlined else longest
-            parts.append(f"@{COMPILE}{_inlining(node, max(lines, longest))})")
+            free = counting is not None and node.name not in counting
+            options = _inlining(node, max(lines, longest)) + (", _nrt=False" if free else "")
+            parts.append(f"@{COMPILE}{options})")
         parts.append(ast.unparse(node))
     return "\n".join(parts) + "\n"
 

@@ -45,6 +45,8 @@ NEEDED_FOR = {
     "second_order": "equations of motion can't be projected in the coordinates, nor weighed by "
     "energy",
     "speeds": "rates of the coordinates can't be turned into speeds",
+    "descriptor": "there are no equations before elimination",
+    "violations": "there are no constraints",
 }
 REASONS = {
     1: f"more than {MOST_CALLS} evaluations of the right-hand side",
@@ -178,6 +180,21 @@ class DynamicModel:
     def mass_matrix(self, x: Any) -> np.ndarray:
         """Mass matrix (n, n) that belongs to the second derivatives of the coordinates."""
         return self._call("second_order", x, np.zeros(len(self.inputs)))[:, :-1]
+
+    def descriptor(self, x: Any, u: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """M (n, n), F (n,), C (c, n), gamma (c,) of the equations before they are solved.
+
+        M q'' - C^T lambda = F and C q'' = gamma; F are applied less inertial forces, C q'' = gamma
+        the stabilised constraints.
+        """
+        n = len(self.coordinates)
+        rows = self._call("descriptor", x, u)
+        return rows[:n, :n], rows[:n, n], rows[n:, :n], rows[n:, n]
+
+    def violations(self, x: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Constraints (c,) and their rates (c,) at the state x and inputs u; zero if they hold."""
+        pairs = self._call("violations", x, u)
+        return pairs[:, 0], pairs[:, 1]
 
     def speeds_of_rates(self, x: Any) -> np.ndarray:
         """Speeds (n,) where x (2 n,) holds the rates of the coordinates in their place."""

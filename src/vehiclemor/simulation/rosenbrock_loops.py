@@ -77,10 +77,21 @@ def frozen_solve(inverse, dim, active, b, result):
         result[i] = b[i]
     for j in active:
         result[j] = 0.0
-    for place in range(len(active)):
-        weight = b[active[place]]
+    # Four rows at a time: the result is loaded and stored a quarter as often.
+    place = 0
+    while place + 3 < len(active):
+        w0, w1 = b[active[place]], b[active[place + 1]]
+        w2, w3 = b[active[place + 2]], b[active[place + 3]]
         for i in range(dim):
-            result[i] += inverse[place, i] * weight
+            result[i] += (inverse[place, i] * w0 + inverse[place + 1, i] * w1) + (
+                inverse[place + 2, i] * w2 + inverse[place + 3, i] * w3
+            )
+        place += 4
+    while place < len(active):
+        w0 = b[active[place]]
+        for i in range(dim):
+            result[i] += inverse[place, i] * w0
+        place += 1
 
 
 def turn(vector, turning, cosine, sine):
