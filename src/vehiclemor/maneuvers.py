@@ -174,7 +174,10 @@ straight_ahead = Maneuver(
 
 def _rack_lane_change(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
     part = (times - LANE_CHANGE_START) * frequency / LANE_CHANGE_LENGTH
-    angle, rate = 2.0 * np.pi * np.clip(part, 0.0, 1.0), 2.0 * np.pi * frequency / LANE_CHANGE_LENGTH
+    angle, rate = (
+        2.0 * np.pi * np.clip(part, 0.0, 1.0),
+        2.0 * np.pi * frequency / LANE_CHANGE_LENGTH,
+    )
     pulse = np.column_stack(
         [
             np.sin(angle) - 0.5 * np.sin(2.0 * angle),

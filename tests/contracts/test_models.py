@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.equations import Quantity
+from vehiclemor.models.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel, build
 from vehiclemor.simulation.trajectory import trajectory_dataset

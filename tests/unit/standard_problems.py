@@ -11,7 +11,8 @@ import numpy as np
 import sympy as sp
 
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.equations import DynamicEquations, Quantity
+from vehiclemor.models.equations import DynamicEquations
+from vehiclemor.models.quantities import Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape

@@ -14,14 +14,15 @@ import tempfile
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vehiclemor.codegen.cache import cache_folder
-from vehiclemor.codegen.emit import kernel_source, operation_counts, reference_source, work_size
 from vehiclemor.codegen.link import kernels_source
 from vehiclemor.codegen.sources import source_digest
-from vehiclemor.models.equations import DynamicEquations, Quantity
+from vehiclemor.models.quantities import Quantity
+
+if TYPE_CHECKING:
+    from vehiclemor.models.equations import DynamicEquations
 
 LAYERS = ("models", "symbolic", "codegen")
 QUANTITIES = ("coordinates", "speeds", "inputs", "outputs", "constraints")
@@ -73,6 +74,14 @@ def derivation(name: str, definition: Any) -> Derivation:
 
 def derived(name: str, equations: DynamicEquations) -> Derivation:
     """Source and description of the kernels of a model's equations."""
+    # Only here is anything symbolic: a model that was derived before starts without it.
+    from vehiclemor.codegen.emit import (
+        kernel_source,
+        operation_counts,
+        reference_source,
+        work_size,
+    )
+
     program = equations.program
     sizes = {"WORK": work_size(program), "CONSTANTS": len(program.constant_symbols)}
     return Derivation(
@@ -89,6 +98,11 @@ def derived(name: str, equations: DynamicEquations) -> Derivation:
 
 def _read(text: str) -> Derivation:
     content = json.loads(text)
-    quantities = [tuple(Quantity(**entry) for entry in content[key]) for key in QUANTITIES]
+    quantities = {key: tuple(Quantity(**entry) for entry in content[key]) for key in QUANTITIES}
     shapes = {key: tuple(shape) for key, shape in content["shapes"].items()}
-    return Derivation(*quantities, shapes, content["source"], content["operations"])
+    return Derivation(
+        **quantities,
+        shapes=shapes,
+        source=content["source"],
+        operations=content["operations"],
+    )

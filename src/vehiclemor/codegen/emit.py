@@ -10,17 +10,11 @@ import ast
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
+from vehiclemor.codegen.batches import LANES, RESULTS, SMALLEST_BATCH
 from vehiclemor.codegen.schedule import Batch, schedule
 from vehiclemor.symbolic.program import Function, Program
 
 OPERATIONS = ("add", "multiply", "divide", "negate", "sqrt", "trigonometric", "power")
-# Elementary functions are evaluated this many at a time, so that the compiler makes one vector loop
-# of them; fewer than the smallest batch one by one.
-LANES = 8
-SMALLEST_BATCH = 3
-# Batched function -> prefixes of its results; its block in the scratch space has one part for the
-# arguments and one for each result.
-RESULTS = {"sincos": ("_sin", "_cos"), "atan": ("_atan",)}
 
 
 class _Printer(PythonCodePrinter):

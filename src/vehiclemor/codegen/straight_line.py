@@ -27,7 +27,7 @@ from numba.core.typing import signature
 from numba.extending import intrinsic
 
 from vehiclemor.codegen import arctangent, exponential, sincos
-from vehiclemor.codegen.emit import LANES, RESULTS
+from vehiclemor.codegen.batches import LANES, RESULTS
 
 # A product and a sum may become one operation, as in the loops that are compiled with them.
 FLAGS = ("contract",)

@@ -12,8 +12,9 @@ from typing import cast
 import numpy as np
 import sympy as sp
 
-from vehiclemor.models import double_wishbone_linkage
-from vehiclemor.models.equations import AlgebraicEquations, Quantity
+from vehiclemor.models import double_wishbone_linkage, double_wishbone_points
+from vehiclemor.models.equations import AlgebraicEquations
+from vehiclemor.models.quantities import Quantity
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.program import assemble
@@ -56,7 +57,7 @@ EQUATIONS = (
     Quantity("wheel_height", "m", "prescribed wheel-centre height"),
     Quantity("rack_displacement", "m", "prescribed rack displacement"),
 )
-PARAMETERS = double_wishbone_linkage.POINTS
+PARAMETERS = double_wishbone_points.POINTS
 
 
 def derive() -> AlgebraicEquations:
@@ -144,9 +145,9 @@ def design_coordinates(points: Mapping[str, np.ndarray]) -> np.ndarray:
     GeometryError
         If two joints of one body coincide, so that the mechanism can't be assembled.
     """
-    double_wishbone_linkage.check_linkage(points)
+    double_wishbone_points.check_linkage(points)
     design = np.zeros(len(COORDINATES))
-    design[5:7] = double_wishbone_linkage.tie_rod_angles(
+    design[5:7] = double_wishbone_points.tie_rod_angles(
         points["tie_rod_inner"], points["tie_rod_outer"]
     )
     return design

@@ -2,16 +2,8 @@
 
 from dataclasses import dataclass
 
+from vehiclemor.models.quantities import Quantity
 from vehiclemor.symbolic.program import Program
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """Name, SI unit and meaning of one coordinate, input or output."""
-
-    name: str
-    unit: str
-    long_name: str
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,15 @@ import sympy as sp
 
 from vehiclemor.errors import GeometryError
 from vehiclemor.models import vehicle_body as body
-from vehiclemor.models.equations import DynamicEquations, Quantity
+from vehiclemor.models.equations import DynamicEquations
+from vehiclemor.models.quantities import (
+    CHASSIS_COORDINATES,
+    CHASSIS_OUTPUTS,
+    CHASSIS_SPEEDS,
+    WHEELS,
+    Quantity,
+    per_wheel,
+)
 from vehiclemor.models.tires import MAGIC_FORMULA, TireForces, magic_formula
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
@@ -28,31 +36,30 @@ NAME = "independent_suspension_vehicle"
 KIND = "ode"
 SUMMARY = "vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)"
 MANEUVER = "lane_change"
-WHEELS = body.WHEELS
 FRONT = (True, True, False, False)
 LEFT = (True, False, True, False)
 # The right-hand side does not depend on them.
 CYCLIC = ("X", "Y", *(f"gamma_{wheel}" for wheel in WHEELS))
 
 COORDINATES = (
-    *body.COORDINATES,
+    *CHASSIS_COORDINATES,
     *(Quantity(f"z_{w}", "m", f"travel of the {w} wheel, compression positive") for w in WHEELS),
     *(Quantity(f"gamma_{w}", "rad", f"spin angle of the {w} wheel") for w in WHEELS),
 )
 SPEEDS = (
-    *body.SPEEDS,
+    *CHASSIS_SPEEDS,
     *(Quantity(f"zdot_{w}", "m/s", f"rate of travel of the {w} wheel") for w in WHEELS),
     *(Quantity(f"omega_{w}", "rad/s", f"spin of the {w} wheel on its carrier") for w in WHEELS),
 )
 INPUTS = (Quantity("delta", "rad", "steering angle of both front wheels, positive to the left"),)
 OUTPUTS = (
-    *body.OUTPUTS,
-    *body.per_wheel("Fx", "N", "longitudinal force on the {} tire"),
-    *body.per_wheel("Fy", "N", "lateral force on the {} tire"),
-    *body.per_wheel("Fz", "N", "vertical load of the {} tire"),
-    *body.per_wheel("Mz", "N m", "aligning moment on the {} tire"),
-    *body.per_wheel("slip_ratio", "1", "longitudinal slip of the {} tire"),
-    *body.per_wheel("slip_angle", "rad", "slip angle of the {} tire, sliding left positive"),
+    *CHASSIS_OUTPUTS,
+    *per_wheel("Fx", "N", "longitudinal force on the {} tire"),
+    *per_wheel("Fy", "N", "lateral force on the {} tire"),
+    *per_wheel("Fz", "N", "vertical load of the {} tire"),
+    *per_wheel("Mz", "N m", "aligning moment on the {} tire"),
+    *per_wheel("slip_ratio", "1", "longitudinal slip of the {} tire"),
+    *per_wheel("slip_angle", "rad", "slip angle of the {} tire, sliding left positive"),
 )
 PARAMETERS = {
     "gravity": Declared("m/s^2", above=0.0, at_most=100.0),
@@ -275,7 +282,9 @@ def _bodies(
         )
         steer = (tape.let(sp.sin(delta)), tape.let(sp.cos(delta)))
         axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
-        centre = frame.point(tape, place, joints.along(joints.free_rate(6 + wheel, rate), mechanics.UNIT[2]))
+        centre = frame.point(
+            tape, place, joints.along(joints.free_rate(6 + wheel, rate), mechanics.UNIT[2])
+        )
         about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
         rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
         contact = body.contact(

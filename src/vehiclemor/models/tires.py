@@ -142,9 +142,7 @@ def fiala(
     # With w = kappa / max(|kappa|, kappa*) both cases of the law are one expression.
     critical = let(limit / (2 * c["longitudinal_slip_stiffness"]))
     inverse = let(1 / (maximum(tape, let(sp.Abs(slip_ratio)), critical) + NOTHING))
-    longitudinal = let(
-        let(limit * let(slip_ratio * inverse)) * let(1 - critical * inverse / 2)
-    )
+    longitudinal = let(let(limit * let(slip_ratio * inverse)) * let(1 - critical * inverse / 2))
 
     # With y = C tan(alpha) / max(3 U, C |tan(alpha)|) as well; H = 1 - |y|.
     drive, most = let(c["cornering_stiffness"] * tan_slip), let(3 * limit)

@@ -9,41 +9,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.equations import Quantity
+from vehiclemor.models.quantities import Quantity
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.tape import Tape
-
-# Front left, front right, rear left, rear right.
-WHEELS = ("FL", "FR", "RL", "RR")
-
-COORDINATES = (
-    Quantity("X", "m", "position of the sprung body's centre of mass in x"),
-    Quantity("Y", "m", "position of the sprung body's centre of mass in y"),
-    Quantity("Z", "m", "height of the sprung body's centre of mass above the road"),
-    Quantity("psi", "rad", "yaw angle, positive to the left"),
-    Quantity("theta", "rad", "pitch angle, nose down positive"),
-    Quantity("phi", "rad", "roll angle, right side down positive"),
-)
-SPEEDS = (
-    Quantity("u", "m/s", "longitudinal velocity, chassis component"),
-    Quantity("v", "m/s", "lateral velocity, chassis component"),
-    Quantity("w", "m/s", "vertical velocity, chassis component"),
-    Quantity("p", "rad/s", "roll velocity, chassis component"),
-    Quantity("q_y", "rad/s", "pitch velocity, chassis component"),
-    Quantity("r", "rad/s", "yaw velocity, chassis component"),
-)
-OUTPUTS = (
-    Quantity("longitudinal_position", "m", "X"),
-    Quantity("lateral_position", "m", "Y"),
-    Quantity("yaw", "rad", "yaw angle"),
-    Quantity("pitch", "rad", "pitch angle, nose down positive"),
-    Quantity("roll", "rad", "roll angle, right side down positive"),
-    Quantity("longitudinal_speed", "m/s", "longitudinal velocity, chassis component"),
-    Quantity("lateral_speed", "m/s", "lateral velocity, chassis component"),
-    Quantity("vertical_speed", "m/s", "vertical velocity, chassis component"),
-    Quantity("yaw_rate", "rad/s", "yaw velocity, chassis component"),
-)
 
 
 def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
@@ -51,13 +20,8 @@ def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
     return [sp.Symbol(quantity.name, real=True) for quantity in quantities]
 
 
-def per_wheel(name: str, unit: str, long_name: str) -> tuple[Quantity, ...]:
-    """One quantity for each wheel; the wheel's name fills the braces in the meaning."""
-    return tuple(Quantity(f"{name}_{w}", unit, long_name.format(w)) for w in WHEELS)
-
-
 def outputs(q: Sequence[sp.Symbol], nu: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """The outputs `OUTPUTS`."""
+    """The outputs `CHASSIS_OUTPUTS`."""
     return [q[0], q[1], q[3], q[4], q[5], nu[0], nu[1], nu[2], nu[5]]
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from vehiclemor.models import tilted_wheel
-from vehiclemor.models.double_wishbone_linkage import Linkage
+from vehiclemor.models.double_wishbone_linkage import Arm, Linkage
 from vehiclemor.models.tires import TireForces
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
@@ -272,9 +272,7 @@ def rear_corner(
         p,
         "rear",
     )
-    to_centre = g.rotate_about_axis(
-        tape, g.named(tape, g.subtract(centre, pivot)), axis, angle
-    )
+    to_centre = g.rotate_about_axis(tape, g.named(tape, g.subtract(centre, pivot)), axis, angle)
     arm, contact, tire = _wheeled_body(
         tape,
         chassis,
@@ -403,8 +401,7 @@ def _with_wheel(
         m.point_mass_tensor(wheel, g.named(tape, g.subtract(wheel_centre, both))),
     )
     rows = [
-        g.named(tape, [sp.Add(*[part[i][j] for part in parts]) for j in range(3)])
-        for i in range(3)
+        g.named(tape, [sp.Add(*[part[i][j] for part in parts]) for j in range(3)]) for i in range(3)
     ]
     return total, both, (rows[0], rows[1], rows[2])
 
@@ -415,7 +412,7 @@ def _diagonal(p: Parameters, name: str) -> Tensor:
 
 
 def _arm_tensor(
-    tape: Tape, arm: object, points: Points, name: str, p: Parameters, side: int
+    tape: Tape, arm: Arm, points: Points, name: str, p: Parameters, side: int
 ) -> Tensor:
     """Tensor of a control arm at the design position, from that in its own axes."""
     axis = arm.axis(tape)

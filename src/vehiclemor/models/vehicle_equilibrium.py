@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.models.double_wishbone_linkage import POINTS, check_linkage, tie_rod_angles
+from vehiclemor.models.double_wishbone_points import POINTS, check_linkage, tie_rod_angles
 
 # Places of z, theta, the left lower arm and the left rear arm among the coordinates.
 HEIGHT, PITCH, LOWER_ARM, REAR_ARM = 2, 4, 10, 20
@@ -97,7 +97,7 @@ def settled(p: Mapping[str, Any], derivative: Derivative) -> dict[str, float]:
     GeometryError
         If there is no such position with the wheels on the ground.
     """
-    front, rear = wheel_places(p)
+    front, _ = wheel_places(p)
     mass, _ = _mass_and_centre(p)
     deflection = mass * p["gravity"] / (4.0 * p["tire_stiffness"])
     lengths = [

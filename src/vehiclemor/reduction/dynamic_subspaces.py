@@ -149,7 +149,9 @@ class ReducedDynamicModel:
         rates = np.empty(len(self.bases))
         for k, dim in enumerate(spaces.ranks):
             y = self._at_mean(k)
-            rates[k] = np.linalg.eigvals(linearisation.reduced_jacobian(model, spaces, k, y[:dim])).real.max()
+            rates[k] = np.linalg.eigvals(
+                linearisation.reduced_jacobian(model, spaces, k, y[:dim])
+            ).real.max()
         return rates
 
     def _at_mean(self, window: int) -> np.ndarray:
@@ -246,7 +248,11 @@ def _spaces(
     lifts, drops = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
     ranks = np.empty(windows, dtype=np.int64)
     # The speeds that go with rates of the coordinates, where angles are small.
-    turn = linearisation.speeds_per_rates(model, model.start()) if formulation == "paired" else np.eye(n)
+    turn = (
+        linearisation.speeds_per_rates(model, model.start())
+        if formulation == "paired"
+        else np.eye(n)
+    )
     back = np.linalg.inv(turn)
     for k, basis in enumerate(bases):
         r, width = basis.rank, len(basis.mean)

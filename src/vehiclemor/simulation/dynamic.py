@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.equations import Quantity
+from vehiclemor.models.quantities import Quantity
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import linearisation, system_loops
@@ -26,6 +26,7 @@ from vehiclemor.simulation.checks import (
     lifted_wheels,
     loop_array,
 )
+from vehiclemor.simulation.compiled_loops import loops_module
 from vehiclemor.simulation.linearisation import LADDER
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
 from vehiclemor.simulation.signals import signal_of
@@ -70,8 +71,6 @@ class DynamicModel:
         Validated parameter set.
     kernels
         Module of the model's compiled kernels.
-    loops
-        Module of compiled loops, the same for all dynamic models.
     kernel_hash
         Hash of the source of kernels and loops, and of the compiler's versions.
     constants
@@ -97,7 +96,6 @@ class DynamicModel:
     equations: Derivation
     parameters: ParameterSet
     kernels: ModuleType
-    loops: ModuleType
     kernel_hash: str
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
@@ -135,6 +133,11 @@ class DynamicModel:
         """Names of the initial conditions."""
         return tuple(self.initial)
 
+    @property
+    def loops(self) -> ModuleType:
+        """Module of compiled loops, the same for all dynamic models."""
+        return loops_module()
+
     @cached_property
     def machine(self) -> tuple[np.ndarray, np.ndarray]:
         """What the loops call: constants and addresses of kernels, zero where there is none."""
@@ -148,7 +151,7 @@ class DynamicModel:
             if name not in self.equations.shapes:
                 raise InputError(f"{self.name} has no {name}: {NEEDED_FOR[name]}")
 
-    @property
+    @cached_property
     def operation_counts(self) -> dict[str, dict[str, int]]:
         """Operations of each generated function, by kind and in total."""
         return self.equations.operations

@@ -1,9 +1,8 @@
-"""Builds dynamic models (kinds `ode` and `dae`): derives, compiles, checks and parametrises them."""
+"""Builds dynamic models (kinds `ode` and `dae`): derived, compiled, checked, with parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,10 +11,9 @@ import numpy as np
 
 from vehiclemor.codegen.cache import kernel_hash, load_module
 from vehiclemor.codegen.derivation import Derivation, derivation
-from vehiclemor.codegen.link import loops_source
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component
-from vehiclemor.simulation import explicit_loops, rosenbrock_loops, run_loops, system_loops
+from vehiclemor.simulation.compiled_loops import loops_digest
 from vehiclemor.simulation.dynamic import DynamicModel
 
 
@@ -41,7 +39,8 @@ def build(
     definition.check(values)
     equations, kernels, digest = compiled(name, definition)
     values |= _solved(definition, values, parameters, kernels)
-    constants = _constants(kernels, parameters, [values[key] for key in _to_solve(definition)])
+    solved = [float(values[key]) for key in _to_solve(definition)]
+    constants = _constants(kernels, parameters, solved)
     states = [q.name for q in (*equations.coordinates, *equations.speeds)]
     typical = dict.fromkeys(states, 1.0) | dict(getattr(definition, "TYPICAL", {}))
     return DynamicModel(
@@ -51,7 +50,6 @@ def build(
         equations,
         parameters,
         kernels,
-        loops_module(),
         digest,
         constants,
         definition.starts(values),
@@ -66,20 +64,8 @@ def build(
 def compiled(name: str, definition: Any) -> tuple[Derivation, ModuleType, str]:
     """Derivation and compiled kernels of a model, and their hash; parameters play no part here."""
     made = derivation(name, definition)
-    digest = kernel_hash(f"{made.source}\n{_loops_text()}")
+    digest = kernel_hash(f"{made.source}\n{loops_digest()}")
     return made, load_module(name, made.source), digest
-
-
-@cache
-def _loops_text() -> str:
-    modules = [system_loops, explicit_loops, rosenbrock_loops, run_loops]
-    return loops_source(modules, "the loops of dynamic models")
-
-
-@cache
-def loops_module() -> ModuleType:
-    """Compiled loops that run every dynamic model."""
-    return load_module("dynamic_loops", _loops_text())
 
 
 def _to_solve(definition: Any) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
@@ -74,6 +73,9 @@ def signal_of(maneuver: Maneuver) -> Signal:
 
 def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.ndarray:
     """Polynomials (pieces, inputs, 6) between two break points."""
+    # Takes longer to import than a model to load.
+    from scipy.interpolate import make_interp_spline
+
     # One-sided values at the ends, where the input may jump.
     inside = 1e-12 * (b - a)
     pieces = 8

@@ -164,9 +164,7 @@ class MovingFrame:
         turn = self.angular_velocity
         columns = {self.first + 3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
         bias = g.add(g.cross(turn, relative.value), relative.bias)
-        return Motion(
-            g.named(tape, g.add(turn, relative.value)), columns, g.named(tape, bias)
-        )
+        return Motion(g.named(tape, g.add(turn, relative.value)), columns, g.named(tape, bias))
 
     def rotation(
         self,
@@ -212,9 +210,7 @@ def product(tensor: Tensor, a: Vector) -> Vector:
     return g.dot(tensor[0], a), g.dot(tensor[1], a), g.dot(tensor[2], a)
 
 
-def axisymmetric_inertia(
-    about_axis: sp.Expr, across: sp.Expr, axis: Vector
-) -> Tensor:
+def axisymmetric_inertia(about_axis: sp.Expr, across: sp.Expr, axis: Vector) -> Tensor:
     """Inertia tensor of a body of revolution about a unit axis."""
     excess = about_axis - across
 
@@ -256,12 +252,12 @@ def kane(
     return full, [tape.let(f) for f in force]
 
 
-def _add_rotor(
-    tape: Tape, body: Body, mass: list[list[sp.Expr]], force: list[sp.Expr]
-) -> Vector:
+def _add_rotor(tape: Tape, body: Body, mass: list[list[sp.Expr]], force: list[sp.Expr]) -> Vector:
     """Add the row of a rotor; the rate of its momentum that is due to the body's turning."""
     rotor, rotation = body.rotor, body.rotation
-    assert rotor is not None and rotation is not None and body.acceleration is not None
+    assert rotor is not None
+    assert rotation is not None
+    assert body.acceleration is not None
     momentum = g.named(tape, g.scale(rotor.inertia, rotor.axis))
     for k, column in rotation.columns.items():
         mass[max(rotor.number, k)][min(rotor.number, k)] += g.dot(momentum, column)
@@ -283,21 +279,15 @@ def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: sp.Expr) -> T
     quarter = [[sp.Integer(0), -z, y], [z, sp.Integer(0), -x], [-y, x, sp.Integer(0)]]
 
     def sandwich(left: Matrix, right: Matrix) -> list[list[sp.Expr]]:
-        """left T right^T."""
-        inner = [[tape.let(g.dot(row, g.vector(column))) for column in right] for row in tensor]
-        return [
-            [tape.let(g.dot(g.vector(row), g.vector([inner[k][j] for k in range(3)]))) for j in range(3)]
-            for row in left
-        ]
+        """Product left T right^T."""
+        columns = [g.named(tape, product(tensor, g.vector(row))) for row in right]
+        return [[tape.let(g.dot(g.vector(row), column)) for column in columns] for row in left]
 
     sine, cosine = tape.let(sp.sin(angle)), tape.let(sp.cos(angle))
     both, square = tape.let(sine * cosine), tape.let(sine * sine)
-    still, full, turned = sandwich(along, along), sandwich(across, across), sandwich(quarter, quarter)
-    first, second, third = (
-        sandwich(along, across),
-        sandwich(along, quarter),
-        sandwich(across, quarter),
-    )
+    still, full = sandwich(along, along), sandwich(across, across)
+    turned, first = sandwich(quarter, quarter), sandwich(along, across)
+    second, third = sandwich(along, quarter), sandwich(across, quarter)
 
     def entry(i: int, j: int) -> sp.Expr:
         return tape.let(

@@ -1,0 +1,50 @@
+"""Hard points of a double-wishbone corner with its tie rod, and what they must allow."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from vehiclemor.errors import GeometryError
+from vehiclemor.parameters import Declared, point
+
+# Hard points at the design position, left side.
+POINTS: dict[str, Declared] = {
+    "upper_arm_front_pivot": point(),
+    "upper_arm_rear_pivot": point(),
+    "upper_ball_joint": point(),
+    "lower_arm_front_pivot": point(),
+    "lower_arm_rear_pivot": point(),
+    "lower_ball_joint": point(),
+    "tie_rod_inner": point(),
+    "tie_rod_outer": point(),
+    "wheel_centre": point(),
+}
+
+
+def tie_rod_angles(inner: np.ndarray, outer: np.ndarray, side: int = 1) -> tuple[float, float]:
+    """Angles alpha and beta (rad) of the tie rod's universal joint at the design position."""
+    rod = outer - inner
+    direction = side * rod / np.linalg.norm(rod)
+    return float(np.arctan2(-direction[0], direction[1])), float(np.arcsin(direction[2]))
+
+
+def check_linkage(points: Mapping[str, np.ndarray]) -> None:
+    """Raise `GeometryError` if two joints of one body coincide: nothing could be assembled."""
+    rigid_links = {
+        "upper arm axis": ("upper_arm_front_pivot", "upper_arm_rear_pivot"),
+        "lower arm axis": ("lower_arm_front_pivot", "lower_arm_rear_pivot"),
+        "tie rod": ("tie_rod_inner", "tie_rod_outer"),
+        "wheel carrier": ("upper_ball_joint", "lower_ball_joint"),
+    }
+    for link, (start, end) in rigid_links.items():
+        if np.linalg.norm(points[end] - points[start]) < 1e-6:
+            raise GeometryError(
+                f"the geometry can't be assembled: {start} and {end} coincide ({link} of length 0)"
+            )
+    for arm in ("upper", "lower"):
+        rear, front = points[f"{arm}_arm_rear_pivot"], points[f"{arm}_arm_front_pivot"]
+        lever = np.cross(front - rear, points[f"{arm}_ball_joint"] - rear)
+        if np.linalg.norm(lever) < 1e-6 * np.linalg.norm(front - rear):
+            raise GeometryError(
+                f"the geometry can't be assembled: {arm}_ball_joint lies on the axis of its arm"
+            )
