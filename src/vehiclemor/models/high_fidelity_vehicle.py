@@ -77,9 +77,12 @@ CONSTRAINTS = tuple(
 # The right-hand side does not depend on them; it turns with the heading.
 CYCLIC = ("x", "y", *(f"gamma_{wheel}" for wheel in WHEELS))
 HEADING = ("psi", (("x", "y"), ("x_dot", "y_dot")))
-# Magnitudes below which errors count absolutely, 1 where not named: the lateral position is the
-# integral of the heading.
-TYPICAL = {"psi": 0.05, "psi_dot": 0.05}
+# Magnitudes below which errors count absolutely.  A heading that is off integrates to a lateral
+# position that is off: no other error matters as much.
+TYPICAL = dict.fromkeys([q.name for q in (*COORDINATES, *SPEEDS)], 10.0) | {
+    "psi": 1.0,
+    "psi_dot": 1.0,
+}
 VALIDITY = {
     "longitudinal_speed": (0.5, np.inf),
     "roll": (-1.2, 1.2),

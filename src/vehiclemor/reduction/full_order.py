@@ -54,16 +54,18 @@ SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
     "ode": _DYNAMIC,
     "dae": _DYNAMIC,
 }
-_DYNAMIC_PRESETS: dict[str, dict[str, Value]] = {
-    "recommended": {},
-    "strongest": {"solver": "ros34pw2", "tolerance": 3e-3},
-}
+
+
+def _strongest(tolerance: float) -> dict[str, dict[str, Value]]:
+    return {"recommended": {}, "strongest": {"solver": "ros34pw2", "tolerance": tolerance}}
+
+
 # Kind of model -> presets.  The paper's kind of baseline is Newton's method; the strongest solver
 # found stands beside it.
 PRESETS_BY_KIND: dict[str, dict[str, dict[str, Value]]] = {
     "ae": {"recommended": {}, "strongest": {"solver": "chord", "tolerance": 1e-6}},
-    "ode": _DYNAMIC_PRESETS,
-    "dae": _DYNAMIC_PRESETS,
+    "ode": _strongest(3e-3),
+    "dae": _strongest(1.5e-3),
 }
 
 

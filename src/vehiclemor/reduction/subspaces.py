@@ -16,7 +16,7 @@ from vehiclemor.simulation.model import Model
 SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
     "ae": projected.SUBSPACE_SETTINGS,
     "ode": dynamic_subspaces.DYNAMIC_SETTINGS,
-    "dae": dynamic_subspaces.DYNAMIC_SETTINGS,
+    "dae": dynamic_subspaces.CONSTRAINED_SETTINGS,
 }
 PRESETS_BY_KIND: dict[str, dict[str, dict[str, Value]]] = {
     "ae": projected.SUBSPACE_PRESETS,

@@ -32,6 +32,7 @@ VARIANTS = {"pod": "default", "pod_literal": "literal"}
 NOMINAL = {
     "double_wishbone": "figures-6-7",
     "independent_suspension_vehicle": "figures-2-4",
+    "high_fidelity_vehicle": "figures-9-10",
 }
 PARAMETERS = "the paper's parameters were never published; ours are public data"
 

@@ -86,4 +86,29 @@ RACES = {
         ("pitch", "yaw", "lateral_position"),
         {"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"},
     ),
+    "high_fidelity_vehicle": Race(
+        (
+            Contestant("full order, explicit", "full_order"),
+            Contestant("full order, strongest", "full_order", "strongest"),
+            Contestant("full order, explicit, 1e-3", "full_order", settings={"tolerance": 1e-3}),
+            Contestant(
+                "full order, RODAS4, 1e-4",
+                "full_order",
+                settings={"solver": "rodas4", "tolerance": 1e-4},
+            ),
+            Contestant("replay", "replay"),
+            Contestant("pod r=1", "pod", settings={"rank": 1}),
+            Contestant("pod r=1, 1e-4", "pod", settings={"rank": 1, "tolerance": 1e-4}),
+            Contestant("pod r=3", "pod", settings={"rank": 3}),
+            Contestant(
+                "pod coordinates r=3", "pod", settings={"rank": 3, "formulation": "coordinates"}
+            ),
+            Contestant("pod literal r=1", "pod", "literal", {"rank": 1}),
+            Contestant("fixed basis r=3", "fixed_basis", settings={"rank": 3}),
+        ),
+        "the explicit pair at 1e-6",
+        "the W-method with one Jacobian",
+        ("lateral_speed", "vertical_speed", "lateral_position"),
+        {"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"},
+    ),
 }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.report.compare import comparison
+from vehiclemor.report.compare import NOMINAL, comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.regenerate import write_text
 from vehiclemor.simulation.model import build
@@ -26,8 +27,21 @@ OUTPUTS = {
         "lateral_position",
         "vertical_speed",
     ),
+    "high_fidelity_vehicle": (
+        "lateral_speed",
+        "vertical_speed",
+        "lateral_position",
+        "yaw",
+        "roll",
+        "position_drift",
+        "velocity_drift",
+    ),
 }
-SETTINGS_STUDY = "vehicle-settings"
+# Name of a table -> its study over all settings, and outputs whose errors are listed.
+SETTINGS = {
+    "vehicle-settings": ("pitch", "yaw"),
+    "high-fidelity-settings": ("lateral_speed", "vertical_speed", "position_drift"),
+}
 LATEX_SPECIAL = {"\\": r"\textbackslash{}"} | {c: f"\\{c}" for c in "&%$#_{}"} | {"^": r"\^{}"}
 
 
@@ -44,7 +58,10 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
         tables[f"costs-{model}"] = cost_table(model, results)
         tables[f"errors-{model}"] = error_table(model, results, jobs)
         tables[f"operations-{model}"] = operation_table(model)
-    tables["vehicle-settings"] = settings_table(results, jobs)
+    for name in SETTINGS:
+        tables[name] = settings_table(name, results, jobs)
+    for model in ("independent_suspension_vehicle", "high_fidelity_vehicle"):
+        tables[f"quantities-{model}"] = quantity_table(model, results, jobs)
     written = []
     for name, table in tables.items():
         for suffix, text in (
@@ -69,17 +86,54 @@ def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
     return table.reindex(columns=[*first, *(c for c in table.columns if c not in first)])
 
 
-def settings_table(results: Path, jobs: int = 1) -> pd.DataFrame:
-    """Control-period POD on the 14-DOF vehicle with every combination of its settings.
+def settings_table(study: str, results: Path, jobs: int = 1) -> pd.DataFrame:
+    """Control-period POD on a vehicle with every combination of its settings.
 
     Returns
     -------
     pandas.DataFrame
-        Errors and floors of pitch and yaw, evaluations, largest growth rate of a reduced Jacobian,
+        Errors and floors of a few outputs, evaluations, largest growth rate of a reduced Jacobian,
         status and reason of each combination.
     """
-    dataset = next(iter(run_studies(SETTINGS_STUDY, results, jobs).values()))
-    return _flat(dataset, ("pitch", "yaw"))
+    dataset = next(iter(run_studies(study, results, jobs).values()))
+    return _flat(dataset, SETTINGS[study])
+
+
+def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
+    """Largest RMS errors of a vehicle's nominal runs: positions, speeds, outputs, constraints.
+
+    Returns
+    -------
+    pandas.DataFrame
+        For each method, start, group of quantities and unit: the largest RMS error, and of which
+        quantity it is.  For constraints it is the RMS of the violation itself.
+    """
+    import pandas as pd
+
+    name = NOMINAL[model]
+    dataset = run_studies(name, results, jobs)[name]
+    rows: list[dict[str, object]] = []
+    for label, start in itertools.product(dataset["method"].values, dataset["start"].values):
+        point = dataset.sel({"method": label, "start": start}).squeeze(drop=True)
+        groups = {
+            "coordinate": point["rms_coordinate_error"].to_series(),
+            "speed": point["rms_speed_error"].to_series(),
+            "output": point["rms_error"].to_series(),
+        }
+        units = {key: point[f"{key}_unit"].to_series() for key in groups}
+        drifts = [str(o) for o in point["output"].values if str(o).endswith("_drift")]
+        if drifts:
+            squares = point["outputs"].sel(output=drifts) ** 2
+            groups["constraint"] = (squares.mean("time", skipna=False) ** 0.5).to_series()
+            units["constraint"] = units["output"].loc[drifts]
+            groups["output"] = groups["output"].drop(drifts)
+        place = {"method": label, "start": start, "status": str(point["status"].item())}
+        for group, errors in groups.items():
+            for unit, part in errors.groupby(units[group].loc[errors.index]):
+                worst = part.idxmax() if part.notna().all() else ""
+                entry = {"group": group, "unit": unit, "quantity": worst, "rms": part.max()}
+                rows.append(place | entry)
+    return pd.DataFrame(rows)
 
 
 def _flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:

@@ -6,55 +6,20 @@ Every criterion takes the worse of the two starts: from the equilibrium the car 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.report.criteria.finding import (
-    SMALLEST_CHANGE,
-    VISIBLE,
-    Finding,
-    Results,
-    at_point,
-    largest_deviation,
-)
+from vehiclemor.report.criteria.finding import SMALLEST_CHANGE, VISIBLE, Finding, Results, at_point
+from vehiclemor.report.criteria.starts import STARTS, closely_followed, worst_of
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-STARTS = ("equilibrium", "dropped")
 OUTPUTS = ("lateral_position", "pitch", "yaw")
 # Control periods (s): the paper's, and one that is clearly longer.
 PERIOD, LONGER_PERIOD = 0.5, 2.5
 
 
-def _worst(values: dict[str, float]) -> tuple[float, str]:
-    """Largest value and where it is; missing if any is missing."""
-    missing = [name for name, value in values.items() if value != value]
-    if missing:
-        return float("nan"), missing[0]
-    name = max(values, key=lambda key: values[key])
-    return values[name], name
-
-
-def _failures(dataset: xr.Dataset) -> str:
-    states = {s: str(dataset["status"].sel(start=s).item()) for s in STARTS}
-    return ", ".join(f"{start}: {status}" for start, status in states.items() if status != "ok")
-
-
 def follows_closely(results: Results, label: str) -> Finding:
     """Figures 2 and 3: trajectory, pitch and yaw can hardly be told from the full model's."""
-    chosen = at_point(results["figures-2-4"], label, rank=3)
-    deviations = {
-        f"{output} from {start}": largest_deviation(chosen.sel(start=start), output)
-        for start in STARTS
-        for output in OUTPUTS
-    }
-    worst, where = _worst(deviations)
-    failed = _failures(chosen)
-    met = worst < VISIBLE and not failed
-    text = f"largest deviation of {where}, as a share of the signal's range"
-    return Finding(worst, VISIBLE, met, f"{text}; {failed}" if failed else text)
+    return closely_followed(at_point(results["figures-2-4"], label, rank=3), OUTPUTS)
 
 
 def three_states_suffice(results: Results, label: str) -> Finding:
@@ -68,7 +33,7 @@ def three_states_suffice(results: Results, label: str) -> Finding:
         for start in STARTS
         for output in OUTPUTS
     }
-    worst, where = _worst(shares)
+    worst, where = worst_of(shares)
     text = f"RMS error of the best approximation of {where}, as a share of the signal's range"
     return Finding(worst, VISIBLE, worst < VISIBLE, text)
 

@@ -1,0 +1,441 @@
+"""Equations of the high-fidelity vehicle against independent mechanics and linear theory."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
+
+from tests.oracles import high_fidelity_pinocchio as pinocchio
+from tests.oracles import high_fidelity_vehicle as oracle
+from tests.oracles.high_fidelity_data import DEPENDENT, PARAMETERS, State, design, random_states
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.registry import component
+from vehiclemor.simulation import linearisation
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.projection import projected_state, without_stabilisation
+from vehiclemor.simulation.spaces import full_space
+
+NAME = "high_fidelity_vehicle"
+N, LOOPS = 26, 12
+WHEELS = ("FL", "FR", "RL", "RR")
+TIRE = ("Fx", "Fy", "Fz", "Mz", "slip_ratio", "slip_angle")
+REST = np.zeros(3)
+STRAIGHT = component("maneuver", "rack_straight_ahead")
+MASS = 1653.686
+LANE_CHANGE = component("maneuver", "rack_lane_change")
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> DynamicModel:
+    return build(NAME)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A state, and what the oracle says of it."""
+
+    state: State
+    mass: np.ndarray
+    bias: np.ndarray
+    applied: np.ndarray
+    constraints: tuple[np.ndarray, ...]
+    tires: list[dict]
+    velocity: np.ndarray  # of the chassis, chassis components
+    qdd: np.ndarray
+
+    @property
+    def at(self) -> tuple[np.ndarray, np.ndarray]:
+        """State and inputs as the model takes them."""
+        return np.concatenate([self.state.q, self.state.qd]), np.array(self.state[2:])
+
+
+@pytest.fixture(scope="module")
+def cases() -> list[Case]:
+    """Large motions with closed and open loops; in the last ones the vehicle crawls."""
+    found = []
+    for state in random_states(42, 1) + random_states(18, 2, speeds=(-1.0, 1.0)):
+        now = oracle.Instant(*state, PARAMETERS)
+        loops = oracle.stabilised(now.loops, PARAMETERS)
+        mechanics = (*now.mass_and_bias(), now.applied_forces(), loops, now.tyres())
+        velocity = now.turns[0].T @ now.v[0]
+        found.append(Case(state, *mechanics, velocity, oracle.accelerations(*state)))
+    return found
+
+
+def error(found, expected) -> float:
+    """Largest difference relative to the largest entry."""
+    return np.abs(np.subtract(found, expected)).max() / max(1.0, np.abs(expected).max())
+
+
+def outputs(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> dict[str, float]:
+    return dict(zip(model.outputs, model.outputs_at(x[None], u[None])[0], strict=True))
+
+
+# Equations of motion
+
+
+def test_accelerations_are_the_oracles(vehicle, cases):
+    for case in cases:
+        found = vehicle.derivative(*case.at)
+        np.testing.assert_array_equal(found[:N], case.state.qd)
+        assert error(found[N:], case.qdd) < 1e-12
+
+
+def test_mass_and_forces_are_the_oracles(vehicle, cases):
+    for case in cases:
+        mass, force, _, _ = vehicle.descriptor(*case.at)
+        assert error(mass, case.mass) < 1e-14
+        assert error(force, case.applied - case.bias) < 1e-12
+        np.testing.assert_allclose(mass, mass.T, rtol=0, atol=1e-14 * mass.max())
+        assert np.linalg.eigvalsh(mass).min() > 0.0
+
+
+def test_mass_and_inertial_forces_are_pinocchios(vehicle, cases):
+    for case in cases:
+        mass, force, _, _ = vehicle.descriptor(*case.at)
+        expected, bias = pinocchio.mass_and_bias(*case.state)
+        assert error(mass, expected) < 1e-14
+        # What is left of the model's forces without the applied ones.
+        assert np.abs(case.applied - force - bias).max() < 1e-12 * np.abs(case.applied).max()
+
+
+def test_the_mass_matrix_is_that_of_the_straight_rack(vehicle, cases):
+    """The tie rods' place on the chassis follows the rack."""
+    for case in cases[:10]:
+        x, _ = case.at
+        expected, _ = pinocchio.mass_and_bias(case.state.q, case.state.qd, 0.0, 0.0, 0.0)
+        assert error(vehicle.mass_matrix(x), expected) < 1e-14
+
+
+def test_constraints_and_their_derivatives_are_the_oracles(vehicle, cases):
+    opened = 0
+    for case in cases:
+        phi, rate, jacobian, gamma = case.constraints
+        found, found_rate = vehicle.violations(*case.at)
+        np.testing.assert_allclose(found, phi, rtol=0, atol=3e-15)
+        np.testing.assert_allclose(found_rate, rate, rtol=0, atol=3e-15)
+        _, _, by_q, right = vehicle.descriptor(*case.at)
+        assert error(by_q, jacobian) < 1e-14
+        assert error(right, gamma) < 1e-13
+        drift = outputs(vehicle, *case.at)
+        assert drift["position_drift"] == pytest.approx(np.linalg.norm(phi), abs=1e-14)
+        assert drift["velocity_drift"] == pytest.approx(np.linalg.norm(rate), abs=1e-14)
+        opened += np.abs(phi).max() > 1e-5
+    assert 20 < opened < 40
+
+
+def random_motion(model: DynamicModel, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cheap random states and inputs: closed by Newton's method, then every second one opened.
+
+    Lower arms and rack are given; from the design position Newton's method, all states at once,
+    finds the corners' other coordinates, then a linear system their rates.
+    """
+    rng = np.random.default_rng(3)
+    scale = rng.uniform(0.0, 1.0, (number, 1))
+    u = rng.uniform(-1.0, 1.0, (number, 3)) * [0.03, 0.1, 1.0]
+    x = np.tile(model.start(), (number, 1))
+    x[:, N:] = 0.0
+    x[:, [10, 17]] = scale * rng.uniform(-0.35, 0.35, (number, 2))
+    work, pairs = np.zeros(model.kernels.WORK), np.empty((number, LOOPS, 2))
+    rows = np.empty((number, N + LOOPS, N + 1))
+
+    def to_close(column: int) -> np.ndarray:
+        for k in range(number):
+            model.kernels.violations(x[k], u[k], model.constants, work, pairs[k])
+            model.kernels.descriptor(x[k], u[k], model.constants, work, rows[k])
+        jacobians = rows[:, N:, :N][:, :, DEPENDENT]
+        return np.linalg.solve(jacobians, pairs[:, :, column, None])[..., 0]
+
+    for _ in range(7):
+        x[:, DEPENDENT] -= to_close(0)
+    ahead, heading = rng.uniform(2.0, 30.0, number), rng.uniform(-3.0, 3.0, number)
+    x[:, 2] += rng.uniform(-0.05, 0.08, number)
+    x[:, 3] = heading
+    x[:, 4:6] = scale * rng.uniform(-0.1, 0.1, (number, 2))
+    x[:, 20:22] = scale * rng.uniform(-0.25, 0.25, (number, 2))
+    x[:, N : 2 * N] = rng.uniform(-2.0, 2.0, (number, N))
+    x[:, N] += ahead * np.cos(heading)
+    x[:, N + 1] += ahead * np.sin(heading)
+    x[:, 48:] = ahead[:, None] / 0.31 * rng.uniform(0.8, 1.2, (number, 4))
+    x[:, N + np.array(DEPENDENT)] -= to_close(1)
+    to_close(0)
+    assert np.abs(pairs).max() < 1e-13
+    x[1::2, 6:20] += rng.uniform(-1e-3, 1e-3, (number // 2, 14))
+    x[1::2, 32:46] = rng.uniform(-2.0, 2.0, (number // 2, 14))
+    return x, u
+
+
+def test_elimination_solves_the_equations_with_multipliers(vehicle):
+    """The dense symmetric way to the same accelerations, of a thousand states."""
+    x, u = random_motion(vehicle, 1000)
+    systems, right = np.zeros((len(x), N + LOOPS, N + LOOPS)), np.empty((len(x), N + LOOPS))
+    for k, at in enumerate(zip(x, u, strict=True)):
+        mass, force, jacobian, gamma = vehicle.descriptor(*at)
+        systems[k, :N] = np.column_stack([mass, -jacobian.T])
+        systems[k, N:, :N] = jacobian
+        right[k] = [*force, *gamma]
+    expected = np.linalg.solve(systems, right[..., None])[:, :N, 0]
+    found = vehicle.derivatives_at(x, u)[:, N:]
+    largest = np.abs(expected).max(axis=1)
+    assert largest.min() > 10.0
+    assert (np.abs(found - expected).max(axis=1) / largest).max() < 1e-13
+    loads = vehicle.outputs_at(x, u)[:, [vehicle.outputs.index(f"Fz_{w}") for w in WHEELS]]
+    assert 0.1 < np.mean(loads == 0.0) < 0.9
+
+
+# Outputs
+
+
+def test_tire_forces_and_slips_are_the_oracles(vehicle, cases):
+    lifted, slow = 0, 0
+    for case in cases:
+        found = outputs(vehicle, *case.at)
+        for wheel, tire in zip(WHEELS, case.tires, strict=True):
+            expected = {**tire, "slip_ratio": tire["kappa"], "slip_angle": np.arctan(tire["t"])}
+            for name in TIRE:
+                close = pytest.approx(expected[name], rel=1e-11, abs=1e-9)
+                assert found[f"{name}_{wheel}"] == close, (name, wheel)
+            if tire["Fz"] == 0.0:
+                lifted += 1
+                assert not any(found[f"{name}_{wheel}"] for name in ("Fx", "Fy", "Fz", "Mz"))
+            slow += abs(tire["V_x"]) < PARAMETERS["tyre.v_low"]
+    # Both branches of the load and of the slip's denominator.
+    assert 40 < lifted < 200
+    assert slow > 20
+
+
+def test_outputs_of_the_chassis_are_the_oracles(vehicle, cases):
+    for case in cases:
+        found = outputs(vehicle, *case.at)
+        q, qd = case.state.q, case.state.qd
+        names = ("longitudinal_position", "lateral_position", "yaw", "pitch", "roll")
+        assert [found[name] for name in names] == list(q[[0, 1, 3, 4, 5]])
+        assert found["longitudinal_speed"] == pytest.approx(case.velocity[0], abs=1e-13)
+        assert found["lateral_speed"] == pytest.approx(case.velocity[1], abs=1e-13)
+        assert found["vertical_speed"] == qd[2]
+
+
+# Equilibrium
+
+
+def test_the_equilibrium_is_the_published_one(vehicle):
+    x = vehicle.start()
+    assert x[2] == pytest.approx(0.5398585628801991, abs=1e-14)
+    assert x[4] == pytest.approx(-1.009393484258528e-4, abs=1e-14)
+    np.testing.assert_array_equal(np.delete(x[:N], [2, 4]), np.delete(design(), [2, 4]))
+    np.testing.assert_allclose(x[48:], np.repeat([64.04125940508, 64.09877154573], 2), rtol=1e-12)
+    np.testing.assert_array_equal(x[N:48], [20.0, *np.zeros(21)])
+    assert np.abs(vehicle.derivative(x, REST)[N:]).max() < 1e-9
+    found = outputs(vehicle, x, REST)
+    loads = [found[f"Fz_{wheel}"] for wheel in WHEELS]
+    np.testing.assert_allclose(loads, np.repeat([4016.3188, 4095.0110], 2), atol=5e-5)
+    assert sum(loads) == pytest.approx(MASS * 9.81, rel=1e-12)
+    assert max(abs(found[f"{name}_{w}"]) for name in TIRE[4:] for w in WHEELS) < 1e-15
+
+
+def test_the_springs_are_as_long_as_published(vehicle):
+    """Free lengths can be seen in the forces that turn the arms."""
+    x = vehicle.start()
+    now = oracle.Instant(x[:N], np.zeros(N), *REST, PARAMETERS)
+    _, force, _, _ = vehicle.descriptor(np.concatenate([x[:N], np.zeros(N)]), REST)
+    missing = force - now.applied_forces() + now.mass_and_bias()[1]
+    expected = {10: (0, "front", 7201.254, 0.609346042798164)}
+    expected |= {20: (2, "rear", 4820.822, 0.499095760284992)}
+    for joint, (number, axle, preload, free) in expected.items():
+        length, _, gradient = now.spring(number)
+        stiffness = PARAMETERS[f"{axle}.spring.stiffness"]
+        found = PARAMETERS[f"{axle}.spring.free_length"]
+        found += missing[joint] / (stiffness * gradient[joint])
+        assert found == pytest.approx(free, abs=2e-14)
+        assert stiffness * (found - length) == pytest.approx(preload, abs=5e-4)
+
+
+def test_the_dropped_start_is_the_equilibrium_raised_and_pitched(vehicle):
+    x, dropped = vehicle.start("equilibrium"), vehicle.start("dropped")
+    change = np.zeros(2 * N)
+    change[[2, 4]] = 0.03, 0.015
+    np.testing.assert_allclose(dropped - x, change, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(dropped, np.concatenate(oracle.start("dropped")), rtol=1e-14)
+    loads = [outputs(vehicle, dropped, REST)[f"Fz_{wheel}"] for wheel in WHEELS]
+    assert 0.0 < loads[0] == pytest.approx(loads[1], rel=1e-12)
+    assert loads[0] < 4000.0
+    assert loads[2:] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+def test_both_starts_hold_the_constraints(vehicle, start):
+    np.testing.assert_allclose(vehicle.violations(vehicle.start(start), REST), 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "mass"),
+    [
+        ({"chassis_mass": 1.1 * 1515.0}, MASS + 151.5),
+        ({"chassis_centre": [0.3, 0.0, 0.3], "rear_stiffness": 6e4, "gravity": 8.0}, MASS),
+    ],
+)
+def test_any_load_rests_at_the_design_position(vehicle, overrides, mass):
+    model = build(NAME, overrides=overrides)
+    x = model.start()
+    np.testing.assert_array_equal(x[6:N], vehicle.start()[6:N])
+    assert not np.array_equal(x[[2, 4]], vehicle.start()[[2, 4]])
+    assert np.abs(model.derivative(x, REST)[N:]).max() < 1e-9
+    weight = mass * overrides.get("gravity", 9.81)
+    loads = [outputs(model, x, REST)[f"Fz_{wheel}"] for wheel in WHEELS]
+    assert sum(loads) == pytest.approx(weight, rel=1e-12)
+    # The other model's springs would not hold it.
+    assert np.abs(vehicle.derivative(x, REST)[N:]).max() > 0.1
+
+
+# Linear theory
+
+
+@pytest.fixture(scope="module")
+def straight(vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """Jacobian of straight running at 20 m/s, and Phi_q."""
+    x = vehicle.start()
+    return linearisation.jacobian(vehicle, x, REST), vehicle.descriptor(x, REST)[2]
+
+
+def test_linear_violations_are_free_of_the_vehicles_motion(straight):
+    """The stabilisation's double eigenvalues -50, without computing any: they would scatter."""
+    jacobian, constraints = straight
+    violations = np.kron(np.eye(2), constraints)
+    decay = np.kron([[0.0, 1.0], [-2500.0, -100.0]], np.eye(LOOPS))
+    difference = violations @ jacobian - decay @ violations
+    assert np.abs(difference).max() < 1e-11 * np.abs(jacobian).max()
+
+
+def test_eigenvalues_are_those_of_the_specification(straight):
+    """Of motions that hold the constraints, so that those of the stabilisation do not interfere."""
+    jacobian, constraints = straight
+    free = np.linalg.svd(constraints)[2][LOOPS:].T
+    motions = np.kron(np.eye(2), free)
+    system = motions.T @ jacobian @ motions
+    # No such motion leaves the constraints.
+    difference = jacobian @ motions - motions @ system
+    assert np.abs(difference).max() < 1e-11 * np.abs(jacobian).max()
+    found = np.linalg.eigvals(system)
+    # Position in the plane, heading, speed and angles of the wheels.
+    resting = np.abs(found) < 1e-3
+    assert resting.sum() == 8
+    found = found[~resting]
+    slip = np.sort(found.real)[:4]
+    np.testing.assert_allclose(slip[[0, -1]], [-526.0, -511.7], atol=0.05)
+    pairs = np.array([-59.3 + 67.4j, -58.8 + 67.5j, -2.9 + 8.1j, -4.1 + 5.8j, -6.3 + 4.8j])
+    single = [-167.8, -164.0, -51.0, -47.5, -36.9, -17.8]
+    expected = np.concatenate([pairs, pairs.conj(), single])
+    found = found[found.real > -500.0]
+    distance = np.abs(found[:, None] - expected)
+    match = linear_sum_assignment(distance)
+    assert len(found) == len(expected)
+    gaps = found[match[0]] - expected[match[1]]
+    # Printed with one digit after the point.
+    assert max(np.abs(gaps.real).max(), np.abs(gaps.imag).max()) < 0.0501
+
+
+MIRRORED = [1, 3, 5, *(6 + corner + k for corner in (0, 7) for k in (0, 2, 3, 4, 5, 6))]
+PARTNERS = [*range(6), *range(13, 20), *range(6, 13), 21, 20, 23, 22, 25, 24]
+
+
+def heading(q: np.ndarray, corner: int) -> float:
+    """Angle in the plane from the y axis to the axis of a front wheel."""
+    chassis, carrier = (Rotation.from_euler("ZYX", q[k : k + 3]) for k in (3, corner))
+    axis = (chassis * carrier).apply([0.0, 1.0, 0.0])
+    return np.arctan2(-axis[0], axis[1])
+
+
+def steady_turn(model: DynamicModel, speed: float) -> tuple[float, float]:
+    """Yaw rate and angle of the front wheels per displacement of the rack, 1/(m s) and rad/m."""
+    x, h = model.start(), 1e-5
+    jacobian = linearisation.jacobian(model, x, REST)
+    # In axes that turn with the vehicle its lateral speed can be steady.
+    jacobian[N + 1, N + 3] -= speed
+    sides = (model.derivative(x, np.array([sign * h, 0.0, 0.0])) for sign in (1, -1))
+    by_rack = np.subtract(*sides) / (2 * h)
+    # Lateral motions are the ones that the mirror reverses; path, heading and wheel angles play
+    # no part.
+    mirror = np.eye(N)[PARTNERS]
+    mirror[MIRRORED] *= -1
+    part = np.array([2, 4, *range(5, 22), *range(N, 2 * N)])
+    reverse = (np.eye(2 * N) - np.kron(np.eye(2), mirror))[np.ix_(part, part)] / 2
+    basis, size, _ = np.linalg.svd(reverse)
+    basis = basis[:, size > 0.5]
+    system = basis.T @ jacobian[np.ix_(part, part)] @ basis
+    steady = np.zeros(2 * N)
+    steady[part] = basis @ np.linalg.solve(system, -basis.T @ by_rack[part])
+    turned = [heading(x + 1e-6 * steady, corner) - heading(x, corner) for corner in (6, 13)]
+    return steady[N + 3], np.mean(turned) / 1e-6
+
+
+def single_track_gain(speed: float, loads: tuple[float, float], trail: float) -> float:
+    """Steady yaw rate in 1/s per angle of the front wheels of the linear single-track vehicle.
+
+    Parameters
+    ----------
+    loads
+        Of the front and the rear axle in N.
+    trail
+        How far behind the contacts' middles the lateral forces act, in m.
+    """
+    stiffness, wheelbase = 2 * 117000.0, 2.776
+    mass = sum(loads) / 9.81
+    ahead = wheelbase * loads[1] / sum(loads) - trail
+    behind = wheelbase * loads[0] / sum(loads) + trail
+    understeer = mass / wheelbase * (behind - ahead) / stiffness
+    return speed / (wheelbase + understeer * speed**2)
+
+
+@pytest.mark.parametrize(
+    ("speed", "without_trail"), [(10.0, 0.981), (20.0, 0.927), (30.0, 0.847)]
+)
+def test_yaw_gain_is_the_single_track_vehicles(speed, without_trail):
+    model = build(NAME, overrides={"initial_speed": speed})
+    yaw_rate, angle = steady_turn(model, speed)
+    found = outputs(model, model.start(), REST)
+    loads = found["Fz_FL"] + found["Fz_FR"], found["Fz_RL"] + found["Fz_RR"]
+    # Small slips: the tire's moment is that of its force on a third of the width.
+    expected = single_track_gain(speed, loads, PARAMETERS["tyre.width"] / 3)
+    assert yaw_rate / angle / expected == pytest.approx(1.0, abs=1e-3)
+    assert yaw_rate / angle / single_track_gain(speed, loads, 0.0) == pytest.approx(
+        without_trail, abs=1e-3
+    )
+    if speed == 10.0:
+        assert np.degrees(angle) == pytest.approx(-421.0, abs=1.0)
+
+
+# Stabilisation
+
+
+def test_violations_decay_as_the_gains_say_and_grow_without_them(vehicle):
+    """With gains a = b = 50 1/s: (p + (p' + 50 p) t) e^(-50 t); without: p + p' t."""
+    rng = np.random.default_rng(4)
+    x = vehicle.start()
+    x[6:20] += rng.uniform(-1e-3, 1e-3, 14)
+    x[N + 6 : N + 20] = rng.uniform(-0.05, 0.05, 14)
+    times = np.linspace(0.0, 0.1, 6)
+    t = times[:, None]
+    position, rate = vehicle.violations(x, REST)
+    assert np.abs(position).min() > 1e-5
+    laws = {
+        vehicle: (position + (rate + 50.0 * position) * t) * np.exp(-50.0 * t),
+        without_stabilisation(vehicle): position + rate * t,
+    }
+    for model, expected in laws.items():
+        path = model.integrate(STRAIGHT, x, full_space(N), "explicit", 1e-11, times)
+        found = np.array([model.violations(state, REST)[0] for state in path.states])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
+
+
+def test_projection_closes_the_loops_and_moves_the_chassis_least(vehicle, cases):
+    for case in [case for case in cases if np.abs(case.constraints[0]).max() > 1e-4][:6]:
+        x, u = case.at
+        found = projected_state(vehicle, x, u)
+        phi, rate, _, _ = oracle.constraints(found[:N], found[N:], *u)
+        assert np.abs(phi).max() < 1e-12
+        assert np.abs(rate).max() < 1e-12
+        moved = np.abs(found - x)
+        assert moved[:3].max() < 1e-3 * moved[6:20].max()
