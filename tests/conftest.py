@@ -21,6 +21,14 @@ IN_CI = os.environ.get("CI", "").lower() in ("1", "true", "yes")
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN_CI else "dev"))
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Where tests run in several processes, keep those together that share long computations."""
+    for item in items:
+        folder, _, rest = item.nodeid.removeprefix("tests/").partition("/")
+        shared = folder if folder == "report" else f"{folder}/{rest.partition('::')[0]}"
+        item.add_marker(pytest.mark.xdist_group(shared))
+
+
 @pytest.fixture(scope="session")
 def model() -> AlgebraicModel:
     """Double wishbone with its own parameters."""

@@ -12,6 +12,7 @@ from sksundae.cvode import CVODE
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
+from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import SOLVERS, DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import full_space

@@ -12,6 +12,7 @@ from vehiclemor.reduction import pod
 from vehiclemor.reduction.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import Spaces, full_space
 from vehiclemor.simulation.system_loops import COORDINATES, STATE

@@ -15,6 +15,7 @@ from vehiclemor.codegen.arctangent import TAN_3_PI_8, atan
 from vehiclemor.codegen.schedule import Batch, schedule
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
+from vehiclemor.symbolic.joints import along, free_rate
 from vehiclemor.symbolic.program import Function, assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -140,7 +141,7 @@ def carrier_with_slider_and_rotor():
         ),
         mechanics.Body(
             sp.Float(0.9),
-            frame.point(tape, place, slide=(6, rate, mechanics.UNIT[2])),
+            frame.point(tape, place, along(free_rate(6, rate), mechanics.UNIT[2])),
             none,
             frame.rotation(tape, about, spin=(7, spin, axis)),
             about,

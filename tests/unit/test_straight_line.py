@@ -18,6 +18,7 @@ from vehiclemor.codegen.link import linked_source
 from vehiclemor.codegen.straight_line import (
     call_machine,
     emit,
+    kernel_shape,
     machine_signature,
     python_kernel,
     straight_line,
@@ -35,7 +36,8 @@ def compiled(text: str):
     pointers = arguments.replace("_work, ", "")
     namespace = {"lines": lines}
     exec(f"def machine({pointers}):\n    lines(({pointers},))", namespace)  # noqa: S102
-    return python_kernel(text, cfunc(machine_signature(text))(namespace["machine"]))
+    machine = cfunc(machine_signature(len(pointers.split(","))))(namespace["machine"])
+    return python_kernel(kernel_shape(text), machine)
 
 
 def texts(program: Program) -> dict[str, str]:

@@ -1,0 +1,351 @@
+"""Symmetries, energy, constraints and runs of the high-fidelity vehicle."""
+
+import itertools
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.integrate import solve_ivp
+from sksundae.cvode import CVODE
+
+from tests.oracles import high_fidelity_vehicle as oracle
+from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS, lane_change
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.registry import component
+from vehiclemor.simulation.dynamic import SOLVERS, DynamicModel
+from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.projection import (
+    projected_state,
+    simulate_projected,
+    without_stabilisation,
+)
+from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.trajectory import Trajectory
+
+NAME = "high_fidelity_vehicle"
+N = 26
+STARTS = ("equilibrium", "dropped")
+LANE_CHANGE = component("maneuver", "rack_lane_change")
+STRAIGHT = component("maneuver", "rack_straight_ahead")
+REST = np.zeros(3)
+# The pulse of the rack is not smooth at its ends.
+EDGES = (0.0, 1.0, 3.5, 4.0)
+TIMES = np.array([0.05, 0.3, 0.9, 1.7, 2.6, 3.4, 4.0])
+
+
+@cache
+def built() -> DynamicModel:
+    """For tests of Hypothesis, which would print a fixture with every example."""
+    return build(NAME)
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> DynamicModel:
+    return built()
+
+
+def integrate(
+    model: DynamicModel,
+    maneuver: Maneuver,
+    start: np.ndarray,
+    times: np.ndarray = TIMES,
+    solver: str = "explicit",
+    tolerance: float = 1e-9,
+    longest_step: float | None = None,
+) -> Trajectory:
+    found = model.integrate(maneuver, start, full_space(N), solver, tolerance, times, longest_step)
+    assert found.status == "ok", found.message
+    return found
+
+
+def series(path: Trajectory, model: DynamicModel, *names: str) -> np.ndarray:
+    return path.outputs[:, [model.outputs.index(name) for name in names]]
+
+
+def loads(path: Trajectory, model: DynamicModel) -> np.ndarray:
+    return series(path, model, *(f"Fz_{wheel}" for wheel in ("FL", "FR", "RL", "RR")))
+
+
+# Symmetries
+
+MIRRORED = [1, 3, 5, *(6 + corner + k for corner in (0, 7) for k in (0, 2, 3, 4, 5, 6))]
+PARTNERS = [*range(6), *range(13, 20), *range(6, 13), 21, 20, 23, 22, 25, 24]
+
+
+def mirror(vectors: np.ndarray) -> np.ndarray:
+    """States, or coordinates, of the mirror image; along the last axis."""
+    halves = vectors.reshape(*vectors.shape[:-1], -1, N)[..., PARTNERS]
+    halves[..., MIRRORED] *= -1
+    return halves.reshape(vectors.shape)
+
+
+def turn(x: np.ndarray, angle: float) -> np.ndarray:
+    """States (..., 52) of the vehicle turned about the world's origin."""
+    turned = np.array(x)
+    turned[..., 3] += angle
+    for k in (0, N):
+        place = (x[..., k] + 1j * x[..., k + 1]) * np.exp(1j * angle)
+        turned[..., k], turned[..., k + 1] = place.real, place.imag
+    return turned
+
+
+# About straight running: loops may be open, wheels in the air or deep in the road.
+RANGES = np.concatenate(
+    [
+        *([50.0, 50.0, 0.05, 3.0], np.full(18, 0.1), np.full(4, 3.0)),
+        *([15.0], np.full(21, 2.0), np.full(4, 20.0), [0.03, 0.1, 1.0]),
+    ]
+)
+shares = arrays(float, 2 * N + 3, elements=st.floats(-1.0, 1.0))
+
+
+def motion(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """State and inputs."""
+    change = share * RANGES
+    x = built().start() + change[: 2 * N]
+    x[3] = 0.0
+    return turn(x, change[3]), change[2 * N :]
+
+
+def close(found: np.ndarray, expected: np.ndarray) -> None:
+    """But for rounding of forces that cancel each other at rest."""
+    assert np.abs(found - expected).max() < 1e-10 * max(1.0, np.abs(expected).max())
+
+
+@given(share=shares)
+def test_the_mirrored_vehicle_accelerates_as_the_mirror_image(share):
+    x, u = motion(share)
+    expected = mirror(built().derivative(x, u)[N:])
+    close(built().derivative(mirror(x), -u)[N:], expected)
+
+
+@given(share=shares, angle=st.floats(-6.0, 6.0), spins=arrays(float, 4, elements=st.floats(-9, 9)))
+def test_place_heading_and_wheel_angles_have_no_influence(share, angle, spins):
+    x, u = motion(share)
+    moved = turn(x, angle)
+    moved[:2] += 100.0 * share[:2]
+    moved[22:N] += spins
+    expected = turn(built().derivative(x, u), angle)
+    close(built().derivative(moved, u)[N:], expected[N:])
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_the_mirrored_steering_drives_the_mirror_image(vehicle, start):
+    x = vehicle.start(start)
+    left = integrate(vehicle, LANE_CHANGE, x)
+    right = integrate(vehicle, LANE_CHANGE.perturbed(amplitude=-1.0), x)
+    assert left.states[-1, 1] > 3.0
+    np.testing.assert_allclose(right.states, mirror(left.states), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_run_does_not_depend_on_the_heading(vehicle, solver):
+    """With equal steps not even its error does, though the frozen Jacobian is of one heading."""
+    x, angle = vehicle.start("dropped"), 2.0
+    step = 0.002 if solver == "explicit" else 0.01
+    options = {"solver": solver, "tolerance": 1e9, "longest_step": step}
+    plain = integrate(vehicle, LANE_CHANGE, x, **options)
+    turned = integrate(vehicle, LANE_CHANGE, turn(x, angle), **options)
+    np.testing.assert_allclose(turned.states, turn(plain.states, angle), rtol=0, atol=1e-6)
+    assert turned.counts == plain.counts
+    exact = integrate(vehicle, LANE_CHANGE, x, tolerance=1e-11).states
+    assert np.abs(plain.states - exact).max() > 1e-5
+
+
+def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle):
+    """Its steps are at the limit of stability, where rounding changes their number, too."""
+    x = vehicle.start()
+
+    def calls(model: DynamicModel, start: np.ndarray, tolerance: float) -> int:
+        path = integrate(model, LANE_CHANGE, start, TIMES, "ros34pw2", tolerance)
+        return path.counts["rhs_calls"]
+
+    assert calls(vehicle, turn(x, 2.0), 1e-2) == calls(vehicle, x, 1e-2)
+    expected = pytest.approx(calls(vehicle, x, 1e-5), rel=0.05)
+    assert calls(vehicle, turn(x, 2.0), 1e-5) == expected
+    # As it would without turning states into the Jacobian's heading and back.
+    fixed = replace(vehicle, turning=np.zeros(0, dtype=np.int64))
+    assert calls(fixed, turn(x, 2.0), 1e-5) > 1.5 * calls(vehicle, x, 1e-5)
+
+
+# Energy and constraints
+
+
+def test_energy_is_conserved_in_flight_without_dampers():
+    model = build(NAME, overrides={"front_damping": 0.0, "rear_damping": 0.0})
+    numbers = PARAMETERS | NO_DAMPERS
+    start = model.start()
+    # High enough to fall for a second; the springs push the arms out.
+    start[2] = 10.0
+    start[N + 3 : N + 6] = 0.3, 0.2, 0.4
+    times = np.linspace(0.0, 1.0, 41)
+    path = integrate(model, STRAIGHT, start, times, tolerance=1e-11)
+    assert not loads(path, model).any()
+    assert np.abs(path.states[:, [10, 17, 20, 21]]).max(axis=0) == pytest.approx(0.75, abs=0.05)
+
+    energies, stored = [], []
+    for x in path.states:
+        energies.append(oracle.energy(x[:N], x[N:], 0.0, 0.0, numbers))
+        now = oracle.Instant(x[:N], x[N:], *REST, numbers)
+        squeezed = [
+            numbers[f"{axle}.spring.free_length"] - now.spring(k)[0] for k, axle in enumerate(AXLES)
+        ]
+        stiffness = [numbers[f"{axle}.spring.stiffness"] for axle in AXLES]
+        stored.append(np.dot(stiffness, np.square(squeezed)) / 2)
+    assert np.ptp(stored) > 1000.0
+    assert np.ptp(energies) < 1e-9 * np.ptp(stored)
+
+
+def test_violations_decay_as_the_gains_say_and_grow_without_them(vehicle):
+    """With gains a = b = 50 1/s: (p + (p' + 50 p) t) e^(-50 t); without: p + p' t."""
+    rng = np.random.default_rng(4)
+    x = vehicle.start()
+    x[6:20] += rng.uniform(-1e-3, 1e-3, 14)
+    x[N + 6 : N + 20] = rng.uniform(-0.05, 0.05, 14)
+    times = np.linspace(0.0, 0.1, 6)
+    t = times[:, None]
+    position, rate = vehicle.violations(x, REST)
+    assert np.abs(position).min() > 1e-5
+    laws = {
+        vehicle: (position + (rate + 50.0 * position) * t) * np.exp(-50.0 * t),
+        without_stabilisation(vehicle): position + rate * t,
+    }
+    for model, expected in laws.items():
+        path = integrate(model, STRAIGHT, x, times, tolerance=1e-11)
+        found = np.array([model.violations(state, REST)[0] for state in path.states])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
+
+
+def test_projection_finds_the_nearest_state_that_holds_the_constraints(vehicle):
+    rng = np.random.default_rng(5)
+    u = np.array([0.004, 0.05, 0.0])
+    for _ in range(4):
+        x = vehicle.start() + 1e-3 * np.r_[np.zeros(6), rng.uniform(-1, 1, 16), np.zeros(30)]
+        x[N:] += rng.uniform(-1.0, 1.0, N)
+        found = projected_state(vehicle, x, u)
+        phi, rate, jacobian, _ = oracle.constraints(found[:N], found[N:], *u)
+        assert np.abs(phi).max() < 1e-12
+        assert np.abs(rate).max() < 1e-12
+        # No admissible change of the rates comes nearer to the given ones in kinetic energy.
+        mass, _ = oracle.mass_and_bias(found[:N], found[N:], *u)
+        free = np.linalg.svd(jacobian)[2][12:].T
+        momentum = mass @ (found - x)[N:]
+        assert np.abs(free.T @ momentum).max() < 1e-11 * np.abs(momentum).max()
+        # The corners move, the chassis hardly does.
+        moved = np.abs(found - x)
+        assert moved[:6].max() < 0.02 * moved[6:20].max()
+
+
+# Runs
+
+
+@pytest.mark.parametrize(
+    ("start", "lateral", "at_rest_of_pulse", "heading", "lightest"),
+    [
+        ("equilibrium", 3.50000025, 3.4604313, 3.65694e-4, 2202.5),
+        ("dropped", 3.49305892, 3.4583545, 3.21000e-4, 0.0),
+    ],
+)
+def test_the_lane_change_is_the_published_one(
+    vehicle, start, lateral, at_rest_of_pulse, heading, lightest
+):
+    times = np.linspace(0.0, 10.0, 10001)
+    path = integrate(vehicle, LANE_CHANGE, vehicle.start(start), times)
+    x = path.states
+    assert x[-1, 1] == pytest.approx(lateral, abs=2e-8)
+    assert x[4500, 1] == pytest.approx(at_rest_of_pulse, abs=1e-6)
+    assert x[-1, 3] == pytest.approx(heading, abs=2e-9)
+    assert np.degrees(np.abs(x[:, 5]).max()) == pytest.approx(4.274, abs=1e-3)
+    speeds = np.abs(series(path, vehicle, "lateral_speed", "vertical_speed")).max(axis=0)
+    assert speeds[0] == pytest.approx(0.2433, abs=5e-5)
+    assert speeds[1] == pytest.approx({"equilibrium": 0.0121, "dropped": 0.2247}[start], abs=5e-5)
+    on_road = loads(path, vehicle)
+    assert on_road.min() == pytest.approx(lightest, abs=0.05)
+    assert on_road.max() == pytest.approx(5787.4, abs=0.1)
+    across = np.column_stack([-np.sin(x[:, 3]), np.cos(x[:, 3])])
+    slopes = vehicle.derivatives_at(x, LANE_CHANGE.at(times))[:, N : N + 2]
+    assert np.abs(np.sum(across * slopes, axis=1)).max() == pytest.approx(5.048, abs=1e-3)
+
+
+def test_the_dropped_rear_wheels_are_in_the_air_for_a_while(vehicle):
+    times = np.linspace(0.0, 0.2, 201)
+    path = integrate(vehicle, LANE_CHANGE, vehicle.start("dropped"), times)
+    aloft = (loads(path, vehicle) == 0.0).sum(axis=0) * 1e-3
+    np.testing.assert_allclose(aloft, [0.0, 0.0, 0.036, 0.036], atol=1.1e-3)
+    assert path.remark.startswith("off the ground for a time: RL (first at 0 s), RR")
+    assert not integrate(vehicle, LANE_CHANGE, vehicle.start()).remark
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_loops_stay_closed(vehicle, start, solver):
+    path = vehicle.simulate(LANE_CHANGE, start, solver=solver, tolerance=1e-6)
+    drift = series(path, vehicle, "position_drift", "velocity_drift").max(axis=0)
+    assert drift[0] < 1e-8
+    assert drift[1] < 1e-6
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_stabilisation_does_not_change_the_run(vehicle, start):
+    """A second way to hold the constraints: projection onto them, without any gain."""
+    expected = simulate_projected(vehicle, LANE_CHANGE, start)
+    found = vehicle.simulate(LANE_CHANGE, start)
+    assert np.abs(found.states - expected.states).max() < 1e-6
+    assert np.abs(found.coordinates - expected.coordinates)[:, :22].max() < 1e-7
+    drift = series(expected, vehicle, "position_drift", "velocity_drift")
+    assert drift.max() < 1e-12
+
+
+@pytest.fixture(scope="module", params=STARTS)
+def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """Start and states at `TIMES` by a method of order 8 of SciPy, broken at the pulse's ends."""
+    x = start = vehicle.start(request.param)
+    path = []
+    for a, b in itertools.pairwise(EDGES):
+        times = [*(t for t in TIMES if a < t < b), b]
+
+        def rates(t, x):
+            return vehicle.derivative(x, lane_change(t))
+
+        solution = solve_ivp(rates, (a, b), x, "DOP853", times, rtol=1e-10, atol=1e-11)
+        x = solution.y[:, -1]
+        path += [state for t, state in zip(times, solution.y.T, strict=True) if np.any(t == TIMES)]
+    return start, np.array(path)
+
+
+@pytest.mark.parametrize(
+    ("solver", "tolerance"), [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 1e-8)]
+)
+def test_compiled_solvers_agree_with_scipy(vehicle, reference, solver, tolerance):
+    start, expected = reference
+    found = integrate(vehicle, LANE_CHANGE, start, TIMES, solver, tolerance).states
+    assert np.abs(found - expected).max() < 1e-6
+
+
+def test_sundials_agrees_with_scipy(vehicle, reference):
+    start, expected = reference
+    x = start
+    for a, b in itertools.pairwise(EDGES):
+
+        def rates(t, x, slope):
+            slope[:] = vehicle.derivative(x, lane_change(t))
+
+        # Straight running is at rest: long steps would miss that the wheels have landed.
+        options = {"rtol": 1e-10, "atol": 1e-11, "max_num_steps": 100000, "max_step": 0.01}
+        x = CVODE(rates, **options).solve(np.array([a, b]), x).y[-1]
+    np.testing.assert_allclose(x, expected[-1], rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
+    x = vehicle.start()
+    exact = integrate(vehicle, LANE_CHANGE, x, tolerance=1e-12).states
+    errors = []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        found = integrate(vehicle, LANE_CHANGE, x, TIMES, solver, tolerance).states
+        errors.append(np.abs(found - exact).max())
+    assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
