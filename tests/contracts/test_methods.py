@@ -116,9 +116,9 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
     moving = size > 0.0
     error = np.abs(run.outputs - full.outputs).max(axis=0)
     # In equations of motion errors accumulate; vertical speed, tire forces and slips follow the
-    # fast modes, which three vectors don't hold.
+    # fast modes, which three vectors don't hold.  The full model's constraints drift by rounding.
     bound = 0.01 if pair.model.kind == "ae" else 0.05
-    fast = ("vertical_speed", "_FL", "_FR", "_RL", "_RR")
+    fast = ("vertical_speed", "_FL", "_FR", "_RL", "_RR", "_drift")
     chosen = moving & np.array([not name.endswith(fast) for name in pair.model.outputs])
     assert np.all(error[chosen] < bound * size[chosen])
 

@@ -13,6 +13,8 @@ SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m", "1"} | {
     "kg",
     "kg m^2",
     "N/m",
+    "N/rad",
+    "1/s",
     "N s/m",
 }
 KINEMATIC = [name for name in names("model") if component("model", name).KIND == "ae"]

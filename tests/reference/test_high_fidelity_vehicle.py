@@ -50,7 +50,7 @@ class Case:
 def cases() -> list[Case]:
     """Large motions with closed and open loops; in the last ones the vehicle crawls."""
     found = []
-    for state in random_states(42, 1) + random_states(18, 2, speeds=(-1.0, 1.0)):
+    for state in random_states(36, 1) + random_states(14, 2, speeds=(-1.0, 1.0)):
         now = oracle.Instant(*state, PARAMETERS)
         loops = oracle.stabilised(now.loops, PARAMETERS)
         mechanics = (*now.mass_and_bias(), now.applied_forces(), loops, now.tyres())
@@ -113,12 +113,13 @@ def test_constraints_and_their_derivatives_are_the_oracles(vehicle, cases):
         np.testing.assert_allclose(found_rate, rate, rtol=0, atol=3e-15)
         _, _, by_q, right = vehicle.descriptor(*case.at)
         assert error(by_q, jacobian) < 1e-14
-        assert error(right, gamma) < 1e-12
+        # Rounding of lengths, times 2500 1/s^2.
+        assert error(right, gamma) < 1e-11
         drift = outputs(vehicle, *case.at)
         assert drift["position_drift"] == pytest.approx(np.linalg.norm(phi), abs=1e-14)
         assert drift["velocity_drift"] == pytest.approx(np.linalg.norm(rate), abs=1e-14)
         opened += np.abs(phi).max() > 1e-5
-    assert 20 < opened < 40
+    assert 15 < opened < 35
 
 
 def random_motion(model: DynamicModel, number: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """Evaluation of tapes and generated sources, and random straight-line programs to try them on."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mpmath as mp
 import numpy as np
@@ -9,7 +9,8 @@ import sympy as sp
 
 from vehiclemor.codegen.emit import reference_source
 from vehiclemor.symbolic.program import Program
-from vehiclemor.symbolic.tape import Tape
+from vehiclemor.symbolic.elimination import Pivots
+from vehiclemor.symbolic.tape import Tape, dependencies
 
 DIGITS = 30
 
@@ -28,6 +29,22 @@ def precise(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, float]) -
         return np.array([float(v) for v in function(*[mp.mpf(v) for v in values.values()])])
 
 
+def function_of(
+    tape: Tape, symbols: Sequence, results: Sequence, modules: str | list = "numpy"
+) -> Callable:
+    """Function of the symbols (nested as the results are) that evaluates results of a tape.
+
+    `modules` as in `sympy.lambdify`: numbers, arrays, complex or of many digits.
+    """
+    definitions = tape.definitions
+
+    def on_tape(expressions: Sequence) -> tuple[list, Sequence]:
+        flat = [sp.sympify(e) for e in sp.flatten(expressions)]
+        return [(s, definitions[s]) for s in dependencies(flat, definitions)], expressions
+
+    return sp.lambdify(symbols, results, modules, cse=on_tape)
+
+
 def run(program: Program, name: str, values: Mapping[sp.Symbol, float]) -> np.ndarray:
     """Result of one function of a program, from its reference source in plain Python."""
     namespace: dict = {"math": math}
@@ -38,6 +55,17 @@ def run(program: Program, name: str, values: Mapping[sp.Symbol, float]) -> np.nd
     result = np.full(program.functions[name].shape, np.nan)
     namespace[name](*arguments, constants, None, result)
     return result
+
+
+def pivot_shares(matrix: np.ndarray, pivots: Pivots) -> list[float]:
+    """Each pivot's size beside the largest entry of its column in the rows that remain."""
+    work, rows, shares = matrix.copy(), list(range(len(matrix))), []
+    for row, column in pivots:
+        shares.append(abs(work[row, column]) / np.abs(work[rows, column]).max())
+        rows.remove(row)
+        for other in rows:
+            work[other] -= work[other, column] / work[row, column] * work[row]
+    return shares
 
 
 def random_program(seed: int, symbols: Sequence[sp.Symbol], length: int = 14) -> tuple[Tape, list]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from tests.unit.programs import run
+from tests.unit.programs import pivot_shares, run
 from vehiclemor.codegen.emit import operation_counts, reference_source
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -74,17 +74,6 @@ def test_pivots_are_a_permutation_above_the_threshold(seed: int) -> None:
     assert sorted(r for r, _ in pivots) == sorted(c for _, c in pivots) == list(range(7))
     for share in pivot_shares(matrix, pivots):
         assert share >= 0.5
-
-
-def pivot_shares(matrix: np.ndarray, pivots: Pivots) -> list[float]:
-    """Each pivot's size beside the largest entry of its column in the rows that remain."""
-    work, rows, shares = matrix.copy(), list(range(len(matrix))), []
-    for row, column in pivots:
-        shares.append(abs(work[row, column]) / np.abs(work[rows, column]).max())
-        rows.remove(row)
-        for other in rows:
-            work[other] -= work[other, column] / work[row, column] * work[row]
-    return shares
 
 
 def test_a_small_pivot_is_passed_over() -> None:

@@ -6,24 +6,32 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from vehiclemor.models import independent_suspension_vehicle as vehicle
 from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures.lines import Results
-from vehiclemor.report.figures.mechanism import draw_graph, rim
+from vehiclemor.report.figures.mechanism import draw_graph
+from vehiclemor.report.figures.space import (
+    CAPTIONS,
+    SIZES,
+    draw_box,
+    draw_frame,
+    draw_size,
+    draw_spring_damper,
+    draw_tire,
+    frame_space,
+    symbol,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLORS = {"road": "#777777", "chassis": "#000000", "mass": "#D55E00", "wheel": "#0072B2"}
-SPRING, DAMPER, SIZES, AXES = "#009E73", "#CC79A7", "#555555", "#E69F00"
+SPRING, DAMPER, AXES = "#009E73", "#CC79A7", "#E69F00"
 # Only for the drawing: outline of the sprung body (m) and steering angle (rad).
 HALF_WIDTH, BOTTOM, TOP, OVERHANG = 0.45, 0.50, 0.92, 0.15
 DRAWN_STEER = np.deg2rad(20.0)
-GREEK = ("psi", "theta", "phi", "gamma")
-CAPTIONS = {"fontsize": 7.5, "ha": "center", "va": "center"}
 
 
 def figure_1(results: Results) -> Figure:
@@ -38,7 +46,7 @@ def figure_1(results: Results) -> Figure:
     graph = figure.add_axes((0.65, 0.10, 0.35, 0.83))
     _draw_vehicle(space, p)
     _draw_sizes(space, p)
-    _frame_space(space)
+    frame_space(space, (-2.2, -1.3, 0.0), (2.4, 1.0, 1.2), view=(24.0, -50.0), zoom=1.2)
     _draw_vehicle_graph(graph)
     handles, labels = space.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower left", ncols=5, fontsize=7.5)
@@ -67,56 +75,26 @@ def wheel_centres(p: dict[str, float]) -> np.ndarray:
 
 def _draw_vehicle(axis: Any, p: dict[str, float]) -> None:
     centres = wheel_centres(p)
-    ends = np.array([centres[0, 0] + OVERHANG, centres[2, 0] - OVERHANG])
-    corners = [(ends[i], side * HALF_WIDTH) for i, side in ((0, 1), (0, -1), (1, -1), (1, 1))]
-    levels = [[(x, y, z) for x, y in corners] for z in (BOTTOM, TOP)]
-    sides = [[levels[0][i - 1], levels[0][i], levels[1][i], levels[1][i - 1]] for i in range(4)]
-    body = Poly3DCollection([*levels, *sides], facecolor="#999999", edgecolor="black")
-    body.set_alpha(0.10)
-    body.set_linewidth(0.8)
-    axis.add_collection3d(body)
+    ends = centres[0, 0] + OVERHANG, centres[2, 0] - OVERHANG
+    draw_box(axis, ends, HALF_WIDTH, (BOTTOM, TOP))
     for number, (centre, front) in enumerate(zip(centres, vehicle.FRONT, strict=True)):
         x, y, z = centre
         steer = DRAWN_STEER if front else 0.0
         first = number == 0
-        circle = rim(centre, np.array([-np.sin(steer), np.cos(steer), 0.0]), p["tire_radius"])
-        # The road presses the tire flat by its static deflection.
-        circle[:, 2] = np.maximum(circle[:, 2], 0.0)
-        name = "wheel" if first else None
-        axis.plot(*circle.T, color=COLORS["wheel"], linewidth=1.8, label=name)
+        spin = np.array([-np.sin(steer), np.cos(steer), 0.0])
+        style = {"color": COLORS["wheel"], "linewidth": 1.8, "label": "wheel" if first else None}
+        draw_tire(axis, centre, spin, p["tire_radius"], **style)
         inner = np.sign(y) * HALF_WIDTH
         axis.plot([x, x], [inner, y], [TOP, TOP], color="black", linewidth=1.4)
-        _strut(axis, centre, first)
+        # Prismatic joint along the chassis z axis.
+        labels = ("spring", "damper") if first else (None, None)
+        draw_spring_damper(axis, centre, np.array([x, y, TOP]), (SPRING, DAMPER), labels)
         name = "lumped mass" if first else None
         axis.plot(x, y, z, "s", color=COLORS["mass"], markersize=6, label=name, linestyle="none")
         if front:
             _steering(axis, centre)
     origin = np.array([0.0, 0.0, p["sprung_height"]])
-    dot = {"marker": "o", "markersize": 5, "linestyle": "none"}
-    axis.plot(*origin, color="black", label="CG of the sprung body", **dot)
-    for direction, name in zip(np.eye(3), "xyz", strict=True):
-        axis.quiver(*origin, *(0.6 * direction), color=AXES, linewidth=1.4, arrow_length_ratio=0.2)
-        axis.text(*(origin + 0.62 * direction + [0.0, 0.0, 0.09]), name, color=AXES, **CAPTIONS)
-
-
-def _strut(axis: Any, centre: np.ndarray, named: bool) -> None:
-    """Prismatic joint along the chassis z axis: spring and damper side by side."""
-    x, y, z = centre
-    part = np.array([0.0, 0.2, *np.linspace(0.23, 0.77, 10), 0.8, 1.0])
-    turns = np.array([0.0, 0.0, *(0.05 * (-1.0) ** np.arange(10)), 0.0, 0.0])
-    height = z + part * (TOP - z)
-    name = "spring" if named else None
-    axis.plot(x - 0.07 + turns, np.full(14, y), height, color=SPRING, linewidth=1.2, label=name)
-    half, quarter = (z + TOP) / 2.0, (TOP - z) / 4.0
-    name = "damper" if named else None
-    style = {"color": DAMPER, "linewidth": 1.2}
-    axis.plot([x + 0.07] * 2, [y, y], [z, half], **style, label=name)
-    axis.plot([x + 0.03, x + 0.11], [y, y], [half, half], **style)
-    cup = x + np.array([0.02, 0.02, 0.12, 0.12])
-    axis.plot(cup, [y] * 4, half + quarter * np.array([-0.6, 0.7, 0.7, -0.6]), **style)
-    axis.plot([x + 0.07] * 2, [y, y], [half + 0.7 * quarter, TOP], **style)
-    for level in (z, TOP):
-        axis.plot([x - 0.07, x + 0.07], [y, y], [level, level], color="black", linewidth=1.2)
+    draw_frame(axis, origin, AXES, "CG of the sprung body")
 
 
 def _steering(axis: Any, centre: np.ndarray) -> None:
@@ -141,38 +119,18 @@ def _draw_sizes(axis: Any, p: dict[str, float]) -> None:
     whole = front_right - [p["front_axle_distance"], 0.0, 0.0]
     rear = np.array([rear_right[0], front_right[1], 0.0])
     top = np.array([0.0, 0.0, p["sprung_height"]])
-    for start, end, label_at, symbol, value in (
-        (front_right + side, whole + side, below, "a", p["front_axle_distance"]),
-        (whole + side, rear + side, below, "b", p["rear_axle_distance"]),
-        (front_left + ahead, front_right + ahead, [0.9, -0.5, 0.0], "T_f", p["front_track"]),
-        (rear_left + behind, rear_right + behind, [-0.05, -1.5, -0.5], "T_r", p["rear_track"]),
-        (0.0 * top, top, [-1.1, 0.0, -2.0 * top[2]], "h_s", p["sprung_height"]),
+    for start, end, label_at, name in (
+        (front_right + side, whole + side, below, "a"),
+        (whole + side, rear + side, below, "b"),
+        (front_left + ahead, front_right + ahead, [0.9, -0.5, 0.0], "T_f"),
+        (rear_left + behind, rear_right + behind, [-0.05, -1.5, -0.5], "T_r"),
+        (0.0 * top, top, [-1.1, 0.0, -2.0 * top[2]], "h_s"),
     ):
-        line = np.array([start, end])
-        axis.plot(*line.T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
-        text = f"${symbol}$ = {value:.3f} m"
-        axis.text(*(line.mean(axis=0) + 0.45 * np.array(label_at)), text, color=SIZES, **CAPTIONS)
-
-
-def _frame_space(axis: Any) -> None:
-    axis.set_axis_off()
-    axis.set_proj_type("ortho")
-    axis.set_xlim(-2.2, 2.4)
-    axis.set_ylim(-1.3, 1.0)
-    axis.set_zlim(0.0, 1.2)
-    axis.set_box_aspect((4.6, 2.3, 1.2), zoom=1.2)
-    axis.view_init(elev=24, azim=-50)
-
-
-def _symbol(name: str) -> str:
-    """A coordinate's name as a formula."""
-    head, _, tail = name.partition("_")
-    head = f"\\{head}" if head in GREEK else head
-    return f"${head}_{{{tail}}}$" if tail else f"${head}$"
+        draw_size(axis, start, end, 0.45 * np.array(label_at), name)
 
 
 def _draw_vehicle_graph(axis: Axes) -> None:
-    names = [_symbol(quantity.name) for quantity in vehicle.COORDINATES]
+    names = [symbol(quantity.name) for quantity in vehicle.COORDINATES]
     nodes, colors = {"road": (1.5, 3.1), "chassis": (1.5, 2.1)}, dict(COLORS)
     free = f"free, {len(names) - 8} DOF\n" + ", ".join(names[:-8])
     edges = [("road", "chassis", free)]
