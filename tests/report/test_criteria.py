@@ -100,7 +100,18 @@ def shorter_is_worse(dataset):
     dataset["rms_error"].loc[{"control_period": 1.0}] = 1.0
 
 
+def jumping_vertically(dataset):
+    place = {"method": "pod", "rank": 1, "start": "dropped", "output": "vertical_speed"}
+    dataset["max_error"].loc[place] = 2.0 * VISIBLE * dataset["signal_range"].loc[place]
+
+
+def one_state_diverges(dataset):
+    dataset["status"].loc[{"method": "pod", "rank": 1, "start": "dropped"}] = "diverged"
+
+
 COUNTEREXAMPLES = [
+    ("hfv_fig10_one_state_excellent", "figures-9-10", jumping_vertically),
+    ("hfv_fig10_one_state_excellent", "figures-9-10", one_state_diverges),
     ("gv_fig3_closely_matches", "figures-2-4", wrong_yaw_from_one_start),
     ("gv_fig3_closely_matches", "figures-2-4", one_start_fails),
     ("gv_three_states_suffice", "figures-2-4", coarse_subspace),

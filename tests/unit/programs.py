@@ -8,8 +8,8 @@ import numpy as np
 import sympy as sp
 
 from vehiclemor.codegen.emit import reference_source
-from vehiclemor.symbolic.program import Program
 from vehiclemor.symbolic.elimination import Pivots
+from vehiclemor.symbolic.program import Program
 from vehiclemor.symbolic.tape import Tape, dependencies
 
 DIGITS = 30

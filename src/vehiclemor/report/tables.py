@@ -58,8 +58,8 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
         tables[f"costs-{model}"] = cost_table(model, results)
         tables[f"errors-{model}"] = error_table(model, results, jobs)
         tables[f"operations-{model}"] = operation_table(model)
-    for name in SETTINGS:
-        tables[name] = settings_table(name, results, jobs)
+    for study in SETTINGS:
+        tables[Path(study).stem] = settings_table(study, results, jobs)
     for model in ("independent_suspension_vehicle", "high_fidelity_vehicle"):
         tables[f"quantities-{model}"] = quantity_table(model, results, jobs)
     written = []

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from vehiclemor.report.figures import (
+    high_fidelity_histories,
+    high_fidelity_perturbations,
+    high_fidelity_schematic,
     histories,
     mechanism,
     order,
@@ -97,6 +100,21 @@ FIGURES: dict[str, Entry] = {
         "best approximation of the coordinates, "
         "which one output can undercut.",
     ),
+    "8": Entry(
+        (),
+        high_fidelity_schematic.figure_8,
+        "TODO",
+    ),
+    "9": Entry(
+        ("figures-9-10",),
+        high_fidelity_histories.figure_9,
+        "TODO",
+    ),
+    "10": Entry(
+        ("figures-9-10",),
+        high_fidelity_histories.figure_10,
+        "TODO",
+    ),
     "11": Entry(
         ("figure-11",),
         histories.figure_11,
@@ -151,5 +169,15 @@ FIGURES: dict[str, Entry] = {
         "14-DOF vehicle without steering, bases from the lane change, start in equilibrium: the "
         "full model drives straight on, replay and POD with r = 3 change lane all the same. "
         "Parameters are public data.",
+    ),
+    "high-fidelity-map": Entry(
+        ("high-fidelity-perturbations",),
+        high_fidelity_perturbations.figure_high_fidelity_map,
+        "TODO",
+    ),
+    "high-fidelity-zero-steer": Entry(
+        ("high-fidelity-zero-steer",),
+        high_fidelity_histories.figure_zero_steer,
+        "TODO",
     ),
 }

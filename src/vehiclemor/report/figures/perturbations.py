@@ -77,6 +77,7 @@ def error_map(
     outputs: Mapping[str, str],
     numbers: Mapping[str, str],
     values_in_cells: bool = False,
+    rank: int = 3,
 ) -> Figure:
     """RMS errors over frequency and amplitude perturbations, POD beside replay.
 
@@ -91,6 +92,8 @@ def error_map(
     values_in_cells
         Write the error into each cell; the colours then leave the nominal input out, whose error
         is far below all others.
+    rank
+        That of POD, for its title.
     """
     figure, axes = plt.subplots(2, 2, sharex=True, sharey=True, figsize=(6.7, 5.6))
     published = load_published().numbers
@@ -131,7 +134,7 @@ def error_map(
             if values_in_cells:
                 _write(axis, frequency, amplitude, values, np.sqrt(lowest * highest))
             axis.grid(visible=False)
-            name = "POD, r = 3" if method == "pod" else "replay"
+            name = f"POD, r = {rank}" if method == "pod" else "replay"
             axis.set_title(f"({'abcd'[2 * row + column]}) {name}")
             if column == 0:
                 axis.set_ylabel("amplitude perturbation (%)")

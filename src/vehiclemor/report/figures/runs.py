@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vehiclemor.report.figures.lines import DEFAULT, FULL, LITERAL, point
+from vehiclemor.report.figures.lines import DEFAULT, FULL, LITERAL, legend_above, point
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,21 +64,23 @@ def panels(rows: int, height: float, last: float, duration: float) -> tuple[Figu
     return figure, axes
 
 
-def draw_path(
-    axis: Axes, dataset: xr.Dataset, start: str, reduced: Drawn, furthest: float
-) -> None:
-    """Path in the plane up to `furthest` (m)."""
-    for label, (text, style) in {"full_order": ("full order", FULL), **reduced}.items():
-        path = point(dataset, label, start=start)["outputs"]
-        x, y = (path.sel(output=f"{way}_position") for way in ("longitudinal", "lateral"))
-        axis.plot(x, y, label=text, **style)
-    axis.set_xlim(0.0, furthest)
-    axis.set_ylabel("Y (m)")
+def figure_of_paths(dataset: xr.Dataset, reduced: Drawn, whole: float, part: float) -> Figure:
+    """Path in the plane from equilibrium: the whole run (m), and the lane change alone (m)."""
+    figure, axes = plt.subplots(2, 1)
+    for axis, letter, furthest in zip(axes, "ab", (whole, part), strict=True):
+        for label, (text, style) in {"full_order": ("full order", FULL), **reduced}.items():
+            path = point(dataset, label, start="equilibrium")["outputs"]
+            x, y = (path.sel(output=f"{way}_position") for way in ("longitudinal", "lateral"))
+            axis.plot(x, y, label=text, **style)
+        axis.set_xlim(0.0, furthest)
+        axis.set_ylabel("Y (m)")
+        axis.set_title(f"({letter})")
+    axes[1].set_xlabel("X (m), not to the scale of Y")
+    legend_above(figure, axes[0])
+    return figure
 
 
-def draw_history(
-    axis: Axes, dataset: xr.Dataset, start: str, output: str, reduced: Drawn
-) -> bool:
+def draw_history(axis: Axes, dataset: xr.Dataset, start: str, output: str, reduced: Drawn) -> bool:
     """One output of the full and of the reduced models; whether one of them leaves the axes."""
     full = point(dataset, "full_order", start=start)["outputs"].sel(output=output)
     axis.plot(full.time, full, label="full order", **FULL)

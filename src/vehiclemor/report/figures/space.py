@@ -35,14 +35,16 @@ def frame_space(
     axis.view_init(elev=view[0], azim=view[1])
 
 
-def draw_box(axis: Any, ends: Sequence[float], half: float, heights: Sequence[float]) -> None:
+def draw_box(
+    axis: Any, ends: Sequence[float], half: float, heights: Sequence[float], edge: float = 0.8
+) -> None:
     """Outline of a body between its ends, its sides at +-`half` and two heights, in m."""
     corners = [(ends[i], side * half) for i, side in ((0, 1), (0, -1), (1, -1), (1, 1))]
     levels = [[(x, y, z) for x, y in corners] for z in heights]
     sides = [[levels[0][i - 1], levels[0][i], levels[1][i], levels[1][i - 1]] for i in range(4)]
     body = Poly3DCollection([*levels, *sides], facecolor="#999999", edgecolor="black")
     body.set_alpha(0.10)
-    body.set_linewidth(0.8)
+    body.set_linewidth(edge)
     axis.add_collection3d(body)
 
 

@@ -15,7 +15,7 @@ from vehiclemor.report.figures.runs import (
     draw_errors,
     draw_history,
     draw_lateral_positions,
-    draw_path,
+    figure_of_paths,
     panels,
     reduced_models,
 )
@@ -35,13 +35,7 @@ SHOWN = 6.0
 
 def figure_2(results: Results) -> Figure:
     """Path in the plane from equilibrium: the whole run, and the lane change alone."""
-    figure, axes = plt.subplots(2, 1)
-    for axis, letter, furthest in zip(axes, "ab", (500.0, 100.0), strict=True):
-        draw_path(axis, results[STUDY], "equilibrium", REDUCED, furthest)
-        axis.set_title(f"({letter})")
-    axes[1].set_xlabel("X (m), not to the scale of Y")
-    legend_above(figure, axes[0])
-    return figure
+    return figure_of_paths(results[STUDY], REDUCED, whole=500.0, part=100.0)
 
 
 def figure_3(results: Results) -> Figure:

@@ -1,0 +1,234 @@
+"""Figure 8: the high-fidelity vehicle drawn from its own geometry, and its topological graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.patches import Rectangle
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from vehiclemor.models import high_fidelity_vehicle as vehicle
+from vehiclemor.models.vehicle_equilibrium import wheel_places
+from vehiclemor.parameters import load_parameters
+from vehiclemor.report.figures import mechanism
+from vehiclemor.report.figures.lines import Results
+from vehiclemor.report.figures.space import (
+    CAPTIONS,
+    SIZES,
+    draw_box,
+    draw_frame,
+    draw_size,
+    draw_spring_damper,
+    draw_tire,
+    frame_space,
+    symbol,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = {
+    **mechanism.COLORS,
+    "road": "#777777",
+    "trailing arm": "#E69F00",
+    "front wheel": "#999999",
+    "rear wheel": "#999999",
+}
+SPRING_DAMPER, AXES = "#56B4E9", "#000000"
+# Only for the drawing: outline of the chassis and half the length of a rear pivot, in m.
+HALF_WIDTH, BOTTOM, TOP, OVERHANG, PIVOT = 0.38, 0.16, 0.68, 0.30, 0.07
+LEGEND = (
+    "upper arm",
+    "lower arm",
+    "wheel carrier",
+    "tie rod",
+    "rack",
+    "trailing arm",
+    "spring and damper",
+    "wheel",
+    "fixed to the chassis",
+    "CG of the chassis",
+)
+NODES = {
+    "rear wheel": (0.0, 1.0),
+    "trailing arm": (1.1, 1.0),
+    "chassis": (2.38, 1.0),
+    "road": (2.38, 2.15),
+    "upper arm": (4.95, 2.15),
+    "rack": (3.72, 1.0),
+    "tie rod": (5.0, 1.0),
+    "lower arm": (4.95, -0.15),
+    "wheel carrier": (7.02, 1.0),
+    "front wheel": (8.2, 1.0),
+}
+# Corners that the vehicle has twice: lower left end, width and height in the graph.
+CORNERS = {"front": (4.06, -0.6, 4.6, 3.2), "rear": (-0.5, 0.3, 2.05, 1.3)}
+# Beginnings of the names of the front suspension's points.
+_FRONT = ("upper_", "lower_", "tie_rod_", "wheel_", "front_spring_")
+Point = np.ndarray
+
+
+def figure_8(results: Results) -> Figure:
+    """Vehicle at rest in equilibrium, and the graph of its bodies and joints."""
+    del results
+    p = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
+    # Placed by hand: the style's automatic layout can't deal with axes in space.
+    figure = plt.figure(figsize=(6.7, 6.7))
+    figure.set_layout_engine("none")
+    # As large as the figure: it is square, and cuts off what stands out of it.
+    space = figure.add_axes((0.0, 0.23, 1.0, 1.0), projection="3d")
+    space.patch.set_visible(False)
+    graph = figure.add_axes((0.01, 0.01, 0.98, 0.35))
+    height = rest_height(p)
+    _draw_vehicle(space, p, height)
+    _draw_sizes(space, p, height)
+    frame_space(space, (-1.9, -0.9, 0.0), (1.9, 0.9, 0.7), view=(22.0, -40.0), zoom=0.87)
+    handles, labels = space.get_legend_handles_labels()
+    drawn = [handles[labels.index(name)] for name in LEGEND]
+    figure.legend(drawn, LEGEND, loc="center", bbox_to_anchor=(0.5, 0.45), ncols=5, fontsize=7.5)
+    _draw_graph(graph)
+    figure.text(0.02, 0.97, "(a)")
+    figure.text(0.02, 0.385, f"(b) {_count()}")
+    return figure
+
+
+def rest_height(p: Mapping[str, Any]) -> float:
+    """Height of the chassis' centre of mass above the road at rest, in m."""
+    # Every tire carries a quarter of the weight: front and rear deflections differ by 0.3 mm from
+    # each other, and the pitch of 0.1 mrad from 0, which no drawing can show.
+    others = [p[name] for name in vehicle.PARAMETERS if name.endswith("_mass")]
+    mass = 2.0 * sum(others) - p["chassis_mass"]
+    deflection = mass * p["gravity"] / (4.0 * p["tire_stiffness"])
+    return p["tire_radius"] - deflection - wheel_places(p)[0][2]
+
+
+def _draw_vehicle(axis: Any, p: Mapping[str, Any], height: float) -> None:
+    """Bodies of both sides at their design position, from the road upwards."""
+    up = np.array([0.0, 0.0, height])
+    front, rear = (place + up for place in wheel_places(p))
+    draw_box(axis, (front[0] + OVERHANG, rear[0] - OVERHANG), HALF_WIDTH, (BOTTOM, TOP), edge=0.4)
+    draw_frame(axis, up, AXES, "CG of the chassis")
+    for side in (1.0, -1.0):
+        mirror = np.array([1.0, side, 1.0])
+        named = side == 1.0
+        fronts = {
+            name: mirror * (p[name] - p["wheel_centre"] + front)
+            for name, declared in vehicle.PARAMETERS.items()
+            if declared.size == 3 and declared.unit == "m" and name.startswith(_FRONT)
+        }
+        rears = {
+            name: mirror * (p[name] + rear)
+            for name in ("rear_arm_pivot", "rear_spring_chassis_point", "rear_spring_arm_point")
+        }
+        _front_corner(axis, fronts, named)
+        _rear_corner(axis, rears, mirror * rear, named)
+        for centre in (mirror * front, mirror * rear):
+            label = "wheel" if named and centre[0] > 0.0 else None
+            style = {"color": COLORS["front wheel"], "linewidth": 1.8, "label": label}
+            draw_tire(axis, centre, np.array([0.0, 1.0, 0.0]), p["tire_radius"], **style)
+    ends = np.array([fronts["tie_rod_inner"], fronts["tie_rod_inner"] * [1.0, -1.0, 1.0]])
+    axis.plot(*ends.T, color=COLORS["rack"], linewidth=2.4, label="rack")
+
+
+def _front_corner(axis: Any, at: Mapping[str, Point], named: bool) -> None:
+    upper, lower, outer = (at[n] for n in ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer"))
+    bodies = {
+        "upper arm": [at["upper_arm_front_pivot"], upper, at["upper_arm_rear_pivot"]],
+        "lower arm": [at["lower_arm_front_pivot"], lower, at["lower_arm_rear_pivot"]],
+        "wheel carrier": [upper, lower, outer, upper],
+        "tie rod": [at["tie_rod_inner"], outer],
+    }
+    for name, points in bodies.items():
+        label = name if named else None
+        axis.plot(*np.array(points).T, color=COLORS[name], linewidth=2.0, label=label)
+        if len(points) > 2:
+            plate = Poly3DCollection([points[:3]], color=COLORS[name], linewidth=0.0)
+            plate.set_alpha(0.25)
+            axis.add_collection3d(plate)
+    axle = np.array([(upper + lower) / 2.0, at["wheel_centre"]])
+    axis.plot(*axle.T, color=COLORS["wheel carrier"], linewidth=1.4)
+    _spring_damper(axis, at["front_spring_arm_point"], at["front_spring_chassis_point"], named)
+    for name in ("upper_arm_front", "upper_arm_rear", "lower_arm_front", "lower_arm_rear"):
+        _mount(axis, at[f"{name}_pivot"], named and name == "upper_arm_front")
+    joints = np.array([upper, lower, outer, at["tie_rod_inner"]])
+    axis.plot(*joints.T, "o", color="white", markeredgecolor="black", markersize=3.5)
+
+
+def _rear_corner(axis: Any, at: Mapping[str, Point], centre: Point, named: bool) -> None:
+    pivot, seat = at["rear_arm_pivot"], at["rear_spring_arm_point"]
+    arm = np.array([pivot, seat, centre])
+    label = "trailing arm" if named else None
+    axis.plot(*arm.T, color=COLORS["trailing arm"], linewidth=2.4, label=label)
+    ends = pivot + np.array([[0.0, -PIVOT, 0.0], [0.0, PIVOT, 0.0]])
+    axis.plot(*ends.T, color=COLORS["trailing arm"], linewidth=4.0)
+    _spring_damper(axis, seat, at["rear_spring_chassis_point"], named=False)
+    _mount(axis, pivot, named=False)
+
+
+def _spring_damper(axis: Any, low: Point, high: Point, named: bool) -> None:
+    colors, labels = (SPRING_DAMPER, SPRING_DAMPER), ("spring and damper" if named else None, None)
+    draw_spring_damper(axis, low, high, colors, labels, size=0.6)
+    _mount(axis, high, named=False)
+
+
+def _mount(axis: Any, place: Point, named: bool) -> None:
+    """Point of the chassis that carries a joint, and its link to the drawn outline."""
+    inner = place * [1.0, 0.0, 1.0] + [0.0, np.sign(place[1]) * HALF_WIDTH, 0.0]
+    axis.plot(*np.array([inner, place]).T, color=COLORS["chassis"], linewidth=1.2)
+    label = "fixed to the chassis" if named else None
+    style = {"color": COLORS["chassis"], "markersize": 3.5, "linestyle": "none"}
+    axis.plot(*place, "s", label=label, **style)
+
+
+def _draw_sizes(axis: Any, p: Mapping[str, Any], height: float) -> None:
+    """Dimensions on the road, each label beside its line."""
+    front, rear = wheel_places(p)
+    aside, ahead = np.array([0.0, -0.45, 0.0]), np.array([0.65, 0.0, 0.0])
+    right, left = (front * [1.0, side, 0.0] for side in (-1.0, 1.0))
+    draw_size(axis, right + aside, rear * [1.0, -1.0, 0.0] + aside, (-0.15, -0.30, 0.0), "l")
+    draw_size(axis, left + ahead, right + ahead, (0.35, -0.15, 0.0), "T")
+    top = np.array([0.0, 0.0, height])
+    draw_size(axis, 0.0 * top, top, (-0.45, 0.0, -height), "h")
+
+
+def _count() -> str:
+    """How many coordinates, constraints and degrees of freedom the model has."""
+    coordinates, constraints = len(vehicle.COORDINATES), len(vehicle.CONSTRAINTS)
+    return (
+        f"{coordinates} coordinates, {constraints} constraints: "
+        f"{coordinates - constraints} degrees of freedom"
+    )
+
+
+def _draw_graph(axis: Axes) -> None:
+    """One front and one rear corner, as the others are the same."""
+    free = ", ".join(symbol(q.name) for q in vehicle.COORDINATES[:6])
+    names = [q.name.removesuffix("_FL") for q in vehicle.COORDINATES if q.name.endswith("_FL")]
+    zeta, eta, xi, upper, lower, alpha, beta, spin = (symbol(name) for name in names)
+    equations = len(vehicle.CONSTRAINTS) // 4
+    cut = f"S  closure\n{equations} equations"
+    edges = [
+        ("road", "chassis", f"free, 6 DOF\n{free}"),
+        ("chassis", "upper arm", f"R  {upper}"),
+        ("chassis", "lower arm", f"R  {lower}"),
+        ("chassis", "rack", "P  $s(t)$"),
+        ("rack", "tie rod", f"U\n{alpha}, {beta}"),
+        ("upper arm", "wheel carrier", f"S  {zeta}, {eta}, {xi}"),
+        ("lower arm", "wheel carrier", cut),
+        ("tie rod", "wheel carrier", cut),
+        ("wheel carrier", "front wheel", f"R  {spin}"),
+        ("chassis", "trailing arm", "R  $a$"),
+        ("trailing arm", "rear wheel", f"R  {spin}"),
+    ]
+    mechanism.draw_graph(axis, NODES, edges, COLORS)
+    for end, (x, y, width, height) in CORNERS.items():
+        outline = {"edgecolor": SIZES, "facecolor": "none", "linestyle": ":", "linewidth": 0.9}
+        axis.add_patch(Rectangle((x, y), width, height, **outline))
+        place, text = (x + width - 0.08, y + 0.08), rf"{end} corner, $\times$ 2"
+        axis.text(*place, text, fontsize=7.5, ha="right", color=SIZES)
+    axis.set_xlim(-0.55, 8.7)
+    axis.set_ylim(-0.65, 2.65)

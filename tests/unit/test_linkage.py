@@ -1,0 +1,296 @@
+"""Geometry of double-wishbone corners: rigid bodies, mirror images, and a solve that never fails."""
+
+from collections.abc import Callable
+from itertools import combinations
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.unit.programs import function_of, pivot_shares
+from vehiclemor.models import double_wishbone_linkage, vehicle_corners
+from vehiclemor.models.double_wishbone_points import POINTS, check_linkage, tie_rod_angles
+from vehiclemor.models.high_fidelity_equations import CORNER, LOWER_ARM, PIVOTS
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.symbolic.joints import free_rate
+from vehiclemor.symbolic.tape import Tape
+
+MIRROR = np.array([1.0, -1.0, 1.0])
+# What the mirror does to zeta, eta, xi, theta_u, theta_l, alpha and beta.
+TURNED = np.array([-1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0])
+CARRIED = ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer", "wheel_centre")
+SIDES = (1, -1)
+
+coordinates = st.tuples(*[st.floats(-1.0, 1.0)] * 7).map(np.array)
+racks = st.floats(-0.05, 0.05)
+
+
+def compiled(side: int) -> Callable:
+    """(hard points by name, q, rack, rates, rack's velocity and acceleration) -> places by name."""
+    tape, q = Tape(), sp.symbols("q:7", real=True)
+    rates, rack = sp.symbols("rate:7", real=True), sp.symbols("rack rack_dot rack_ddot", real=True)
+    points = {name: sp.symbols(f"{name}_x {name}_y {name}_z", real=True) for name in POINTS}
+    linkage = double_wishbone_linkage.assembled(tape, q, rack[0], points, side)
+    on_carrier = {name: linkage.on_carrier(tape, points[name]) for name in CARRIED}
+    free = [free_rate(k, rate) for k, rate in enumerate(rates)]
+    motions = vehicle_corners.linkage_motions(tape, linkage, q, free, rack[1:])
+    gaps, closing = vehicle_corners.closures(tape, linkage, motions, points)
+    zero = (sp.Integer(0),) * 3
+    results = {
+        **on_carrier,
+        "upper_arm_ball": linkage.upper_ball_joint,
+        "lower_arm_ball": linkage.on_lower_arm(tape, points["lower_ball_joint"]),
+        "lower_arm_rear": linkage.on_lower_arm(tape, points["lower_arm_rear_pivot"]),
+        "lower_arm_front": linkage.on_lower_arm(tape, points["lower_arm_front_pivot"]),
+        "rack_end": linkage.rack_end,
+        "rod_end": linkage.rod_end,
+        "rod_direction": linkage.rod_direction,
+        "gaps": gaps,
+        "gap_rates": [e for motion in closing for e in motion.value],
+        "gap_biases": [e for motion in closing for e in motion.bias],
+        "gap_columns": [
+            [motion.columns.get(k, zero)[i] for k in range(7)]
+            for motion in closing
+            for i in range(3)
+        ],
+    }
+    function = function_of(
+        tape,
+        [list(points.values()), q, rack, rates],
+        [sp.Matrix(r).tolist() for r in results.values()],
+    )
+
+    def places(p, q, rack=(0.0, 0.0, 0.0), rates=(0.0,) * 7) -> dict[str, np.ndarray]:
+        found = function([p[name] for name in POINTS], q, rack, rates)
+        return {k: np.squeeze(np.array(v)) for k, v in zip(results, found, strict=True)}
+
+    return places
+
+
+SIDE = {side: compiled(side) for side in SIDES}
+
+
+def of_side(points: dict, side: int) -> dict[str, np.ndarray]:
+    return {name: points[name] * (MIRROR if side < 0 else 1.0) for name in POINTS}
+
+
+def design(points: dict, side: int) -> np.ndarray:
+    p = of_side(points, side)
+    return np.array([*np.zeros(5), *tie_rod_angles(p["tie_rod_inner"], p["tie_rod_outer"], side)])
+
+
+def distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b))
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_design_position_is_that_of_the_hard_points(points, side):
+    p = of_side(points, side)
+    found = SIDE[side](p, design(points, side))
+    for name in CARRIED:
+        np.testing.assert_allclose(found[name], p[name], rtol=0, atol=1e-15)
+    same = {
+        "upper_arm_ball": "upper_ball_joint",
+        "lower_arm_ball": "lower_ball_joint",
+        "lower_arm_rear": "lower_arm_rear_pivot",
+        "lower_arm_front": "lower_arm_front_pivot",
+        "rack_end": "tie_rod_inner",
+        "rod_end": "tie_rod_outer",
+    }
+    for name, expected in same.items():
+        np.testing.assert_allclose(found[name], p[expected], rtol=0, atol=2e-16 + 1e-15)
+    np.testing.assert_allclose(found["gaps"], 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("side", SIDES)
+@settings(max_examples=30)
+@given(q=coordinates, rack=racks)
+def test_bodies_are_rigid(points, side, q, rack):
+    p = of_side(points, side)
+    found = SIDE[side](p, q, (rack, 0.0, 0.0))
+
+    def assert_kept(a, b, design_a, design_b):
+        assert distance(a, b) == pytest.approx(distance(p[design_a], p[design_b]), abs=1e-15)
+
+    for arm in ("upper", "lower"):
+        for end in ("front", "rear"):
+            pivot = f"{arm}_arm_{end}_pivot"
+            assert_kept(found[f"{arm}_arm_ball"], p[pivot], f"{arm}_ball_joint", pivot)
+    for a, b in combinations(CARRIED, 2):
+        assert_kept(found[a], found[b], a, b)
+    # The carrier is no mirror image of itself.
+    now, before = ([places[name] for name in CARRIED] for places in (found, p))
+    volumes = [np.linalg.det(np.array(four[1:]) - four[0]) for four in (now, before)]
+    assert volumes[0] == pytest.approx(volumes[1], abs=1e-15)
+    assert_kept(found["rack_end"], found["rod_end"], "tie_rod_inner", "tie_rod_outer")
+    assert np.linalg.norm(found["rod_direction"]) == pytest.approx(1.0, abs=1e-15)
+    # Pivots stay, the rack moves along y, the upper arm carries the carrier.
+    for end in ("rear", "front"):
+        pivot = p[f"lower_arm_{end}_pivot"]
+        np.testing.assert_allclose(found[f"lower_arm_{end}"], pivot, rtol=0, atol=2e-16)
+    moved = found["rack_end"] - p["tie_rod_inner"]
+    np.testing.assert_allclose(moved, [0.0, rack, 0.0], rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(found["upper_arm_ball"], found["upper_ball_joint"])
+
+
+@settings(max_examples=30)
+@given(q=coordinates, rack=racks)
+def test_the_right_corner_mirrors_the_left_one(points, q, rack):
+    left = SIDE[1](of_side(points, 1), q, (rack, 0.0, 0.0))
+    right = SIDE[-1](of_side(points, -1), TURNED * q, (-rack, 0.0, 0.0))
+    for name in (*CARRIED, "upper_arm_ball", "lower_arm_ball", "rack_end", "rod_end"):
+        np.testing.assert_allclose(
+            right[name], MIRROR * left[name], rtol=0, atol=5e-16, err_msg=name
+        )
+    gaps = np.tile(MIRROR, 2) * left["gaps"]
+    np.testing.assert_allclose(right["gaps"], gaps, rtol=0, atol=1e-15)
+
+
+def test_design_angles_of_the_tie_rods_mirror_each_other(points):
+    left, right = design(points, 1), design(points, -1)
+    np.testing.assert_array_equal(right, TURNED * left)
+    assert left[5:] == pytest.approx([-0.178016256461, -0.0840901368329], abs=0.1)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_positive_arm_angle_raises_the_left_and_lowers_the_right_ball_joint(points, side):
+    p, q = of_side(points, side), design(points, side)
+    for name, place in (("upper", 3), ("lower", 4)):
+        moved = q.copy()
+        moved[place] += 0.01
+        rise = SIDE[side](p, moved)[f"{name}_arm_ball"] - p[f"{name}_ball_joint"]
+        assert side * rise[2] > 0.001
+
+
+@pytest.mark.parametrize("side", SIDES)
+@settings(max_examples=15)
+@given(q=coordinates, rack=racks, data=st.data())
+def test_motions_of_the_closures_are_their_derivatives(points, side, q, rack, data):
+    speeds = data.draw(coordinates)
+    moved, accelerated = data.draw(st.tuples(st.floats(-1, 1), st.floats(-1, 1)))
+    p = of_side(points, side)
+    now = (rack, moved, accelerated)
+    found = SIDE[side](p, q, now, speeds)
+    # Complex steps: along the motion, and on from it where no coordinate accelerates.
+    step = 1e-30
+    later = SIDE[side](
+        p, q + 1j * step * speeds, (rack + 1j * step * moved, moved + 1j * step * accelerated, 0.0),
+        speeds,
+    )  # fmt: skip
+    np.testing.assert_allclose(later["gaps"].imag / step, found["gap_rates"], atol=1e-14)
+    np.testing.assert_allclose(later["gap_rates"].imag / step, found["gap_biases"], atol=1e-13)
+    rack_alone = np.array([0.0, 0.0, 0.0, 0.0, -moved, 0.0])
+    by_speeds = found["gap_columns"] @ speeds + rack_alone
+    np.testing.assert_allclose(by_speeds, found["gap_rates"], atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    [
+        ("upper_arm_front_pivot", "upper arm axis of length 0"),
+        ("tie_rod_outer", "tie rod of length 0"),
+    ],
+)
+def test_bodies_without_extent_are_refused(points, end, words):
+    start = {"upper_arm_front_pivot": "upper_arm_rear_pivot", "tie_rod_outer": "tie_rod_inner"}[end]
+    check_linkage(points)
+    with pytest.raises(ValueError, match=words):
+        check_linkage(points | {end: points[start]})
+
+
+# Pivots of the vehicle's front corners
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> DynamicModel:
+    return build("high_fidelity_vehicle")
+
+
+ARM_ANGLES = np.linspace(0.0, 0.35, 15)
+RACKS = (-0.03, -0.015, 0.0, 0.015, 0.03)
+
+
+def corner_blocks(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Jacobians of both corners' closures by their seven coordinates (2, 6, 7)."""
+    _, _, by_q, _ = model.descriptor(x, u)
+    return np.array([by_q[6 * k : 6 * k + 6, CORNER[k]] for k in range(2)])
+
+
+@pytest.fixture(scope="module")
+def reached(vehicle) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Closed corners on a grid of arm angles to both sides and racks, on from the design."""
+    dependent = [j for j in range(7) if j != LOWER_ARM]
+    found = []
+    for rack in RACKS:
+        u = np.array([rack, 0.0, 0.0])
+        for direction in (1.0, -1.0):
+            x = vehicle.start()
+            for angle in ARM_ANGLES:
+                # The same travel at both corners: the right arm's angle is opposite.
+                for k, own in enumerate(CORNER):
+                    x[own.start + LOWER_ARM] = SIDES[k] * direction * angle
+                for _ in range(6):
+                    gaps, _ = vehicle.violations(x, u)
+                    blocks = corner_blocks(vehicle, x, u)
+                    for k, own in enumerate(CORNER):
+                        step = np.linalg.solve(blocks[k][:, dependent], gaps[6 * k : 6 * k + 6])
+                        x[np.arange(own.start, own.stop)[dependent]] -= step
+                assert np.abs(vehicle.violations(x, u)[0]).max() < 1e-14
+                found.append((x.copy(), u))
+    return found
+
+
+def dependent_blocks(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    return np.delete(corner_blocks(model, x, u), LOWER_ARM, axis=2)
+
+
+def growth(matrix: np.ndarray, pivots) -> float:
+    """Largest entry that elimination makes, beside the largest of the matrix."""
+    work, rows, largest = matrix.copy(), list(range(len(matrix))), np.abs(matrix).max()
+    for row, column in pivots:
+        rows.remove(row)
+        for other in rows:
+            work[other] -= work[other, column] / work[row, column] * work[row]
+    return float(np.abs(work).max() / largest)
+
+
+def test_the_reachable_range_is_that_of_a_road_car(vehicle, reached):
+    heights = [
+        SIDE[1](of_side(vehicle.parameters.values(), 1), x[CORNER[0]])["wheel_centre"][2]
+        for x, _ in reached
+    ]
+    design = vehicle.parameters["wheel_centre"][2]
+    assert min(heights) - design < -0.1
+    assert max(heights) - design > 0.1
+
+
+def test_pivots_of_the_vehicle_stay_away_from_zero(vehicle, reached):
+    rng = np.random.default_rng(5)
+    shares, growths, smallest = [], [], []
+    for x, u in reached:
+        # A stabilised corner is closed up to a millirad.
+        for state in (x, x + np.concatenate([rng.uniform(-1e-3, 1e-3, 26), np.zeros(26)])):
+            for block in dependent_blocks(vehicle, state, u):
+                shares.append(min(pivot_shares(block, PIVOTS)))
+                growths.append(growth(block, PIVOTS))
+                smallest.append(np.linalg.svd(block, compute_uv=False)[-1])
+    print(min(shares), max(growths), min(smallest))
+    # Each corner's solve loses two digits at most.
+    assert min(shares) > 0.01
+    assert max(growths) < 10.0
+    assert min(smallest) > 0.01
+
+
+def test_the_fixed_elimination_solves_as_accurately_as_a_dense_one(vehicle, reached):
+    """Accelerations of closed corners fulfil the closures' second derivatives."""
+    rng = np.random.default_rng(6)
+    for x, u in reached[::7]:
+        state = x.copy()
+        state[26:] += rng.uniform(-1.0, 1.0, 26)
+        _, _, by_q, gamma = vehicle.descriptor(state, u)
+        accelerations = vehicle.derivative(state, u)[26:]
+        error = by_q @ accelerations - gamma
+        assert np.abs(error).max() < 1e-12 * np.abs(accelerations).max()
