@@ -1,25 +1,30 @@
-"""The 14-DOF vehicle's results are unchanged: they agree with the committed reference."""
+"""Results of the vehicles are unchanged: they agree with the committed references."""
 
 import json
 
 import numpy as np
 import pytest
 
-from tests.reference.vehicle_results import COUNTS, NAME, current
+from tests.reference.vehicle_results import COUNTS, RUNS, current
 from vehiclemor.resources import data_folder
 
 # Step size control amplifies rounding: another processor may need a few steps more or less.
 COUNT_TOLERANCE = 0.03
 
 
-@pytest.fixture(scope="module")
-def reference() -> dict:
-    return json.loads((data_folder() / "reference" / f"{NAME}.json").read_text())
+@pytest.fixture(scope="module", params=list(RUNS))
+def name(request) -> str:
+    return request.param
 
 
 @pytest.fixture(scope="module")
-def now() -> dict:
-    return current()
+def reference(name) -> dict:
+    return json.loads((data_folder() / "reference" / f"{name}.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def now(name) -> dict:
+    return current(name)
 
 
 def test_operation_counts_are_exact(reference, now):
