@@ -38,7 +38,6 @@ VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
 POINTER = types.CPointer(types.float64)
-FLOATS = ctypes.POINTER(ctypes.c_double)
 SOURCES: dict[str, ModuleType] = {
     "sincos": sincos,
     "atan": arctangent,
@@ -416,8 +415,10 @@ def python_kernel(kernel: KernelShape, machine: Any) -> Callable[..., None]:
     machine
         The C function that `straight_line` was compiled into.
     """
+    count = len(kernel.arguments) - ("_work" in kernel.arguments)
+    function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * count)(machine.address)
     # The machine code lives as long as its owner.
-    alive: tuple[Callable[..., None], Any] = machine.ctypes, machine
+    alive: tuple[Callable[..., None], Any] = function, machine
 
     def checked(name: str, array: np.ndarray) -> Any:
         dimensions = kernel.dimensions if name == "_result" else 1
@@ -434,7 +435,7 @@ def python_kernel(kernel: KernelShape, machine: Any) -> Callable[..., None]:
                 f"{kernel.name}: {name.removeprefix('_')} must be a C-contiguous array of at least "
                 f"{kernel.sizes[name]} floats with {dimensions} dimension(s), not {kind}"
             )
-        return array.ctypes.data_as(FLOATS)
+        return array.ctypes.data
 
     def execute(*arrays: np.ndarray) -> None:
         given = zip(kernel.arguments, arrays, strict=True)

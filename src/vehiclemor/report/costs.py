@@ -73,7 +73,7 @@ def printed_costs(folder: Path) -> str:
 
 def _printed(model: str, folder: Path) -> str:
     data, table, race = timing(model, folder), cost_table(model, folder), RACES[model]
-    head = f"{'':<27}{'rank':>5}{'tol.':>7}{'us/run':>9}{'+-%':>5}{'ns/point':>9}"
+    head = f"{'':<27}{'rank':>5}{'tol.':>8}{'us/run':>9}{'+-%':>5}{'ns/point':>9}"
     head += "".join(f"{heading:>11}" for heading in race.counts.values())
     head += f"{'x1':>7}{'x2':>7}" + "".join(f"{_heading(name):>10}" for name in race.errors)
     lines = [
@@ -94,7 +94,7 @@ def _printed(model: str, folder: Path) -> str:
 
 
 def _line(row: dict, counts: Iterable[str], errors: Iterable[str]) -> str:
-    text = f"{row['contestant']:<27}{row['rank']:>5}{_power(row['tolerance']):>7}"
+    text = f"{row['contestant']:<27}{row['rank']:>5}{_power(row['tolerance']):>8}"
     text += f"{row['us_per_run']:>9.1f}{50.0 * row['quartile_spread']:>5.0f}"
     text += f"{row['ns_per_sample']:>9.1f}" + "".join(f"{row[name]:>11}" for name in counts)
     text += f"{_cell(row['speed_up'], 2):>7}{_cell(row['speed_up_strongest'], 2):>7}"
@@ -108,7 +108,13 @@ def _line(row: dict, counts: Iterable[str], errors: Iterable[str]) -> str:
 
 
 def _heading(output: str) -> str:
-    return {"second_euler_angle": "angle", "lateral_position": "Y"}.get(output, output)
+    short = {
+        "second_euler_angle": "angle",
+        "lateral_position": "Y",
+        "lateral_speed": "v_y",
+        "vertical_speed": "v_z",
+    }
+    return short.get(output, output)
 
 
 def _share(part: float, whole: float) -> float:
@@ -116,7 +122,7 @@ def _share(part: float, whole: float) -> float:
 
 
 def _power(value: float) -> str:
-    return "-" if value != value else f"{value:.0e}"
+    return "-" if value != value else f"{value:.1e}".replace(".0e", "e")
 
 
 def _cell(value: float, digits: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
@@ -14,7 +14,6 @@ import numpy as np
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.quantities import Quantity
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import linearisation, system_loops
@@ -111,22 +110,27 @@ class DynamicModel:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates."""
-        return _names(self.equations.coordinates)
+        return self._names["coordinates"]
 
     @property
     def speeds(self) -> tuple[str, ...]:
         """Names of the speeds."""
-        return _names(self.equations.speeds)
+        return self._names["speeds"]
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs."""
-        return _names(self.equations.inputs)
+        return self._names["inputs"]
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs."""
-        return _names(self.equations.outputs)
+        return self._names["outputs"]
+
+    @cached_property
+    def _names(self) -> dict[str, tuple[str, ...]]:
+        kinds = ("coordinates", "speeds", "inputs", "outputs")
+        return {kind: tuple(q.name for q in getattr(self.equations, kind)) for kind in kinds}
 
     @property
     def starts(self) -> tuple[str, ...]:
@@ -180,9 +184,10 @@ class DynamicModel:
         self.loops.derivative_path(states, inputs, self.machine, result)
         return result
 
-    def mass_matrix(self, x: Any) -> np.ndarray:
-        """Mass matrix (n, n) that belongs to the second derivatives of the coordinates."""
-        return self._call("second_order", x, np.zeros(len(self.inputs)))[:, :-1]
+    def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
+        """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
+        inputs = np.zeros(len(self.inputs)) if u is None else u
+        return self._call("second_order", x, inputs)[:, :-1]
 
     def descriptor(self, x: Any, u: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """M (n, n), F (n,), C (c, n), gamma (c,) of the equations before they are solved.
@@ -394,7 +399,3 @@ class DynamicModel:
 
     def _inputs(self, u: Any) -> np.ndarray:
         return checked_array(np.atleast_1d(u), len(self.inputs), "u", self.name)
-
-
-def _names(quantities: Sequence[Quantity]) -> tuple[str, ...]:
-    return tuple(quantity.name for quantity in quantities)

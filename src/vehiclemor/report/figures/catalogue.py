@@ -114,10 +114,10 @@ FIGURES: dict[str, Entry] = {
     "9": Entry(
         ("figures-9-10",),
         high_fidelity_histories.figure_9,
-        "Path of the high-fidelity vehicle from equilibrium (a) and its lane change alone (b): full "
-        "order and POD with r = 1 of 26, control period 0.1 s, 5 snapshots. Parameters are public "
-        "data, since the paper's were never published. Nominal only: trained on the run that is "
-        "shown, which replay returns exactly.",
+        "Path of the high-fidelity vehicle from equilibrium (a) and its lane change alone (b): "
+        "full order and POD with r = 1 of 26, control period 0.1 s, 5 snapshots. Parameters are "
+        "public data, since the paper's were never published. Nominal only: trained on the run "
+        "that is shown, which replay returns exactly.",
     ),
     "10": Entry(
         ("figures-9-10",),

@@ -16,7 +16,6 @@ from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures import mechanism
 from vehiclemor.report.figures.lines import Results
 from vehiclemor.report.figures.space import (
-    CAPTIONS,
     SIZES,
     draw_box,
     draw_frame,
@@ -75,7 +74,8 @@ Point = np.ndarray
 def figure_8(results: Results) -> Figure:
     """Vehicle at rest in equilibrium, and the graph of its bodies and joints."""
     del results
-    p = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
+    parameters = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
+    p = {name: parameters[name] for name in vehicle.PARAMETERS}
     # Placed by hand: the style's automatic layout can't deal with axes in space.
     figure = plt.figure(figsize=(6.7, 6.7))
     figure.set_layout_engine("none")
@@ -100,8 +100,9 @@ def rest_height(p: Mapping[str, Any]) -> float:
     """Height of the chassis' centre of mass above the road at rest, in m."""
     # Every tire carries a quarter of the weight: front and rear deflections differ by 0.3 mm from
     # each other, and the pitch of 0.1 mrad from 0, which no drawing can show.
-    others = [p[name] for name in vehicle.PARAMETERS if name.endswith("_mass")]
-    mass = 2.0 * sum(others) - p["chassis_mass"]
+    masses = [p[name] for name in vehicle.PARAMETERS if name.endswith("_mass")]
+    # All bodies but the chassis come in pairs.
+    mass = 2.0 * sum(masses) - p["chassis_mass"]
     deflection = mass * p["gravity"] / (4.0 * p["tire_stiffness"])
     return p["tire_radius"] - deflection - wheel_places(p)[0][2]
 
@@ -130,19 +131,14 @@ def _draw_vehicle(axis: Any, p: Mapping[str, Any], height: float) -> None:
             label = "wheel" if named and centre[0] > 0.0 else None
             style = {"color": COLORS["front wheel"], "linewidth": 1.8, "label": label}
             draw_tire(axis, centre, np.array([0.0, 1.0, 0.0]), p["tire_radius"], **style)
-    ends = np.array([fronts["tie_rod_inner"], fronts["tie_rod_inner"] * [1.0, -1.0, 1.0]])
+    inner = p["tie_rod_inner"] - p["wheel_centre"] + front
+    ends = np.array([inner, inner * [1.0, -1.0, 1.0]])
     axis.plot(*ends.T, color=COLORS["rack"], linewidth=2.4, label="rack")
 
 
 def _front_corner(axis: Any, at: Mapping[str, Point], named: bool) -> None:
     upper, lower, outer = (at[n] for n in ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer"))
-    bodies = {
-        "upper arm": [at["upper_arm_front_pivot"], upper, at["upper_arm_rear_pivot"]],
-        "lower arm": [at["lower_arm_front_pivot"], lower, at["lower_arm_rear_pivot"]],
-        "wheel carrier": [upper, lower, outer, upper],
-        "tie rod": [at["tie_rod_inner"], outer],
-    }
-    for name, points in bodies.items():
+    for name, points in mechanism.linkage(at).items():
         label = name if named else None
         axis.plot(*np.array(points).T, color=COLORS[name], linewidth=2.0, label=label)
         if len(points) > 2:

@@ -73,10 +73,7 @@ def _draw(axis: Any, model: AlgebraicModel, q: np.ndarray, alpha: float) -> None
     upper, lower = moving["upper_ball_joint"], moving["lower_ball_joint"]
     centre, outer = moving["wheel_centre"], moving["tie_rod_outer"]
     bodies = {
-        "upper arm": [fixed["upper_arm_front_pivot"], upper, fixed["upper_arm_rear_pivot"]],
-        "lower arm": [fixed["lower_arm_front_pivot"], lower, fixed["lower_arm_rear_pivot"]],
-        "wheel carrier": [upper, lower, outer, upper],
-        "tie rod": [moving["tie_rod_inner"], outer],
+        **linkage({**fixed, **moving}),
         "rack": [
             moving["tie_rod_inner"] - np.array([0.0, 0.12, 0.0]),
             moving["tie_rod_inner"] + np.array([0.0, 0.03, 0.0]),
@@ -106,6 +103,17 @@ def _draw(axis: Any, model: AlgebraicModel, q: np.ndarray, alpha: float) -> None
             *np.array(pivots).T, "s", color=COLORS["chassis"], markersize=4.5, label="chassis pivot"
         )
     _wheel(axis, centre, moving["axle_direction"], alpha)
+
+
+def linkage(at: Mapping[str, np.ndarray]) -> dict[str, list[np.ndarray]]:
+    """Corners of the bodies of one front suspension, from the places of its points."""
+    upper, lower, outer = at["upper_ball_joint"], at["lower_ball_joint"], at["tie_rod_outer"]
+    return {
+        "upper arm": [at["upper_arm_front_pivot"], upper, at["upper_arm_rear_pivot"]],
+        "lower arm": [at["lower_arm_front_pivot"], lower, at["lower_arm_rear_pivot"]],
+        "wheel carrier": [upper, lower, outer, upper],
+        "tie rod": [at["tie_rod_inner"], outer],
+    }
 
 
 def _wheel(axis: Any, centre: np.ndarray, spin: np.ndarray, alpha: float) -> None:

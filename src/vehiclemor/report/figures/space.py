@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import ArrayLike
 
 from vehiclemor.report.figures.mechanism import rim
 
@@ -101,7 +102,7 @@ def draw_frame(axis: Any, origin: np.ndarray, color: str, label: str) -> None:
 
 
 def draw_size(
-    axis: Any, start: np.ndarray, end: np.ndarray, label_at: Sequence[float], name: str
+    axis: Any, start: np.ndarray, end: np.ndarray, label_at: ArrayLike, name: str
 ) -> None:
     """Distance between two points (3,) in m; its label `label_at` (3,) from their middle."""
     axis.plot(*np.array([start, end]).T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
