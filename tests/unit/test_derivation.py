@@ -75,16 +75,16 @@ def test_a_derivation_describes_its_equations(folder: Path) -> None:
             "speeds": (2,),
         }
         assert made.operations == operation_counts(reference_source(program))
-        # Counted by hand: rate (target - x) + rate of the target; torque - sin; growth x^2.
+        # By hand: rate (target - x) + rate of the target; -sin + torque; growth x^2.
         assert made.operations["derivative"] == {
             "add": 3,
             "multiply": 3,
             "divide": 0,
-            "negate": 0,
+            "negate": 1,
             "sqrt": 0,
             "trigonometric": 1,
             "power": 0,
-            "total": 7,
+            "total": 8,
         }
         assert made.operations["outputs"]["trigonometric"] == 4
 
@@ -143,7 +143,10 @@ def without_an_entry(name: str):
 
 
 def replaced(content: object):
-    return lambda text: json.dumps(content).encode()
+    def changed(_text: str) -> bytes:
+        return json.dumps(content).encode()
+
+    return changed
 
 
 def with_another_source(text: str) -> bytes:

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from tests.unit.programs import pivot_shares, run
+from tests.unit.programs import function_of, pivot_shares, run
 from vehiclemor.codegen.emit import operation_counts, reference_source
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.symbolic.elimination import Pivots, choose_pivots, eliminate
+from vehiclemor.symbolic.elimination import (
+    Pivots,
+    choose_pivots,
+    eliminate,
+    eliminate_several,
+)
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -52,6 +57,38 @@ def test_elimination_equals_a_dense_solve(seed: int) -> None:
     values |= {sp.Symbol(f"b_{i}", real=True): right_side[i] for i in range(n)} | {p: 1.0}
     found = run(program, "f", values)[:n]
     np.testing.assert_allclose(found, np.linalg.solve(matrix, right_side), rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_several_right_sides_are_solved_at_once(seed: int) -> None:
+    n, sides = 4 + seed % 4, 1 + seed % 3
+    matrix = sparse_matrix(seed, n)
+    rng = np.random.default_rng(200 + seed)
+    right_sides = rng.standard_normal((sides, n))
+    # Structural zeros on the right as well.
+    right_sides[0, 0] = 0.0
+    pivots, tape = choose_pivots(matrix), Tape()
+    entries = [[sp.Float(e) if e else sp.Integer(0) for e in row] for row in matrix]
+    b = [[sp.Symbol(f"b_{k}_{i}", real=True) for i in range(n)] for k in range(sides)]
+    b[0][0] = sp.Integer(0)
+    together = eliminate_several(tape, entries, b, pivots)
+    # What the right sides have in common is there once: one after the other adds nothing to it.
+    length = len(tape.definitions)
+    assert [eliminate(tape, entries, side, pivots) for side in b] == together
+    assert len(tape.definitions) == length
+    known = [symbol for side in b for symbol in side if symbol.is_Symbol]
+    values = [e for e, symbol in zip(right_sides.flat, sum(b, []), strict=True) if symbol.is_Symbol]
+    found = np.array(function_of(tape, known, together)(*values))
+    expected = np.linalg.solve(matrix, right_sides.T).T
+    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-13)
+
+
+def test_right_sides_do_not_change_their_arguments() -> None:
+    a = [[sp.Symbol(f"a_{i}_{j}", real=True) for j in range(3)] for i in range(3)]
+    b = [list(sp.symbols(f"b{k}_:3", real=True)) for k in range(2)]
+    before = ([row.copy() for row in a], [side.copy() for side in b])
+    eliminate_several(Tape(), a, b, ((0, 0), (1, 1), (2, 2)))
+    assert (a, b) == before
 
 
 def test_arrow_matrix_is_solved_without_fill() -> None:

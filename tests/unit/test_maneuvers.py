@@ -84,3 +84,87 @@ def test_break_points_follow_the_frequency() -> None:
     )
     assert corners.break_points == (1.0, 2.0)
     assert corners.perturbed(frequency=2.0).break_points == (0.5, 1.0)
+
+
+# Pulses of the steering rack
+
+
+def rack_pulse(frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
+    return component("maneuver", "rack_lane_change").perturbed(frequency, amplitude)
+
+
+def spectral_derivative(values: np.ndarray, period: float) -> np.ndarray:
+    """Derivative of equidistant values of a periodic function with few harmonics: exact."""
+    n = len(values)
+    rates = 2j * np.pi * np.fft.fftfreq(n, period / n)
+    return np.fft.ifft(rates * np.fft.fft(values)).real
+
+
+@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
+def test_rack_speed_and_acceleration_are_derivatives_of_its_place(
+    frequency: float, amplitude: float
+) -> None:
+    pulse = rack_pulse(frequency, amplitude)
+    begin, end = pulse.break_points
+    times = np.linspace(begin, end, 33)[:-1]
+    place, speed, acceleration = pulse.at(times).T
+    rate = 2.0 * np.pi / (end - begin)
+    # The pulse has two harmonics; its values are of the order of the amplitude.
+    scale = 0.0047 * max(abs(amplitude), 1e-6)
+    close = {"rtol": 0.0, "atol": 1e-12 * scale * rate}
+    np.testing.assert_allclose(spectral_derivative(place, end - begin), speed, **close)
+    # Where it begins, the pulse's acceleration is zero, as the periodic function's.
+    close["atol"] *= rate
+    np.testing.assert_allclose(spectral_derivative(speed, end - begin), acceleration, **close)
+
+
+@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
+def test_the_rack_pulse_is_as_high_and_as_long_as_described(
+    frequency: float, amplitude: float
+) -> None:
+    pulse = rack_pulse(frequency, amplitude)
+    assert pulse.break_points == (1.0, pytest.approx(1.0 + 2.5 / frequency))
+    begin, end = pulse.break_points
+    times = np.linspace(begin, end, 3001)
+    place = pulse.at(times)[:, 0]
+    # sin x - sin(2 x) / 2 = sin x (1 - cos x) is largest at a third of the turn.
+    highest = 0.0046903 * 0.75 * np.sqrt(3.0)
+    assert place[1000] == pytest.approx(-amplitude * highest, abs=1e-15)
+    assert np.abs(place).max() == pytest.approx(abs(amplitude) * highest, abs=1e-15)
+    # To the one side and then to the other, by the same amount.
+    np.testing.assert_allclose(place[::-1], -place, rtol=0, atol=1e-15)
+
+
+@given(frequency=factors)
+def test_the_rack_pulse_has_no_corner_in_its_acceleration(frequency: float) -> None:
+    pulse = rack_pulse(frequency)
+    rate = 2.0 * np.pi * frequency / 2.5
+    step = 1e-7
+    for corner, inside in zip(pulse.break_points, (1.0, -1.0), strict=True):
+        at_corner, outside = pulse.at(corner - inside * np.array([0.0, step]))
+        np.testing.assert_allclose(at_corner, 0.0, atol=1e-15)
+        np.testing.assert_array_equal(outside, 0.0)
+        # Inside it grows with the third power of time: its third derivative alone jumps.
+        third = -0.0046903 * 3.0 * rate**3
+        near = pulse.at(np.array([corner + inside * step]))[0]
+        expected = third * np.array([inside * step**3 / 6.0, step**2 / 2.0, inside * step])
+        np.testing.assert_allclose(near, expected, rtol=1e-5, atol=[1e-17, 1e-14, 1e-14])
+
+
+def test_the_rack_rests_before_and_after_its_pulse() -> None:
+    pulse = rack_pulse()
+    assert (pulse.duration, len(pulse.times), pulse.inputs) == (10.0, 501, ("s", "s_dot", "s_ddot"))
+    times = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(3.5, 10.0, 50)])
+    np.testing.assert_array_equal(pulse.at(times), 0.0)
+    # A positive displacement steers to the right: the lane change to the left begins negative.
+    assert pulse.at(np.array([1.5]))[0, 0] < 0.0
+
+
+@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
+def test_a_rack_that_is_held_does_not_move(frequency: float, amplitude: float) -> None:
+    held = component("maneuver", "rack_straight_ahead").perturbed(frequency, amplitude)
+    assert held.inputs == rack_pulse().inputs
+    assert held.break_points == ()
+    inputs = held.at(held.times)
+    assert inputs.shape == (501, 3)
+    assert not inputs.any()

@@ -1,0 +1,255 @@
+"""The high-fidelity vehicle stands still at its design position, whatever its parameters."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vehiclemor.errors import GeometryError
+from vehiclemor.models.quantities import WHEELS
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.dynamic_build import build
+
+NAME = "high_fidelity_vehicle"
+N = 26
+REST = np.zeros(3)
+# Bodies of the front axle and of the rear one, with the number of each; centres in front are given
+# in the front's frame, behind from the rear left wheel's centre.
+FRONT = ("upper_arm", "lower_arm", "carrier")
+
+
+def built(**overrides: object) -> DynamicModel:
+    return build(NAME, overrides=overrides)
+
+
+@pytest.fixture(scope="module")
+def given_values() -> dict[str, np.ndarray]:
+    return built().parameters.values()
+
+
+def statics(p: Mapping[str, np.ndarray], pitch: float = 0.0) -> tuple[float, float]:
+    """Mass, and the share of the weight on the front axle by the moments about the rear wheels."""
+    front, rear = p["front_frame_origin"], p["rear_wheel_centre"]
+    middle_of_rod = (p["tie_rod_inner"] + p["tie_rod_outer"]) / 2
+    bodies = [(p["chassis_mass"], p["chassis_centre"])]
+    bodies += [(2 * p[f"{name}_mass"], front + p[f"{name}_centre"]) for name in FRONT]
+    bodies += [(2 * p["tie_rod_mass"], front + middle_of_rod)]
+    bodies += [(2 * p["front_wheel_mass"], front + p["wheel_centre"])]
+    bodies += [(2 * p["rear_arm_mass"], rear + p["rear_arm_centre"])]
+    bodies += [(2 * p["rear_wheel_mass"], rear)]
+    mass = sum(float(part) for part, _ in bodies)
+    # Along the road; a wheel without camber stands below its centre.
+    along = np.array([np.cos(pitch), 0.0, np.sin(pitch)])
+    moment = sum(float(part) * float((place - rear) @ along) for part, place in bodies)
+    return mass, moment / mass / float((front + p["wheel_centre"] - rear) @ along)
+
+
+def outputs(model: DynamicModel, x: np.ndarray) -> dict[str, float]:
+    return dict(zip(model.outputs, model.outputs_at(x[None], REST[None])[0], strict=True))
+
+
+def factor(spread: float) -> st.SearchStrategy[float]:
+    return st.floats(1.0 / spread, spread)
+
+
+def scaled(names: Mapping[str, float]) -> st.SearchStrategy[dict[str, float]]:
+    """Factors of parameters."""
+    return st.fixed_dictionaries({name: factor(spread) for name, spread in names.items()})
+
+
+CHANGED = {
+    "gravity": 2.0,
+    "chassis_mass": 1.6,
+    "carrier_mass": 3.0,
+    "front_wheel_mass": 2.0,
+    "rear_arm_mass": 2.0,
+    "rear_wheel_mass": 2.0,
+    "tire_stiffness": 2.0,
+    "tire_radius": 1.2,
+    "front_stiffness": 4.0,
+    "rear_stiffness": 4.0,
+    "front_damping": 5.0,
+    "initial_speed": 2.0,
+}
+
+
+@settings(max_examples=8, derandomize=True)
+@given(factors=scaled(CHANGED), shift=st.floats(-0.4, 0.4), height=st.floats(-0.1, 0.3))
+def test_the_design_position_is_at_rest_for_any_vehicle(given_values, factors, shift, height):
+    changed = {name: factor * given_values[name] for name, factor in factors.items()}
+    centre = given_values["chassis_centre"] + [shift, 0.0, height]
+    model = built(chassis_centre=centre, **changed)
+    p = model.parameters.values()
+    x = model.start()
+    # Rounding of forces of some 1e4 N, which move parts of 1 kg.
+    assert np.abs(model.derivative(x, REST)[N:]).max() < 1e-9 * max(1.0, float(p["gravity"]))
+    # Joints as they were designed, no roll, no heading; the corners are closed.
+    design = built().start()[:N]
+    np.testing.assert_array_equal(np.delete(x[:N] - design, [2, 4]), 0.0)
+    assert np.abs(model.violations(x, REST)[0]).max() < 1e-14
+    found = outputs(model, x)
+    loads = np.array([found[f"Fz_{wheel}"] for wheel in WHEELS])
+    mass, share = statics(p, x[4])
+    weight = mass * p["gravity"]
+    assert loads.sum() == pytest.approx(weight, rel=1e-12)
+    assert loads[:2].sum() == pytest.approx(share * weight, rel=1e-11)
+    np.testing.assert_allclose(loads[::2], loads[1::2], rtol=1e-12)
+    # Tires are pressed by their loads: heights of the wheel centres by plain geometry.
+    radii = p["tire_radius"] - loads / p["tire_stiffness"]
+    up = np.array([-np.sin(x[4]), 0.0, np.cos(x[4])])
+    front = p["front_frame_origin"] + p["wheel_centre"] - centre
+    for k, place in ((0, front), (2, p["rear_wheel_centre"] - centre)):
+        assert x[2] + up @ place == pytest.approx(radii[k], abs=1e-13)
+    # Wheels roll without slip.
+    np.testing.assert_allclose(x[48:] * radii, p["initial_speed"], rtol=1e-12)
+    assert x[N] == p["initial_speed"]
+    assert max(abs(found[f"slip_ratio_{wheel}"]) for wheel in WHEELS) < 1e-14
+
+
+def test_the_equilibrium_is_where_the_vehicle_comes_to_rest():
+    """Not only at rest: pushed out of it, weight and springs bring it back."""
+    model = built()
+    x = model.start()
+    for place, push in ((2, 1e-4), (4, 1e-4), (20, 1e-4), (21, 1e-4)):
+        for sign in (1.0, -1.0):
+            pushed = x.copy()
+            pushed[place] += sign * push
+            assert sign * model.derivative(pushed, REST)[N + place] < 0.0
+
+
+@pytest.mark.parametrize(("end", "arm"), [("front", 10), ("rear", 20)])
+def test_a_stiffer_spring_has_the_same_preload(given_values, end, arm):
+    """Statics alone sets what it carries; beyond that it resists in proportion to its stiffness."""
+    stands, bent = [], []
+    for factor in (0.5, 1.0, 2.0):
+        model = built(**{f"{end}_stiffness": factor * float(given_values[f"{end}_stiffness"])})
+        x = model.start()
+        stands.append(model.descriptor(x, REST)[1])
+        x[arm] += 0.05
+        bent.append(model.descriptor(x, REST)[1][arm])
+    for force in stands[1:]:
+        np.testing.assert_allclose(force, stands[0], rtol=0, atol=1e-9 * np.abs(stands[0]).max())
+    assert bent[2] - bent[1] == pytest.approx(2.0 * (bent[1] - bent[0]), rel=1e-9)
+    assert bent[2] < bent[1] - 100.0
+
+
+def test_the_dropped_start_is_lifted_and_pitched(given_values):
+    model = built(drop_height=0.2, drop_pitch=0.0)
+    lifted, stands = model.initial["dropped"], model.initial["equilibrium"]
+    assert np.flatnonzero(lifted - stands).tolist() == [2]
+    assert lifted[2] - stands[2] == pytest.approx(0.2)
+    # All wheels are in the air: the centre of mass falls freely, and no wheel is loaded.
+    found = outputs(model, lifted)
+    assert [found[f"Fz_{wheel}"] for wheel in WHEELS] == [0.0] * 4
+    mass, force, by_q, gamma = model.descriptor(lifted, REST)
+    system = np.block([[mass, -by_q.T], [by_q, np.zeros((12, 12))]])
+    accelerations = np.linalg.solve(system, [*force, *gamma])[:N]
+    weight = statics(given_values)[0] * given_values["gravity"]
+    assert mass[2] @ accelerations == pytest.approx(-weight, rel=1e-12)
+
+
+# Vehicles that can't stand
+
+
+def moved(name: str, *shift: float):
+    return lambda p: {name: p[name] + np.array(shift)}
+
+
+def at_another_place(**places: str):
+    return lambda p: {name: p[place] for name, place in places.items()}
+
+
+IMPOSSIBLE = {
+    "centre of mass ahead of the front axle": (
+        moved("chassis_centre", 1.7, 0.0, 0.0),
+        "its weight lifts the rear wheels off the ground",
+    ),
+    "centre of mass behind the rear axle": (
+        moved("chassis_centre", -1.7, 0.0, 0.0),
+        "its weight lifts the front wheels off the ground",
+    ),
+    "tires pressed flat": (
+        lambda _: {"tire_stiffness": 11e3},
+        "its weight presses the front tires flat",
+    ),
+    "rear tires pressed flat": (
+        lambda _: {"tire_stiffness": 15e3, "chassis_centre": np.array([-0.9, 0.0, 0.2277])},
+        "its weight presses the rear tires flat",
+    ),
+    "front spring without length": (
+        at_another_place(front_spring_chassis_point="front_spring_arm_point"),
+        "the front spring has length 0",
+    ),
+    "rear spring without length": (
+        at_another_place(rear_spring_arm_point="rear_spring_chassis_point"),
+        "the rear spring has length 0",
+    ),
+    "upper arm on one pivot": (
+        at_another_place(upper_arm_front_pivot="upper_arm_rear_pivot"),
+        "upper arm axis of length 0",
+    ),
+    "lower arm on one pivot": (
+        at_another_place(lower_arm_rear_pivot="lower_arm_front_pivot"),
+        "lower arm axis of length 0",
+    ),
+    "tie rod without length": (
+        at_another_place(tie_rod_inner="tie_rod_outer"),
+        "tie rod of length 0",
+    ),
+    "carrier without length": (
+        at_another_place(upper_ball_joint="lower_ball_joint"),
+        "wheel carrier of length 0",
+    ),
+    "ball joint on its arm's axis": (
+        lambda p: {
+            "lower_ball_joint": (p["lower_arm_rear_pivot"] + p["lower_arm_front_pivot"]) / 2
+        },
+        "lower_ball_joint lies on the axis of its arm",
+    ),
+    "front wheels behind the rear ones": (
+        lambda p: {"rear_wheel_centre": p["front_frame_origin"] + [0.1, 0.7, 0.0]},
+        "its front wheels are not ahead of the rear",
+    ),
+    "spring that pushes along its arm": (
+        # In line with the arm's pivot axis: no free length turns the arm.
+        lambda p: {
+            "rear_spring_arm_point": p["rear_arm_pivot"] + [-0.2, 0.0, 0.0],
+            "rear_spring_chassis_point": p["rear_arm_pivot"] + [-0.4, 0.0, 0.0],
+        },
+        "no free lengths of its springs hold it at its design position",
+    ),
+    "springs without stiffness": (
+        lambda _: {"front_stiffness": 0.0},
+        "no free lengths of its springs hold it at its design position",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "words"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
+def test_a_vehicle_that_cant_stand_is_refused_in_one_line(given_values, change, words):
+    with pytest.raises(GeometryError) as error:
+        built(**change(given_values))
+    message = str(error.value)
+    assert words in message
+    assert "\n" not in message
+    assert message.startswith(("the vehicle can't stand: ", "the geometry can't be assembled: "))
+
+
+@settings(max_examples=8, derandomize=True)
+@given(beyond=st.floats(0.02, 1.0), ahead=st.booleans())
+def test_the_centre_of_mass_must_be_between_the_axles(given_values, beyond, ahead):
+    """On either side of where statics puts the limit."""
+    p = given_values
+    mass, share = statics(p)
+    wheelbase = (p["front_frame_origin"] + p["wheel_centre"] - p["rear_wheel_centre"])[0]
+    limit = (1.0 - share if ahead else -share) * wheelbase * mass / float(p["chassis_mass"])
+    direction = 1.0 if ahead else -1.0
+    centre = p["chassis_centre"] + [limit + direction * beyond, 0.0, 0.0]
+    # The chassis' frame moves with its centre of mass, all other parts stay where they are.
+    with pytest.raises(GeometryError, match=f"lifts the {'rear' if ahead else 'front'} wheels"):
+        built(chassis_centre=centre)
+    centre[0] -= direction * (beyond + 0.05)
+    x = built(chassis_centre=centre).start()
+    assert np.isfinite(x).all()
