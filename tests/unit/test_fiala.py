@@ -269,6 +269,16 @@ def random_wheel(rng: np.random.Generator) -> tuple:
     return up, height, axle, velocity, rng.uniform(-3.0, 3.0, 3), rng.uniform(-60.0, 60.0)
 
 
+def rolling_wheel(rng: np.random.Generator) -> tuple:
+    """A wheel on the road that slips a little, so that no contact slides as a whole."""
+    up, height, axle, _, turning, _ = random_wheel(rng)
+    height -= 0.03
+    across = np.cross(axle, up)
+    velocity = 15.0 * unit(across) + rng.uniform(-0.2, 0.2, 3)
+    spin = 15.0 / (height / np.linalg.norm(across))
+    return up, height, axle, velocity, 0.1 * turning, spin * rng.uniform(0.99, 1.01)
+
+
 def test_the_contact_point_lies_on_the_road_and_in_the_wheels_plane(rng):
     for _ in range(100):
         case = random_wheel(rng)
@@ -377,22 +387,20 @@ def test_an_upright_wheel_that_rolls_ahead_does_not_slip():
 
 
 def test_loads_have_the_power_of_the_tire_forces_at_the_contact(rng):
-    worked = 0
     for _ in range(50):
-        _, _, _, velocity, turning, _ = case = random_wheel(rng)
+        _, _, _, velocity, turning, _ = case = rolling_wheel(rng)
         found = wheel(*case)
         fx, fy, mz = found["tire"]
-        worked += found["load"] > 0.0
+        assert min(abs(fx), abs(fy), abs(mz), found["load"]) > 1e-3
         at_contact = velocity + np.cross(turning, found["arm"])
         power = fx * at_contact @ found["heading"] + fy * at_contact @ found["leftward"]
         power += found["load"] * at_contact @ found["up"] + mz * turning @ found["up"]
         total = found["force"] @ velocity + found["moment"] @ turning
         assert total == pytest.approx(power, rel=1e-11, abs=1e-9)
-    assert worked > 10
 
 
 def test_tires_are_fialas_at_the_contacts_load_and_slips(rng):
-    for _ in range(100):
-        found = wheel(*random_wheel(rng))
+    for k in range(100):
+        found = wheel(*(random_wheel, rolling_wheel)[k % 2](rng))
         expected = by_cases(*(float(found[name]) for name in FIELDS[4:]))
         np.testing.assert_allclose(found["tire"], expected, rtol=1e-11, atol=1e-9)
