@@ -128,16 +128,17 @@ def binary(text: str) -> bytes:
 
 def with_an_entry(**entries: object):
     def changed(text: str) -> bytes:
-        return json.dumps(json.loads(text) | entries).encode()
+        digest, content = text.split("\n")
+        return f"{digest}\n{json.dumps(json.loads(content) | entries)}".encode()
 
     return changed
 
 
 def without_an_entry(name: str):
     def changed(text: str) -> bytes:
-        content = json.loads(text)
-        del content[name]
-        return json.dumps(content).encode()
+        digest, content = text.split("\n")
+        kept = {key: value for key, value in json.loads(content).items() if key != name}
+        return f"{digest}\n{json.dumps(kept)}".encode()
 
     return changed
 
@@ -150,7 +151,7 @@ def replaced(content: object):
 
 
 def with_another_source(text: str) -> bytes:
-    """A disk error inside a string: the file is JSON as before."""
+    """A disk error inside a string: what follows the hash is JSON as before."""
     assert text.count("_result[0]")
     return text.replace("_result[0]", "_result[1]", 1).encode()
 
@@ -196,7 +197,7 @@ def test_no_unfinished_file_is_left(folder: Path, calls: list) -> None:
     path.write_text("")
     fetch()
     assert [p.suffix for p in folder.iterdir()] == [".json"]
-    assert json.loads(path.read_text())["source"]
+    assert json.loads(path.read_text().split("\n")[1])["source"]
 
 
 def test_what_cant_be_derived_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

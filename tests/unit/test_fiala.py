@@ -77,7 +77,7 @@ def test_forces_are_those_of_the_cases(rng):
         assert 0.2 < side.mean() < 0.9
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(kappa=slips, t=slips)
 def test_an_unloaded_tire_has_no_force(kappa, t):
     assert tire(0.0, kappa, t) == [0.0, 0.0, 0.0]
@@ -86,13 +86,13 @@ def test_an_unloaded_tire_has_no_force(kappa, t):
         assert tire(0.0, *still) == [0.0, 0.0, 0.0]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=loads)
 def test_a_tire_without_slip_carries_its_load_alone(load):
     assert tire(load, 0.0, 0.0) == [0.0, 0.0, 0.0]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(kappa=slips, t=slips)
 def test_forces_vanish_with_the_load_without_a_jump(kappa, t):
     fx, fy, mz = tire(1e-9, kappa, t)
@@ -100,7 +100,7 @@ def test_forces_vanish_with_the_load_without_a_jump(kappa, t):
     assert abs(mz) <= MOST * WIDTH * 1e-9
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=loads, kappa=slips, t=slips)
 def test_forces_are_odd_in_their_own_slip_and_even_in_the_other(load, kappa, t):
     fx, fy, mz = tire(load, kappa, t)
@@ -108,7 +108,7 @@ def test_forces_are_odd_in_their_own_slip_and_even_in_the_other(load, kappa, t):
     assert tire(load, -kappa, t) == [-fx, fy, mz]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=loads, kappa=slips, t=slips)
 def test_forces_act_against_the_sliding_and_within_friction(load, kappa, t):
     fx, fy, mz = tire(load, kappa, t)
@@ -123,7 +123,7 @@ def test_forces_act_against_the_sliding_and_within_friction(load, kappa, t):
     assert abs(mz) <= grip * WIDTH * 27 / 256 * (1 + 1e-14)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=loads)
 def test_stiffnesses_are_the_slopes_without_slip(load):
     h = 1e-9 * load / ACROSS
@@ -135,7 +135,7 @@ def test_stiffnesses_are_the_slopes_without_slip(load):
     assert mz / -fy == pytest.approx(WIDTH / 3, rel=1e-7)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=loads, beyond=st.floats(1.0, 5.0), angle=st.floats(0.1, 1.5))
 def test_a_tire_that_slides_has_the_smallest_friction(load, beyond, angle):
     kappa, t = beyond * np.cos(angle), beyond * np.sin(angle)
@@ -168,7 +168,7 @@ def assert_smooth(f: Callable[[float], np.ndarray], at: float, scale: float, h: 
     np.testing.assert_allclose(before, after, rtol=0, atol=2e-4 * scale)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=st.floats(100.0, 9000.0), t=st.floats(0.01, 0.5))
 def test_the_longitudinal_force_is_smooth_where_sliding_begins(load, t):
     def left(kappa: float) -> float:
@@ -180,7 +180,7 @@ def test_the_longitudinal_force_is_smooth_where_sliding_begins(load, t):
     )
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=st.floats(100.0, 9000.0), kappa=st.floats(0.01, 0.5))
 def test_lateral_force_and_moment_are_smooth_where_sliding_begins(load, kappa):
     def left(t: float) -> float:
@@ -190,7 +190,7 @@ def test_lateral_force_and_moment_are_smooth_where_sliding_begins(load, kappa):
     assert_smooth(lambda t: np.array(tire(load, kappa, t)[1:]) / load, at, ACROSS / load, 1e-4 * at)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(load=loads, angle=st.floats(0.0, 1.57))
 def test_forces_do_not_jump_where_friction_stops_falling(load, angle):
     near, far = (
@@ -204,7 +204,7 @@ tape = Tape()
 extremes = function_of(tape, two, [tires.maximum(tape, *two), tires.minimum(tape, *two)], "math")
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(a=st.floats(-1e6, 1e6), b=st.floats(-1e6, 1e6))
 def test_maximum_and_minimum_without_a_branch(a, b):
     large, small = extremes(a, b)
@@ -213,7 +213,7 @@ def test_maximum_and_minimum_without_a_branch(a, b):
     assert small == pytest.approx(min(a, b), abs=rounding)
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(a=st.floats(-1e6, 1e6))
 def test_the_larger_and_the_smaller_of_equals(a):
     assert extremes(a, a) == pytest.approx([a, a], rel=1e-15, abs=1e-300)

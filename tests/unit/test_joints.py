@@ -455,7 +455,7 @@ def compiled_tensors() -> tuple[Callable, Callable, Callable]:
 by_axis, by_matrix, of_point = compiled_tensors()
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(entries=six, axis=vectors.filter(lambda a: np.linalg.norm(a) > 0.1), angle=angles)
 def test_a_turned_tensor_is_the_tensor_between_rotations(entries, axis, angle):
     axis = axis / np.linalg.norm(axis)
@@ -464,7 +464,7 @@ def test_a_turned_tensor_is_the_tensor_between_rotations(entries, axis, angle):
     np.testing.assert_allclose(found, turn @ symmetric(entries) @ turn.T, rtol=0, atol=1e-13)
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(entries=six, turn=vectors)
 def test_a_rotated_tensor_is_the_tensor_between_rotations(entries, turn):
     rotation = Rotation.from_rotvec(turn).as_matrix()
@@ -473,7 +473,7 @@ def test_a_rotated_tensor_is_the_tensor_between_rotations(entries, turn):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(mass=st.floats(0.1, 9.0), lever=vectors, turning=vectors)
 def test_a_point_mass_has_the_energy_of_its_turning(mass, lever, turning):
     tensor = np.array(of_point(mass, lever))
@@ -604,7 +604,7 @@ def free_body_with_rotor() -> Callable:
     return accelerations
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(turn=vectors, spin=st.floats(-90.0, 90.0), torque=st.floats(-30.0, 30.0))
 def test_a_free_body_with_a_rotor_keeps_its_angular_momentum(turn, spin, torque):
     change = free(np.array([0.0, 0.0, 0.0, *turn, spin, torque]))

@@ -111,7 +111,7 @@ def test_the_design_position_is_that_of_the_hard_points(points, side):
 
 
 @pytest.mark.parametrize("side", SIDES)
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(q=coordinates, rack=racks)
 def test_bodies_are_rigid(points, side, q, rack):
     p = of_side(points, side)
@@ -141,7 +141,7 @@ def test_bodies_are_rigid(points, side, q, rack):
     np.testing.assert_array_equal(found["upper_arm_ball"], found["upper_ball_joint"])
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(q=coordinates, rack=racks)
 def test_the_right_corner_mirrors_the_left_one(points, q, rack):
     left = SIDE[1](of_side(points, 1), q, (rack, 0.0, 0.0))

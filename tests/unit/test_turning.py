@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.rosenbrock_loops import turn
 
@@ -14,13 +15,18 @@ angles = st.floats(-7.0, 7.0)
 states = st.tuples(*[st.floats(-100.0, 100.0)] * 7).map(np.array)
 
 
+@pytest.fixture(scope="module")
+def model() -> DynamicModel:
+    return build("high_fidelity_vehicle")
+
+
 def turned(vector: np.ndarray, angle: float, turning: np.ndarray = TURNING) -> np.ndarray:
     result = vector.copy()
     assert turn(result, turning, np.cos(angle), np.sin(angle)) is None
     return result
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(vector=states, angle=angles)
 def test_pairs_turn_as_complex_numbers(vector, angle):
     found, factor = turned(vector, angle), np.exp(1j * angle)
@@ -31,7 +37,7 @@ def test_pairs_turn_as_complex_numbers(vector, angle):
     np.testing.assert_array_equal(found[[2, 3, 5]], vector[[2, 3, 5]])
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(vector=states, angle=angles, other=angles)
 def test_turns_add_up_and_are_undone(vector, angle, other):
     np.testing.assert_allclose(turned(turned(vector, angle), -angle), vector, rtol=0, atol=1e-12)
@@ -40,16 +46,16 @@ def test_turns_add_up_and_are_undone(vector, angle, other):
     np.testing.assert_array_equal(turned(vector, 0.0), vector)
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(vector=states, angle=angles)
 def test_without_pairs_all_stays(vector, angle):
     for nothing in (np.zeros(0, dtype=np.int64), np.array([2])):
         np.testing.assert_array_equal(turned(vector, angle, nothing), vector)
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(angle=st.floats(-3.0, 3.0))
-def test_a_vehicle_that_heads_elsewhere_moves_alike(angle):
+def test_a_vehicle_that_heads_elsewhere_moves_alike(model, angle):
     """What `turn` is for: position and velocity turn with the heading, all else stays."""
     x = model.initial["dropped"].copy()
     x[26:48] += np.linspace(-0.5, 0.5, 22)
@@ -61,6 +67,3 @@ def test_a_vehicle_that_heads_elsewhere_moves_alike(angle):
     expected = turned(expected, angle, model.turning)
     found = model.derivative(elsewhere, u)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
-
-
-model = build("high_fidelity_vehicle")

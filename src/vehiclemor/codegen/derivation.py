@@ -62,12 +62,12 @@ def derivation(name: str, definition: Any) -> Derivation:
     path = cache_folder() / "derivations" / f"{name}_{digest}.json"
     try:
         return _read(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError):
         made = derived(name, definition.derive())
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
     with os.fdopen(handle, "w", encoding="utf-8") as file:
-        json.dump(asdict(made), file)
+        file.write(_text(made))
     os.replace(temporary, path)
     return made
 
@@ -96,8 +96,18 @@ def derived(name: str, equations: DynamicEquations) -> Derivation:
     )
 
 
+def _text(made: Derivation) -> str:
+    """Text of a derivation after the hash of that text."""
+    content = json.dumps(asdict(made))
+    return f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}"
+
+
 def _read(text: str) -> Derivation:
-    content = json.loads(text)
+    """A derivation from its text; `ValueError` if that isn't as it was written."""
+    digest, _, written = text.partition("\n")
+    if digest != hashlib.sha256(written.encode()).hexdigest():
+        raise ValueError("the file is damaged")
+    content = json.loads(written)
     quantities = {key: tuple(Quantity(**entry) for entry in content[key]) for key in QUANTITIES}
     shapes = {key: tuple(shape) for key, shape in content["shapes"].items()}
     return Derivation(
