@@ -1,6 +1,8 @@
 """Fixtures and settings that all tests share."""
 
 import os
+import subprocess
+import sys
 
 import hypothesis
 import matplotlib
@@ -19,6 +21,24 @@ hypothesis.settings.register_profile("dev", deadline=None)
 hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
 IN_CI = os.environ.get("CI", "").lower() in ("1", "true", "yes")
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN_CI else "dev"))
+
+
+# What takes long to derive and compile, for two processes side by side.
+COMPILATIONS = (
+    "import vehiclemor as vm; from vehiclemor.maneuvers import straight_ahead; "
+    "vm.model('independent_suspension_vehicle').simulate(straight_ahead, tolerance=1e-2)",
+    "import vehiclemor as vm; vm.model('high_fidelity_vehicle'); "
+    "vm.model('double_wishbone').solve([0.05, 0.0])",
+)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before tests run in several processes, compile once what each would compile for itself."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        commands = [[sys.executable, "-c", text] for text in COMPILATIONS]
+        # A failure shows in the tests, where it belongs.
+        for process in [subprocess.Popen(command) for command in commands]:
+            process.wait()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

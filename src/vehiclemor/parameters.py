@@ -1,7 +1,8 @@
 """Parameter sets: every value with its unit, source and status, validated on loading."""
 
+import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -151,11 +152,11 @@ def load_parameters(
         if entry.source not in content.sources:
             raise FileError(f"{where}.source: {entry.source!r} is not listed under sources")
         _check_value(entry.value, declared, where, FileError)
+    if overrides is not None and not isinstance(overrides, Mapping):
+        raise InputError(f"parameters must be a mapping of names to values, not {overrides!r}")
     for name, value in (overrides or {}).items():
         if name not in entries:
-            raise InputError(
-                f"{name!r} is not a parameter of {model}; it has {', '.join(expected)}"
-            )
+            raise InputError(f"{name!r} is not a parameter of {model}{_near(name, expected)}")
         number = _number_or_list(value, name)
         _check_value(number, expected[name], f"parameter {name}", InputError)
         entries[name] = entries[name].model_copy(
@@ -164,8 +165,16 @@ def load_parameters(
     return ParameterSet(model, entries)
 
 
+def _near(name: object, names: Iterable[str]) -> str:
+    """The nearest names, or all of them if none is near."""
+    near = difflib.get_close_matches(str(name), names := list(names), n=3)
+    return f"; did you mean {' or '.join(near)}?" if near else f"; it has {', '.join(names)}"
+
+
 def _number_or_list(value: object, name: str) -> float | list[float]:
     try:
+        if isinstance(value, bool):
+            raise TypeError
         array = np.array(value, dtype=float)
         return [float(component) for component in array] if array.ndim else float(array)
     except (TypeError, ValueError, OverflowError):

@@ -35,7 +35,7 @@ WRONG_VEHICLES = [
     ({"gravity": 0.0}, ["gravity", "0 m/s^2 is not above 0"]),
     ({"baumgarte_a": -50.0}, ["baumgarte_a", "-50 1/s", "smallest allowed 0 1/s"]),
     ({"baumgarte_b": 2e4}, ["baumgarte_b", "20000 1/s", "largest allowed 10000 1/s"]),
-    ({"initial_speed": 0.5}, ["initial_speed", "0.5 m/s", "smallest allowed 1 m/s"]),
+    ({"initial_speed": 0.5}, ["initial_speed", "0.5 m/s", "smallest allowed 3 m/s"]),
     ({"tire_stiffness": "nan"}, ["tire_stiffness", "not finite"]),
     ({"largest_friction": 11.0}, ["largest_friction", "11 is above the largest allowed 10"]),
     ({"drop_height": 5.0}, ["drop_height", "5 m", "largest allowed 1 m"]),
@@ -51,7 +51,8 @@ WRONG_VEHICLES = [
     ({"rear_wheel_centre": [2.0, 0.8, 0.0]}, ["can't stand", "not ahead of the rear"]),
     ({"upper_arm_front_pivot": [-0.25, 0.51, 0.11]}, ["can't be assembled", "upper arm axis"]),
     ({"front_spring_chassis_point": [0.0, 0.62, -0.27]}, ["front spring has length 0"]),
-    ({"rear_stiffness": 0.0}, ["can't stand", "no free lengths of its springs"]),
+    ({"rear_stiffness": 0.0}, ["rear_stiffness", "0 N/m is not above 0"]),
+    ({"chassis_centre": [0.0, 0.3, 0.2]}, ["chassis_centre", "beside the midplane"]),
 ]
 
 

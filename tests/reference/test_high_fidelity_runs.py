@@ -177,6 +177,8 @@ def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle):
 
 def test_energy_is_conserved_in_flight_without_dampers():
     model = build(NAME, overrides={"front_damping": 0.0, "rear_damping": 0.0})
+    # Arms that swing this far turn the wheels farther than a car's: mechanics all the same.
+    model = replace(model, validity={})
     numbers = PARAMETERS | NO_DAMPERS
     start = model.start()
     # High enough to fall for a second; the springs push the arms out.
@@ -351,3 +353,33 @@ def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
         found = integrate(vehicle, LANE_CHANGE, x, TIMES, solver, tolerance).states
         errors.append(np.abs(found - exact).max())
     assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
+
+
+@pytest.mark.parametrize("factor", [20.0, 25.0, -30.0, 50.0])
+def test_a_rack_beyond_reach_ends_the_run(vehicle, factor):
+    """The linkage locks near 1.3 rad; on the branch beyond it the closures hold all the same."""
+    space = full_space(N)
+    run = vehicle.integrate(
+        LANE_CHANGE.perturbed(amplitude=factor), vehicle.start(), space, "explicit", 1e-6
+    )
+    assert run.status == "diverged"
+    assert "steer_F" in run.message
+    kept = np.isfinite(run.outputs).all(axis=1)
+    assert kept[0]
+    assert not kept[-1]
+    steer = run.outputs[:, [vehicle.outputs.index(f"steer_{wheel}") for wheel in ("FL", "FR")]]
+    assert np.abs(steer[kept]).max() < 1.1
+    # As far as the run is kept, no corner has changed its branch.
+    signs = []
+    for x, u in zip(run.states[kept], run.inputs[kept], strict=True):
+        closures = vehicle.descriptor(x, u)[2]
+        corners = (closures[:6, 6:13], closures[6:, 13:20])
+        signs.append([np.sign(np.linalg.det(np.delete(c, 4, axis=1))) for c in corners])
+    assert len(np.unique(signs, axis=0)) == 1
+
+
+def test_a_maneuver_that_goes_on_after_the_run_is_remarked(vehicle):
+    late = LANE_CHANGE.perturbed(frequency=0.2)
+    run = vehicle.simulate(late, solver="ros34pw2", tolerance=1e-3)
+    assert "13.5 s" in run.remark
+    assert not vehicle.simulate(LANE_CHANGE, solver="ros34pw2", tolerance=1e-3).remark

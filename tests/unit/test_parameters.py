@@ -115,7 +115,7 @@ def test_override_replaces_a_value_and_says_so(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("joints", [1, 2, 3], "'joints' is not a parameter of toy; it has pivot, joint"),
+        ("joints", [1, 2, 3], "'joints' is not a parameter of toy; did you mean joint?"),
         ("joint", [1, 2], "parameter joint: a point has 3 components"),
         ("joint", 1.0, "parameter joint: a point has 3 components"),
         ("joint", [[1, 2, 3]], "parameter joint: .* is not a number or list of numbers"),

@@ -222,7 +222,7 @@ IMPOSSIBLE = {
         "no free lengths of its springs hold it at its design position",
     ),
     "springs without stiffness": (
-        lambda _: {"front_stiffness": 0.0},
+        lambda _: {"front_stiffness": 1e-30},
         "no free lengths of its springs hold it at its design position",
     ),
 }
@@ -266,3 +266,19 @@ def test_the_softest_tires_that_carry_the_vehicle(given_values):
     check_vehicle(given_values | {"tire_stiffness": softest * (1.0 + 1e-12)})
     with pytest.raises(GeometryError, match="presses the rear tires flat"):
         check_vehicle(given_values | {"tire_stiffness": softest * (1.0 - 1e-12)})
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"chassis_centre": [0.0, 0.3, 0.2277]}, "beside the midplane"),
+        ({"front_frame_origin": [1.388, -0.1, 0.1199]}, "beside the midplane"),
+        ({"rear_wheel_centre": [-1.388, -0.7979, 0.0]}, "rear wheel lies on the right"),
+        ({"chassis_inertia": [1.0, 1.0, 1000.0]}, "no body has"),
+        ({"rear_arm_inertia_products": [10.0, 10.0, 10.0]}, "no body has"),
+        ({"largest_friction": 0.2, "smallest_friction": 0.9}, "friction falls"),
+    ],
+)
+def test_a_car_that_cant_be_is_refused(changes, words):
+    with pytest.raises(GeometryError, match=words):
+        build("high_fidelity_vehicle", overrides=changes)

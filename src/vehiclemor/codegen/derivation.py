@@ -14,6 +14,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vehiclemor.codegen.cache import cache_folder
@@ -54,14 +55,13 @@ class Derivation:
     operations: dict[str, dict[str, int]]
 
 
-@lru_cache(maxsize=8)
 def derivation(name: str, definition: Any) -> Derivation:
     """The derivation of a registered model: from disk, or made and written there."""
     parts = [source_digest(LAYERS, (), (definition,)), name, f"sympy {version('sympy')}"]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
     path = cache_folder() / "derivations" / f"{name}_{digest}.json"
     try:
-        return _read(path.read_text(encoding="utf-8"))
+        return _read(path)
     except (OSError, ValueError):
         made = derived(name, definition.derive())
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -69,7 +69,7 @@ def derivation(name: str, definition: Any) -> Derivation:
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(_text(made))
     os.replace(temporary, path)
-    return made
+    return _read(path)
 
 
 def derived(name: str, equations: DynamicEquations) -> Derivation:
@@ -102,9 +102,11 @@ def _text(made: Derivation) -> str:
     return f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}"
 
 
-def _read(text: str) -> Derivation:
-    """A derivation from its text; `ValueError` if that isn't as it was written."""
-    digest, _, written = text.partition("\n")
+# A derivation does not change under its digest.
+@lru_cache(maxsize=8)
+def _read(path: Path) -> Derivation:
+    """A derivation from its file; `ValueError` if that isn't as it was written."""
+    digest, _, written = path.read_text(encoding="utf-8").partition("\n")
     if digest != hashlib.sha256(written.encode()).hexdigest():
         raise ValueError("the file is damaged")
     content = json.loads(written)

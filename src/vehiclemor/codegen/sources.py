@@ -35,16 +35,38 @@ def source_digest(layers: Sequence[str], files: Sequence[str], components: Seque
 
 
 def _plug_in_source(thing: object) -> list[bytes]:
-    """Source texts of the package, or single file, that a component comes from."""
-    module = thing if isinstance(thing, ModuleType) else inspect.getmodule(thing)
-    if module is None:
-        module = inspect.getmodule(type(thing))
+    """Source texts of the package, or of the single file with its neighbours, of a component."""
+    module = _module_of(thing)
     if module is None or module.__file__ is None:
         return [repr(thing).encode()]
     top = module.__name__.split(".")[0]
     if top == "vehiclemor":
         return []
-    origin = getattr(sys.modules.get(top), "__file__", None)
-    if origin is None or Path(origin).name != "__init__.py":
-        return [Path(module.__file__).read_bytes()]
-    return [path.read_bytes() for path in sorted(Path(origin).parent.rglob("*.py"))]
+    folders = list(getattr(sys.modules.get(top), "__path__", ()))
+    if folders:
+        paths = [path for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
+        return [path.read_bytes() for path in paths]
+    return [path.read_bytes() for path in sorted(_neighbours(module, set()))]
+
+
+def _module_of(thing: object) -> ModuleType | None:
+    """The module that a component is, or that its functions or its class come from."""
+    if isinstance(thing, ModuleType):
+        return thing
+    for name in ("derive", "fit", "signal"):
+        if callable(function := getattr(thing, name, None)):
+            return inspect.getmodule(function)
+    return inspect.getmodule(thing) or inspect.getmodule(type(thing))
+
+
+def _neighbours(module: ModuleType, found: set[Path]) -> set[Path]:
+    """File of a module, and those in its folder of what it has imported."""
+    if module.__file__ is None or Path(module.__file__) in found:
+        return found
+    found.add(Path(module.__file__))
+    for value in list(vars(module).values()):
+        other = value if isinstance(value, ModuleType) else inspect.getmodule(value)
+        origin = getattr(other, "__file__", None)
+        if other is not None and origin and Path(origin).parent == Path(module.__file__).parent:
+            _neighbours(other, found)
+    return found

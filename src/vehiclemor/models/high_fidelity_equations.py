@@ -347,6 +347,7 @@ def _outputs(
         *(tire.aligning for tire in tires),
         *(contact.slip_ratio for contact in contacts),
         *(tape.let(sp.atan(contact.tan_slip)) for contact in contacts),
+        *(tape.let(sp.atan2(-part.carrier[0][1], part.carrier[1][1])) for part in m.linkages),
         norm(gaps),
         norm(gap_rates),
     ]

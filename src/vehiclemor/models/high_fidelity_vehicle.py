@@ -65,6 +65,10 @@ OUTPUTS = (
     *per_wheel("Mz", "N m", "aligning moment on the {} tire"),
     *per_wheel("slip_ratio", "1", "longitudinal slip of the {} tire"),
     *per_wheel("slip_angle", "rad", "slip angle of the {} tire, sliding left positive"),
+    *(
+        Quantity(f"steer_{w}", "rad", f"angle of the {w} wheel, positive to the left")
+        for w in FRONT
+    ),
     Quantity("position_drift", "m", "violation of the 12 constraints, Euclidean norm"),
     Quantity("velocity_drift", "m/s", "rate of violation of the 12 constraints, Euclidean norm"),
 )
@@ -83,8 +87,10 @@ TYPICAL = dict.fromkeys([q.name for q in (*COORDINATES, *SPEEDS)], 10.0) | {
     "psi": 1.0,
     "psi_dot": 1.0,
 }
+# Slips need forward motion.  At 1.3 rad of steering the linkage locks; another branch lies beyond.
 VALIDITY = {
     "longitudinal_speed": (0.5, np.inf),
+    **{f"steer_{wheel}": (-1.1, 1.1) for wheel in FRONT},
     "roll": (-1.2, 1.2),
     "pitch": (-1.2, 1.2),
 }
@@ -103,8 +109,9 @@ PARAMETERS = {
     "gravity": Declared("m/s^2", above=0.0, at_most=100.0),
     "baumgarte_a": Declared("1/s", at_least=0.0, at_most=1e4),
     "baumgarte_b": Declared("1/s", at_least=0.0, at_most=1e4),
-    # Below walking pace the slip of a rolling wheel has no meaning.
-    "initial_speed": Declared("m/s", at_least=1.0, at_most=150.0),
+    # The stiffness of the slips goes as one over the speed: at a slower pace the explicit reference
+    # runs into its limit of calls.
+    "initial_speed": Declared("m/s", at_least=3.0, at_most=150.0),
     "front_frame_origin": point(),
     "rear_wheel_centre": point(),
     "chassis_centre": point(),
@@ -128,7 +135,7 @@ PARAMETERS = {
     "front_wheel_mass": _mass(),
     "front_wheel_spin_inertia": _inertia(),
     "front_wheel_transverse_inertia": _inertia(),
-    "front_stiffness": Declared("N/m", at_least=0.0),
+    "front_stiffness": Declared("N/m", above=0.0),
     "front_damping": Declared("N s/m", at_least=0.0),
     "rear_arm_pivot": point(),
     "rear_arm_mass": _mass(),
@@ -140,7 +147,7 @@ PARAMETERS = {
     "rear_wheel_transverse_inertia": _inertia(),
     "rear_spring_chassis_point": point(),
     "rear_spring_arm_point": point(),
-    "rear_stiffness": Declared("N/m", at_least=0.0),
+    "rear_stiffness": Declared("N/m", above=0.0),
     "rear_damping": Declared("N s/m", at_least=0.0),
     "tire_radius": Declared("m", above=0.0, at_most=20.0),
     "tire_stiffness": Declared("N/m", above=0.0),

@@ -19,6 +19,8 @@ SPINS = slice(48, 52)
 # Accelerations (m/s^2, rad/s^2) below which nothing moves; rounding alone gives a tenth of it.
 AT_REST = 1e-9
 MOST_ITERATIONS = 30
+# Share by which a published moment of inertia may break the triangle inequality.
+ROUNDED = 0.01
 
 # Free lengths, state, inputs -> time derivative of the state.
 Derivative = Callable[[list[float], np.ndarray, np.ndarray], np.ndarray]
@@ -28,6 +30,17 @@ def check_vehicle(p: Mapping[str, Any]) -> None:
     """Raise `GeometryError` if the vehicle can't be assembled, or can't stand on its wheels."""
     check_linkage({name: p[name] for name in POINTS})
     wheels = wheel_places(p)
+    for name in ("chassis_centre", "front_frame_origin"):
+        if p[name][1] != 0.0:
+            raise GeometryError(
+                f"{name} lies {p[name][1]:g} m beside the midplane: both sides are mirror images"
+            )
+    for name, place in zip(("front", "rear"), wheels, strict=True):
+        if place[1] <= 0.0:
+            raise GeometryError(f"the left {name} wheel lies on the right side of the vehicle")
+    if p["smallest_friction"] > p["largest_friction"]:
+        raise GeometryError("smallest_friction is above largest_friction: friction falls with slip")
+    _check_inertia(p)
     if wheels[0][0] <= wheels[1][0]:
         raise GeometryError("the vehicle can't stand: its front wheels are not ahead of the rear")
     for name, (start, end) in {
@@ -47,6 +60,30 @@ def check_vehicle(p: Mapping[str, Any]) -> None:
             raise GeometryError(
                 f"the vehicle can't stand: its weight presses the {name} tires flat "
                 f"(tire_stiffness is too small)"
+            )
+
+
+def _check_inertia(p: Mapping[str, Any]) -> None:
+    """Raise `GeometryError` if no body can have one of the inertia tensors.
+
+    Wheels are let pass: the published moments of a tire about its axis exceed twice those across.
+    """
+    xy, xz, yz = p["rear_arm_inertia_products"]
+    xx, yy, zz = p["rear_arm_inertia"]
+    arm = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = {
+        name: np.sort(p[name])
+        for name in ("chassis_inertia", "upper_arm_inertia", "lower_arm_inertia", "carrier_inertia")
+    }
+    moments["rear_arm_inertia"] = np.linalg.eigvalsh(arm)
+    across = p["tie_rod_transverse_inertia"]
+    moments["tie_rod_axial_inertia"] = np.sort([p["tie_rod_axial_inertia"], across, across])
+    for name, (smallest, middle, largest) in moments.items():
+        # A share of the largest: published moments of flat and thin bodies are rounded.
+        if smallest <= 0.0 or largest > (smallest + middle) * (1.0 + ROUNDED):
+            raise GeometryError(
+                f"{name}: no body has the principal moments of inertia {smallest:.4g}, "
+                f"{middle:.4g}, {largest:.4g} kg m^2 (the largest is at most the sum of the others)"
             )
 
 
@@ -127,7 +164,7 @@ def settled(p: Mapping[str, Any], derivative: Derivative) -> dict[str, float]:
         residual = accelerations(unknown)
         if moved < 1e-14 * max(1.0, np.abs(unknown).max()):
             break
-    if not np.abs(residual).max() < AT_REST * max(1.0, p["gravity"]):
+    if not np.abs(residual).max() < AT_REST * p["gravity"]:
         raise GeometryError(
             "the vehicle can't stand: no free lengths of its springs hold it at its design "
             f"position (accelerations up to {np.abs(residual).max():.2g} are left)"

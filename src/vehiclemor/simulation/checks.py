@@ -30,7 +30,9 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
 
 
 def check_inputs(maneuver: Maneuver, model: str, inputs: Sequence[str]) -> None:
-    """Raise `InputError` if a maneuver gives other inputs than a model has."""
+    """Raise `InputError` if a maneuver is none, or gives other inputs than a model has."""
+    if not isinstance(maneuver, Maneuver):
+        raise InputError(f"{maneuver!r} is not a maneuver: get one by its name from the registry")
     if tuple(maneuver.inputs) != tuple(inputs):
         raise InputError(
             f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
@@ -38,8 +40,26 @@ def check_inputs(maneuver: Maneuver, model: str, inputs: Sequence[str]) -> None:
         )
 
 
+def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
+    """Raise `InputError` if a value is no finite positive number, or is below the smallest."""
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not (number and 0.0 < float(value) < np.inf and float(value) >= smallest):  # type: ignore[arg-type]
+        bound = f"at least {smallest:g}" if smallest else "positive"
+        raise InputError(f"{name} is {value!r}; it must be a finite number, {bound}")
+
+
+def cut_short(maneuver: Maneuver) -> str:
+    """That a maneuver goes on after the end of its run, if it does."""
+    last = max(maneuver.break_points, default=0.0)
+    if last <= maneuver.duration:
+        return ""
+    return f"the maneuver would end at {last:.4g} s, after the run"
+
+
 def check_times(times: np.ndarray, maneuver: Maneuver) -> None:
     """Raise `InputError` if output times (samples,) in s don't increase within the maneuver."""
+    if times.ndim != 1:
+        raise InputError("output times must be a list of times in s")
     slack = 1e-9 * maneuver.duration
     if not (np.isfinite(times).all() and np.all(np.diff(times) > 0.0)):
         raise InputError("output times must be finite and increasing")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import ModuleType
 from typing import Any
@@ -19,8 +19,10 @@ from vehiclemor.registry import unknown
 from vehiclemor.simulation import linearisation, system_loops
 from vehiclemor.simulation.checks import (
     check_inputs,
+    check_positive,
     check_times,
     checked_array,
+    cut_short,
     left_validity,
     lifted_wheels,
     loop_array,
@@ -35,6 +37,8 @@ from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Trajectory
 SOLVERS = ("explicit", "rodas4", "ros34pw2")
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
+# Below it there is only rounding.
+SMALLEST_TOLERANCE = 1e-13
 # A run that needs more evaluations of its right-hand side than this is going nowhere.
 MOST_CALLS = 100_000
 # First step (s) of a frozen-Jacobian run after a break point of the inputs.
@@ -168,8 +172,17 @@ class DynamicModel:
         return self.initial[name].copy()
 
     def derivative(self, x: Any, u: Any) -> np.ndarray:
-        """Time derivative (2 n,) of the state x at inputs u."""
-        return self._call("derivative", x, u)
+        """Time derivative (2 n,) of the state x at inputs u.
+
+        Raises
+        ------
+        InputError
+            If a value isn't finite, or if the derivative isn't.
+        """
+        result = self._call("derivative", x, u)
+        if not np.isfinite(result).all():
+            raise InputError(f"the derivative of {self.name} is not finite at this state")
+        return result
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
@@ -280,6 +293,7 @@ class DynamicModel:
         spaces
             Form of the system and its subspaces by window.
         """
+        check_inputs(maneuver, self.name, self.inputs)
         times = maneuver.times if times is None else loop_array(times)
         arguments = self.loop_arguments(
             maneuver, state, spaces, solver, tolerance, times, longest_step
@@ -294,7 +308,9 @@ class DynamicModel:
         status, reached = self.loops.run(*arguments)
         seconds = time.perf_counter() - began
         failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
-        return self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
+        trajectory = self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
+        remarks = (trajectory.remark, cut_short(maneuver))
+        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
 
     def loop_arguments(
         self,
@@ -308,6 +324,9 @@ class DynamicModel:
     ) -> tuple:
         """Arguments of the compiled `run`, for which see `integrate`; path and counts come last."""
         check_inputs(maneuver, self.name, self.inputs)
+        check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
+        if longest_step is not None:
+            check_positive("longest_step", longest_step)
         if solver not in SOLVERS:
             raise unknown("solver", solver, SOLVERS)
         frozen = solver == "ros34pw2"

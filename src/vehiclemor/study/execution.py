@@ -57,6 +57,12 @@ def compute_cell(
         return _failed(model, maneuver, cell, "rejected", str(error))
     try:
         reference = model.simulate(maneuver, cell.start)
+    except UnreachableError as error:
+        return _failed(model, maneuver, cell, "unreachable", str(error))
+    except ConvergenceError as error:
+        message = f"the full-order reference: {error}"
+        return _failed(model, maneuver, cell, "diverged", message)
+    try:
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
         reduced = method.fit(model, runs, cell.settings)
         # The first run loads machine code and warms caches, the second is timed.

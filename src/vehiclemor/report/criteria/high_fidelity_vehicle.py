@@ -7,7 +7,7 @@ from collections.abc import Callable
 from vehiclemor.report.criteria.finding import Finding, Results, at_point
 from vehiclemor.report.criteria.starts import closely_followed
 
-OUTPUTS = ("lateral_position", "lateral_speed", "vertical_speed")
+OUTPUTS = ("longitudinal_position", "lateral_position", "lateral_speed", "vertical_speed")
 
 
 def one_state_suffices(results: Results, label: str) -> Finding:

@@ -115,8 +115,8 @@ FIGURES: dict[str, Entry] = {
         ("figures-9-10",),
         high_fidelity_histories.figure_9,
         "Path of the high-fidelity vehicle from equilibrium (a) and its lane change alone (b): "
-        "full order and POD with r = 1 of 26, control period 0.1 s, 5 snapshots. Parameters are "
-        "public data, since the paper's were never published. Nominal only: trained on the run "
+        "full order and POD with r = 1 of 52 states, control period 0.1 s, 5 snapshots. Parameters "
+        "are public data, since the paper's were never published. Nominal only: trained on the run "
         "that is shown, which replay returns exactly.",
     ),
     "10": Entry(
@@ -124,8 +124,8 @@ FIGURES: dict[str, Entry] = {
         high_fidelity_histories.figure_10,
         "Lateral speed (chassis component) and vertical speed of the chassis' CG in the "
         "high-fidelity vehicle, started in equilibrium and dropped onto the road with its nose "
-        "down: r = 1 of 26, control period 0.1 s, 5 snapshots. Below each its errors, the largest "
-        "in each control period, beside the published RMS errors over the run. From the dropped "
+        "down: r = 1 of 52 states, control period 0.1 s, 5 snapshots. Below each its errors, the "
+        "largest in each control period, beside the published RMS errors over the run. From the dropped "
         "start the literal procedure runs backwards in the first control period and stays 2.3 m "
         "behind. Parameters are public data, since the paper's were never published: the published "
         "numbers are for orders of magnitude. Nominal only: trained on the run that is shown, "
