@@ -25,10 +25,16 @@ hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN
 
 # What takes long to derive and compile, for two processes side by side.
 COMPILATIONS = (
-    "import vehiclemor as vm; from vehiclemor.maneuvers import straight_ahead; "
-    "vm.model('independent_suspension_vehicle').simulate(straight_ahead, tolerance=1e-2)",
-    "import vehiclemor as vm; vm.model('high_fidelity_vehicle'); "
-    "vm.model('double_wishbone').solve([0.05, 0.0])",
+    """
+import vehiclemor as vm
+from vehiclemor.maneuvers import straight_ahead
+vm.model("independent_suspension_vehicle").simulate(straight_ahead, tolerance=1e-2)
+""",
+    """
+import vehiclemor as vm
+vm.model("high_fidelity_vehicle")
+vm.model("double_wishbone").solve([0.05, 0.0])
+""",
 )
 
 
@@ -41,6 +47,8 @@ def pytest_configure(config: pytest.Config) -> None:
             process.wait()
 
 
+# First: the plugin reads the marks in its own hook.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Where tests run in several processes, keep those together that share long computations."""
     for item in items:

@@ -125,10 +125,11 @@ FIGURES: dict[str, Entry] = {
         "Lateral speed (chassis component) and vertical speed of the chassis' CG in the "
         "high-fidelity vehicle, started in equilibrium and dropped onto the road with its nose "
         "down: r = 1 of 52 states, control period 0.1 s, 5 snapshots. Below each its errors, the "
-        "largest in each control period, beside the published RMS errors over the run. From the dropped "
-        "start the literal procedure runs backwards in the first control period and stays 2.3 m "
-        "behind. Parameters are public data, since the paper's were never published: the published "
-        "numbers are for orders of magnitude. Nominal only: trained on the run that is shown, "
+        "largest in each control period, beside the published RMS errors over the run. From the "
+        "dropped start the literal procedure runs backwards in the first control period and "
+        "stays 2.3 m behind. Parameters are public data, since the paper's were never published: "
+        "the published numbers are for orders of magnitude. Nominal only: trained on the run "
+        "that is shown, "
         "which replay returns exactly.",
     ),
     "11": Entry(
