@@ -1,0 +1,65 @@
+"""Digests of plug-ins follow all the source that they are made of."""
+
+import importlib
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from vehiclemor.codegen.sources import source_digest
+
+EQUATIONS = "def derive():\n    return {}\n"
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Writes modules and imports one of them as in a process of its own."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = set(sys.modules)
+
+    def imported(name: str, files: dict[str, str]):
+        for file, text in files.items():
+            path = tmp_path / file
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+        for module in set(sys.modules) - before:
+            del sys.modules[module]
+        importlib.invalidate_caches()
+        return importlib.import_module(name)
+
+    yield imported
+    for module in set(sys.modules) - before:
+        del sys.modules[module]
+
+
+def digest(component: object) -> str:
+    return source_digest((), (), (component,))
+
+
+@pytest.mark.parametrize("extra", [{}, {"plug/__init__.py": ""}], ids=["namespace", "package"])
+def test_a_second_file_of_a_package_counts(fresh, extra):
+    files = {"plug/model.py": "NAME = 'plug'\n", **extra}
+    first = digest(fresh("plug.model", {**files, "plug/equations.py": EQUATIONS.format(1)}))
+    again = digest(fresh("plug.model", {**files, "plug/equations.py": EQUATIONS.format(1)}))
+    other = digest(fresh("plug.model", {**files, "plug/equations.py": EQUATIONS.format(2)}))
+    assert first == again != other
+
+
+@pytest.mark.parametrize(
+    "how", ["import equations_of_single", "from equations_of_single import derive"]
+)
+def test_a_helper_beside_a_single_file_counts(fresh, how):
+    files = {"single_model.py": f"{how}\nNAME = 'single'\n"}
+    helper = "equations_of_single.py"
+    first = digest(fresh("single_model", {**files, helper: EQUATIONS.format(1)}))
+    other = digest(fresh("single_model", {**files, helper: EQUATIONS.format(22)}))
+    assert first != other
+
+
+def test_an_object_counts_by_the_source_of_its_functions(fresh):
+    def component(number: int) -> SimpleNamespace:
+        module = fresh("object_model", {"object_model.py": EQUATIONS.format(number)})
+        return SimpleNamespace(derive=module.derive)
+
+    assert digest(component(1)) != digest(component(22))
