@@ -1,5 +1,8 @@
 """Errors that a user can mend: each carries one clear line."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class VehiclemorError(Exception):
     """Base of all errors that reach a user as one line and exit status 2."""
@@ -23,3 +26,9 @@ class UnreachableError(VehiclemorError):
 
 class ConvergenceError(VehiclemorError):
     """An iteration did not converge, or met a value that is not finite."""
+
+
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Question that offers the nearest of the known names; empty if none is near."""
+    near = difflib.get_close_matches(str(name), list(known), n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(near)}?" if near else ""

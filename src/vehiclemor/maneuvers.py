@@ -134,12 +134,24 @@ chirp_travel = Maneuver(
 )
 
 
-def _lane_change(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+def _pulse(times: np.ndarray, frequency: float) -> np.ndarray:
+    """Pulse of the lane change (n, 3) of about unit size, with its first and second derivatives."""
     part = (times - LANE_CHANGE_START) * frequency / LANE_CHANGE_LENGTH
     angle = 2.0 * np.pi * np.clip(part, 0.0, 1.0)
-    pulse = np.sin(angle) - 0.5 * np.sin(2.0 * angle)
+    rate = 2.0 * np.pi * frequency / LANE_CHANGE_LENGTH
+    pulse = np.column_stack(
+        [
+            np.sin(angle) - 0.5 * np.sin(2.0 * angle),
+            rate * (np.cos(angle) - np.cos(2.0 * angle)),
+            rate**2 * (2.0 * np.sin(2.0 * angle) - np.sin(angle)),
+        ]
+    )
     inside = (part > 0.0) & (part < 1.0)
-    return amplitude * LANE_CHANGE_AMPLITUDE * np.where(inside, pulse, 0.0)[:, None]
+    return np.where(inside[:, None], pulse, 0.0)
+
+
+def _lane_change(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    return amplitude * LANE_CHANGE_AMPLITUDE * _pulse(times, frequency)[:, :1]
 
 
 def _lane_change_corners(frequency: float) -> tuple[float, ...]:
@@ -173,20 +185,7 @@ straight_ahead = Maneuver(
 
 
 def _rack_lane_change(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-    part = (times - LANE_CHANGE_START) * frequency / LANE_CHANGE_LENGTH
-    angle, rate = (
-        2.0 * np.pi * np.clip(part, 0.0, 1.0),
-        2.0 * np.pi * frequency / LANE_CHANGE_LENGTH,
-    )
-    pulse = np.column_stack(
-        [
-            np.sin(angle) - 0.5 * np.sin(2.0 * angle),
-            rate * (np.cos(angle) - np.cos(2.0 * angle)),
-            rate**2 * (2.0 * np.sin(2.0 * angle) - np.sin(angle)),
-        ]
-    )
-    inside = (part > 0.0) & (part < 1.0)
-    return amplitude * RACK_AMPLITUDE * np.where(inside[:, None], pulse, 0.0)
+    return amplitude * RACK_AMPLITUDE * _pulse(times, frequency)
 
 
 def _rack_held(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:

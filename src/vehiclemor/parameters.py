@@ -1,8 +1,7 @@
 """Parameter sets: every value with its unit, source and status, validated on loading."""
 
-import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import field_validator
 
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import FileSchema, read_toml
 
@@ -156,19 +155,14 @@ def load_parameters(
         raise InputError(f"parameters must be a mapping of names to values, not {overrides!r}")
     for name, value in (overrides or {}).items():
         if name not in entries:
-            raise InputError(f"{name!r} is not a parameter of {model}{_near(name, expected)}")
+            hint = did_you_mean(name, expected) or f"it has {', '.join(expected)}"
+            raise InputError(f"{name!r} is not a parameter of {model}; {hint}")
         number = _number_or_list(value, name)
         _check_value(number, expected[name], f"parameter {name}", InputError)
         entries[name] = entries[name].model_copy(
             update={"value": number, "status": "assumed", "source": "override"}
         )
     return ParameterSet(model, entries)
-
-
-def _near(name: object, names: Iterable[str]) -> str:
-    """The nearest names, or all of them if none is near."""
-    near = difflib.get_close_matches(str(name), names := list(names), n=3)
-    return f"; did you mean {' or '.join(near)}?" if near else f"; it has {', '.join(names)}"
 
 
 def _number_or_list(value: object, name: str) -> float | list[float]:

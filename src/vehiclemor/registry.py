@@ -4,13 +4,12 @@ An entry point of the group `vehiclemor.models` or `vehiclemor.methods` names a 
 `vehiclemor.maneuvers` a `Maneuver`.
 """
 
-import difflib
 from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from vehiclemor.errors import InputError
+from vehiclemor.errors import InputError, did_you_mean
 
 GROUPS = {
     "model": "vehiclemor.models",
@@ -66,8 +65,7 @@ def component(kind: str, name: str) -> Any:
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     """Error for an unknown name, with the nearest known ones."""
     known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known)}"
+    hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
     return InputError(f"unknown {kind} {str(name)!r}; {hint}")
 
 

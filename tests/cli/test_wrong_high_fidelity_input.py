@@ -1,6 +1,6 @@
 """High-fidelity vehicles that can't stand and parameters that are none: one line, exit status 2."""
 
-import re
+from functools import partial
 
 import pytest
 
@@ -14,20 +14,9 @@ TEXT = (data_folder() / "parameters" / f"{NAME}.toml").read_text()
 
 
 @pytest.fixture
-def vehicle_file(tmp_path):
+def vehicle_file(parameter_file):
     """Parameter file of the vehicle with some values replaced."""
-
-    def write(values):
-        text = TEXT
-        for name, value in values.items():
-            entry = rf"(\[parameters\.{name}\]\n(?:(?!\[).*\n)*?value = ).*\n"
-            text, replaced = re.subn(entry, rf"\g<1>{value}\n", text)
-            assert replaced == 1
-        path = tmp_path / "vehicle.toml"
-        path.write_text(text)
-        return path
-
-    return write
+    return partial(parameter_file, NAME)
 
 
 WRONG_VEHICLES = [

@@ -1,6 +1,6 @@
 """Vehicles that can't drive and inputs that are none: one clear line, exit status 2."""
 
-import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,27 +8,15 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.errors import VehiclemorError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.resources import data_folder
 
 NAME = "independent_suspension_vehicle"
 SIMULATE = ("simulate", NAME)
 
 
 @pytest.fixture
-def vehicle_file(tmp_path):
+def vehicle_file(parameter_file):
     """Parameter file of the vehicle with some values replaced."""
-
-    def write(values):
-        text = (data_folder() / "parameters" / f"{NAME}.toml").read_text()
-        for name, value in values.items():
-            entry = rf"(\[parameters\.{name}\]\n(?:(?!\[).*\n)*?value = ).*\n"
-            text, replaced = re.subn(entry, rf"\g<1>{value}\n", text)
-            assert replaced == 1
-        path = tmp_path / "vehicle.toml"
-        path.write_text(text)
-        return path
-
-    return write
+    return partial(parameter_file, NAME)
 
 
 WRONG_VEHICLES = [

@@ -83,6 +83,18 @@ def test_a_plug_in_error_spoils_only_its_cell(cell, monkeypatch):
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
 
 
+def test_a_plug_in_model_that_breaks_in_the_reference_spoils_only_its_cell(
+    cell, model, monkeypatch
+):
+    def broken(*_):
+        raise ZeroDivisionError("in a plug-in")
+
+    monkeypatch.setattr(type(model), "simulate", broken)
+    dataset = compute_cell(cell)
+    assert dataset["status"].item() == "error"
+    assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
+
+
 def test_divergence_is_a_result(cell):
     singular = dataclasses.replace(cell, settings={**cell.settings, "tolerance": 1e-300})
     dataset = compute_cell(singular)

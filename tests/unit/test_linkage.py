@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.unit.programs import function_of, pivot_shares
 from vehiclemor.models import double_wishbone_linkage, vehicle_corners
 from vehiclemor.models.double_wishbone_points import POINTS, tie_rod_angles
-from vehiclemor.models.high_fidelity_equations import CORNER, LOWER_ARM, PIVOTS
+from vehiclemor.models.high_fidelity_equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.symbolic.joints import free_rate
@@ -200,10 +200,14 @@ ARM_ANGLES = np.linspace(0.0, 0.35, 15)
 RACKS = (-0.03, -0.015, 0.0, 0.015, 0.03)
 
 
+# Place of the lower arm among a corner's seven coordinates.
+LOWER_ARM = CORNER[0].index(LOWER_ARMS[0])
+
+
 def corner_blocks(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Jacobians of both corners' closures by their seven coordinates (2, 6, 7)."""
     _, _, by_q, _ = model.descriptor(x, u)
-    return np.array([by_q[6 * k : 6 * k + 6, CORNER[k]] for k in range(2)])
+    return np.array([by_q[6 * k : 6 * k + 6, list(own)] for k, own in enumerate(CORNER)])
 
 
 @pytest.fixture(scope="module")

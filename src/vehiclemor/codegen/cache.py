@@ -39,6 +39,15 @@ def cache_folder() -> Path:
     return folder
 
 
+def write_whole(path: Path, text: str) -> None:
+    """Write a file under a temporary name, then move it into place; its folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(temporary, path)
+
+
 def load_module(name: str, source: str) -> ModuleType:
     """Import a linked source from the cache, written there first if it is new.
 
@@ -54,11 +63,7 @@ def load_module(name: str, source: str) -> ModuleType:
     path = folder / f"{module_name}.py"
     # A damaged file is written again: what runs is always the source at hand.
     if not path.exists() or path.read_text(encoding="utf-8", errors="replace") != source:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(source)
-        os.replace(temporary, path)
+        write_whole(path, source)
     specification = importlib.util.spec_from_file_location(module_name, path)
     if specification is None or specification.loader is None:
         raise ImportError(f"can't import {path}")

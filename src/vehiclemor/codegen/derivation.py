@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.cache import cache_folder
+from vehiclemor.codegen.cache import cache_folder, write_whole
 from vehiclemor.codegen.link import kernels_source
 from vehiclemor.codegen.sources import source_digest
 from vehiclemor.models.quantities import Quantity
@@ -64,11 +62,7 @@ def derivation(name: str, definition: Any) -> Derivation:
         return _read(path)
     except (OSError, ValueError):
         made = derived(name, definition.derive())
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(_text(made))
-    os.replace(temporary, path)
+    write_whole(path, _text(made))
     return _read(path)
 
 

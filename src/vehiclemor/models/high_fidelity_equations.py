@@ -7,6 +7,7 @@ that of the lower arm, so that Kane's equations remain in 14 accelerations and n
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -47,20 +48,20 @@ REAR_POINTS = (
     "rear_spring_chassis_point",
     "rear_spring_arm_point",
 )
-# Place of a front corner's coordinates, and in these of the lower arm's.
-CORNER = (slice(6, 13), slice(13, 20))
-LOWER_ARM = 4
+# Places of the front corners' coordinates, and of the arms that carry the springs.
+CORNER = (range(6, 13), range(13, 20))
+LOWER_ARMS = (10, 17)
 REAR_ARMS = (20, 21)
 SPINS = (22, 23, 24, 25)
 # Pivots (closure, coordinate of the six without the lower arm's) at the design position.
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
 # Accelerations that are solved for: each but the last six couples to these and to one other.
-INDEPENDENT = (*SPINS, 10, 17, *REAR_ARMS, *range(6))
+INDEPENDENT = (*SPINS, *LOWER_ARMS, *REAR_ARMS, *range(6))
 
 
 @dataclass(frozen=True)
 class _Mechanism:
-    """What both forms of the equations share; for the rest see `_mechanism`."""
+    """What both forms of the equations share: chassis, front linkages, design points, symbols."""
 
     chassis: corners.Chassis
     linkages: tuple[linkage.Linkage, ...]
@@ -90,9 +91,7 @@ def derive() -> DynamicEquations:
     points = _points(tape, p)
     mechanism = _Mechanism(
         corners.Chassis(frame, up, q[2]),
-        tuple(
-            linkage.assembled(tape, q[CORNER[k]], rack[0], points[k], SIDES[k]) for k in range(2)
-        ),
+        tuple(linkage.assembled(tape, _own(q, k), rack[0], points[k], SIDES[k]) for k in range(2)),
         points,
         q,
         rates,
@@ -137,15 +136,9 @@ def derive() -> DynamicEquations:
             tape.let(sp.Add(*[row[k] * accelerations[k] for k in range(n)])),
         ]
     ]
-    constraint_rows = [
-        e
-        for motion in motions
-        for i in range(3)
-        for e in [motion.columns[k][i] if k in motion.columns else sp.Integer(0) for k in range(n)]
-    ]
     descriptor = [*open_form]
-    for j, right in enumerate(gamma):
-        descriptor += [*constraint_rows[j * n : (j + 1) * n], right]
+    for row, right in zip(_rows(motions, range(n)), gamma, strict=True):
+        descriptor += [*row, right]
     program = assemble(
         tape,
         {"x": [*q, *rates], "u": rack},
@@ -198,10 +191,22 @@ def _points(tape: Tape, p: Mapping[str, sp.Expr]) -> tuple[dict[str, g.Vector], 
 
 
 def _motions(tape: Tape, m: _Mechanism, rates: Sequence[Rate], k: int) -> corners.LinkageMotions:
-    own = CORNER[k]
-    return corners.linkage_motions(
-        tape, m.linkages[k], m.q[own], rates[own], (m.rack[1], m.rack[2])
-    )
+    rack = (m.rack[1], m.rack[2])
+    return corners.linkage_motions(tape, m.linkages[k], _own(m.q, k), _own(rates, k), rack)
+
+
+def _own(values: Sequence[Any], k: int) -> Sequence[Any]:
+    """The part of a list over all coordinates that belongs to a front corner."""
+    return values[CORNER[k].start : CORNER[k].stop]
+
+
+def _rows(motions: Sequence[mechanics.Motion], numbers: Sequence[int]) -> list[list[sp.Expr]]:
+    """Rows of the Jacobian of closures, in the columns of some speeds."""
+    return [
+        [motion.columns[j][i] if j in motion.columns else sp.Integer(0) for j in numbers]
+        for motion in motions
+        for i in range(3)
+    ]
 
 
 def _closures(
@@ -226,21 +231,11 @@ def _bound_rates(
     """Rates whose derivatives follow from the closures and those of the lower arms."""
     bound = list(free)
     for k in range(2):
-        own = range(CORNER[k].start, CORNER[k].stop)
-        lower = own[LOWER_ARM]
-        dependent = [j for j in own if j != lower]
-        pair = closures[2 * k : 2 * k + 2]
-        rows = [
-            [motion.columns[j][i] if j in motion.columns else sp.Integer(0) for j in own]
-            for motion in pair
-            for i in range(3)
-        ]
-        matrix = [[row[j - own.start] for j in dependent] for row in rows]
+        lower, pair = LOWER_ARMS[k], closures[2 * k : 2 * k + 2]
+        dependent = [j for j in CORNER[k] if j != lower]
+        driving = [-row[0] for row in _rows(pair, [lower])]
         follow, bias = eliminate_several(
-            tape,
-            matrix,
-            [[-row[LOWER_ARM] for row in rows], gamma[6 * k : 6 * k + 6]],
-            PIVOTS,
+            tape, _rows(pair, dependent), [driving, gamma[6 * k : 6 * k + 6]], PIVOTS
         )
         for place, j in enumerate(dependent):
             bound[j] = Rate(free[j].value, {lower: follow[place]}, bias[place])
@@ -252,11 +247,10 @@ def _corners(tape: Tape, m: _Mechanism, rates: Sequence[Rate]) -> list[corners.C
     for k in range(4):
         spin = corners.Spin(SPINS[k], m.rates[SPINS[k]])
         if k < 2:
-            own = _motions(tape, m, rates, k)
-            lower = CORNER[k].start + LOWER_ARM
+            own, number = _motions(tape, m, rates, k), LOWER_ARMS[k]
             result.append(
                 corners.front_corner(
-                    tape, m.chassis, m.linkages[k], own, m.points[k], spin, m.p, lower, SIDES[k]
+                    tape, m.chassis, m.linkages[k], own, m.points[k], spin, m.p, number, SIDES[k]
                 )
             )
         else:
@@ -282,8 +276,7 @@ def _kane(
 ) -> tuple[list[list[sp.Expr]], list[sp.Expr]]:
     """Mass matrix and forces of all bodies, springs added."""
     frame, p = m.chassis.frame, m.p
-    x, y, z = (p[f"chassis_inertia_{axis}"] for axis in "xyz")
-    inertia = (g.vector((x, 0, 0)), g.vector((0, y, 0)), g.vector((0, 0, z)))
+    inertia = corners.diagonal(p, "chassis_inertia")
     chassis = mechanics.Body(
         p["chassis_mass"],
         frame.origin(tape),
@@ -293,8 +286,7 @@ def _kane(
     )
     bodies = [chassis, *(part for corner in vehicle for part in corner.bodies)]
     mass, force = mechanics.kane(tape, len(COORDINATES), bodies)
-    arms = (CORNER[0].start + LOWER_ARM, CORNER[1].start + LOWER_ARM, *REAR_ARMS)
-    for number, corner in zip(arms, vehicle, strict=True):
+    for number, corner in zip((*LOWER_ARMS, *REAR_ARMS), vehicle, strict=True):
         force[number] = tape.let(force[number] + corner.spring_moment)
     return mass, force
 

@@ -203,7 +203,7 @@ def front_corner(
         tape,
         p["carrier_mass"],
         points["carrier_centre"],
-        _diagonal(p, "carrier_inertia"),
+        diagonal(p, "carrier_inertia"),
         points["wheel_centre"],
         p,
         "front",
@@ -406,7 +406,8 @@ def _with_wheel(
     return total, both, (rows[0], rows[1], rows[2])
 
 
-def _diagonal(p: Parameters, name: str) -> Tensor:
+def diagonal(p: Parameters, name: str) -> Tensor:
+    """Tensor of the principal moments of inertia that a parameter holds."""
     x, y, z = (p[f"{name}_{axis}"] for axis in "xyz")
     return g.vector((x, 0, 0)), g.vector((0, y, 0)), g.vector((0, 0, z))
 
@@ -423,5 +424,5 @@ def _arm_tensor(
     out = g.named(tape, g.cross(up, axis))
     frame = tuple(g.vector([axis[i], out[i], up[i]]) for i in range(3))
     return m.rotated_tensor(
-        tape, _diagonal(p, f"{name}_arm_inertia"), (frame[0], frame[1], frame[2])
+        tape, diagonal(p, f"{name}_arm_inertia"), (frame[0], frame[1], frame[2])
     )

@@ -18,7 +18,7 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
         If the shape is another one or an entry isn't finite.
     """
     try:
-        array = np.require(value, float, ("C", "A", "W"))
+        array = loop_array(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}, {model} needs {size} numbers") from None
     if array.shape != (size,):

@@ -9,6 +9,7 @@ from vehiclemor.codegen.sources import source_digest
 LOOPS = ("system_loops", "explicit_loops", "rosenbrock_loops", "run_loops")
 
 
+@cache
 def loops_digest() -> str:
     """Hash of the source of the loops and of what compiles them."""
     return source_digest(("codegen",), tuple(f"simulation/{name}.py" for name in LOOPS), ())

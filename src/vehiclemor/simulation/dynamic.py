@@ -293,12 +293,10 @@ class DynamicModel:
         spaces
             Form of the system and its subspaces by window.
         """
-        check_inputs(maneuver, self.name, self.inputs)
-        times = maneuver.times if times is None else loop_array(times)
         arguments = self.loop_arguments(
             maneuver, state, spaces, solver, tolerance, times, longest_step
         )
-        path, counts = arguments[-2:]
+        sampled, path, counts = arguments[-3:]
         if not self.loops.run.signatures:
             # Compile, or load machine code, outside of the time that is measured.
             edges, one = np.array([0.0, 1e-9]), np.zeros(1, dtype=np.int64)
@@ -308,7 +306,7 @@ class DynamicModel:
         status, reached = self.loops.run(*arguments)
         seconds = time.perf_counter() - began
         failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
-        trajectory = self.trajectory(times, maneuver.at(times), path, counts, seconds, failure)
+        trajectory = self.trajectory(sampled, maneuver.at(sampled), path, counts, seconds, failure)
         remarks = (trajectory.remark, cut_short(maneuver))
         return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
 
@@ -319,11 +317,12 @@ class DynamicModel:
         spaces: Spaces,
         solver: str,
         tolerance: float,
-        times: np.ndarray,
+        times: np.ndarray | None = None,
         longest_step: float | None = None,
     ) -> tuple:
-        """Arguments of the compiled `run`, for which see `integrate`; path and counts come last."""
+        """Arguments of the compiled `run`, see `integrate`; times, path and counts come last."""
         check_inputs(maneuver, self.name, self.inputs)
+        times = maneuver.times if times is None else loop_array(times)
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
         if longest_step is not None:
             check_positive("longest_step", longest_step)

@@ -55,14 +55,10 @@ def compute_cell(
         method.check(model, cell.settings)
     except InputError as error:
         return _failed(model, maneuver, cell, "rejected", str(error))
+    whose = "the full-order reference: "
     try:
         reference = model.simulate(maneuver, cell.start)
-    except UnreachableError as error:
-        return _failed(model, maneuver, cell, "unreachable", str(error))
-    except ConvergenceError as error:
-        message = f"the full-order reference: {error}"
-        return _failed(model, maneuver, cell, "diverged", message)
-    try:
+        whose = ""
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
         reduced = method.fit(model, runs, cell.settings)
         # The first run loads machine code and warms caches, the second is timed.
@@ -72,7 +68,7 @@ def compute_cell(
     except UnreachableError as error:
         return _failed(model, maneuver, cell, "unreachable", str(error))
     except ConvergenceError as error:
-        return _failed(model, maneuver, cell, "diverged", str(error))
+        return _failed(model, maneuver, cell, "diverged", f"{whose}{error}")
     except VehiclemorError:
         raise
     except Exception as error:  # noqa: BLE001 - a plug-in's bug spoils its own cell, not the study

@@ -129,8 +129,7 @@ FIGURES: dict[str, Entry] = {
         "dropped start the literal procedure runs backwards in the first control period and "
         "stays 2.3 m behind. Parameters are public data, since the paper's were never published: "
         "the published numbers are for orders of magnitude. Nominal only: trained on the run "
-        "that is shown, "
-        "which replay returns exactly.",
+        "that is shown, which replay returns exactly.",
     ),
     "11": Entry(
         ("figure-11",),
