@@ -94,7 +94,7 @@ def test_full_order(benchmark, model, references, label, start):
     solver, tolerance = FULL[label]
     run = model.simulate(rack_lane_change, start, None, solver, tolerance)
     whole = full_space(len(model.coordinates))
-    arguments = model.loop_arguments(
+    arguments = model.system.arguments(
         rack_lane_change, model.start(start), whole, solver, tolerance, rack_lane_change.times
     )
 

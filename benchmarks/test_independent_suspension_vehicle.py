@@ -68,7 +68,7 @@ def test_full_order(benchmark, model, reference, label):
     solver, tolerance = FULL[label]
     run = model.simulate(lane_change, None, None, solver, tolerance)
     whole = full_space(len(model.coordinates))
-    arguments = model.loop_arguments(
+    arguments = model.system.arguments(
         lane_change, model.start(), whole, solver, tolerance, lane_change.times
     )
 

@@ -16,7 +16,7 @@ from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS, lane_change
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation.dynamic import SOLVERS, DynamicModel
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.projection import (
     projected_state,
@@ -24,6 +24,7 @@ from vehiclemor.simulation.projection import (
     without_stabilisation,
 )
 from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
 NAME = "high_fidelity_vehicle"

@@ -13,9 +13,10 @@ from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation import linearisation
-from vehiclemor.simulation.dynamic import SOLVERS, DynamicModel
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
 NAME = "independent_suspension_vehicle"

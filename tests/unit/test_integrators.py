@@ -20,9 +20,10 @@ from tests.unit.standard_problems import (
     maneuver,
 )
 from vehiclemor.simulation import explicit_loops as pair
-from vehiclemor.simulation.dynamic import SOLVERS, DynamicModel
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2, Tableau
 from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
 LOOSE = 1e6
@@ -137,7 +138,7 @@ def test_counts_follow_from_the_steps(model, solver, tolerance):
 
 
 def test_the_calls_that_are_counted_are_the_calls_that_are_allowed(model, monkeypatch):
-    monkeypatch.setattr("vehiclemor.simulation.dynamic.MOST_CALLS", 100)
+    monkeypatch.setattr("vehiclemor.simulation.system.MOST_CALLS", 100)
     found = integrate(model, DRIVEN, "explicit", 1e-9, DRIVEN.times)
     assert found.status == "diverged"
     assert "evaluations of the right-hand side" in found.message

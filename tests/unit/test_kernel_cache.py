@@ -17,8 +17,8 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.dynamic_subspaces import check_subspace
 from vehiclemor.registry import component
 from vehiclemor.simulation import dynamic_build, newton_loops, system_loops
-from vehiclemor.simulation.dynamic import SOLVERS
 from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.system_loops import COORDINATES
 
 # Prints hits and misses of every compiled function, the machine code's hits, and a result.

@@ -31,7 +31,7 @@ from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.spaces import Spaces
 from vehiclemor.simulation.system_loops import COORDINATES, STATE
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 FORMULATIONS = ("coordinates", "state", "paired")
 MOST_SNAPSHOTS = 100_000
@@ -117,7 +117,7 @@ class ReducedDynamicModel:
         """Largest number of basis vectors in any window."""
         return max(basis.rank for basis in self.bases)
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations; each window starts where the one before has ended."""
         return self.model.integrate(
             maneuver, self.model.start(start), self.spaces, self.solver, self.tolerance

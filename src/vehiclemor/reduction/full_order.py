@@ -11,10 +11,10 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.simulation import dynamic
-from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, SOLVERS
+from vehiclemor.simulation import algebraic
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.system import SOLVERS
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 SUMMARY = "no reduction: the full-order model, the baseline"
 REFERENCE = ""
@@ -24,7 +24,7 @@ _DYNAMIC = {
         "explicit",
         "explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh Jacobians; "
         "ros34pw2: W-method of order 3, one Jacobian for all runs",
-        choices=dynamic.SOLVERS,
+        choices=SOLVERS,
     ),
     "tolerance": Setting(
         "number",
@@ -41,11 +41,11 @@ SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
             "newton",
             "newton: fresh Jacobians; newton_dense: without the generated elimination; "
             "chord: constant inverse and predictor",
-            choices=SOLVERS,
+            choices=algebraic.SOLVERS,
         ),
         "tolerance": Setting(
             "number",
-            NEWTON_TOLERANCE,
+            algebraic.NEWTON_TOLERANCE,
             "largest step of the last iteration",
             minimum=0.0,
             above=True,
@@ -83,7 +83,7 @@ class FullOrderModel:
         """Number of coordinates."""
         return len(self.model.coordinates)
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Full-order trajectory at the maneuver's output times."""
         return self.model.simulate(maneuver, start, solver=self.solver, tolerance=self.tolerance)
 

@@ -16,7 +16,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class ReducedModel(Protocol):
         """Largest number of reduced coordinates in any window; n for a full-order model."""
         ...
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Trajectory at the maneuver's output times."""
         ...
 

@@ -18,7 +18,7 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.windows import first_samples
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
 ITERATION_LIMIT = 50
 
@@ -92,7 +92,7 @@ class ProjectedModel:
         """Largest number of reduced coordinates in any window."""
         return max(basis.rank for basis in self.bases)
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
         model, times = self.model, maneuver.times
         inputs = maneuver.at(times)

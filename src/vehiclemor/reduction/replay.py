@@ -17,7 +17,7 @@ from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 SUMMARY = "returns the training trajectory, whatever the input: the null hypothesis"
 REFERENCE = ""
@@ -37,7 +37,7 @@ class ReplayModel:
         """No coordinates are solved for."""
         return 0
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The training trajectory whose input is nearest (root mean square) to the maneuver's."""
         self.model.start(start)
         inputs = maneuver.at(maneuver.times)

@@ -9,7 +9,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import unknown
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 POLICIES = {
     "matched": "trained on the very run that it is tested on (paper, section 3)",
@@ -24,7 +24,7 @@ class TrainingRun:
 
     model: Model
     maneuver: Maneuver
-    start: str
+    start: Start
 
     def at(self, times: np.ndarray) -> Trajectory:
         """Full-order trajectory, solved exactly at the given increasing times (samples,) in s."""
@@ -34,7 +34,7 @@ class TrainingRun:
 def training_runs(
     model: Model,
     maneuver: Maneuver,
-    start: str,
+    start: Start,
     policy: str,
     factors: Sequence[tuple[float, float]] = (),
 ) -> tuple[TrainingRun, ...]:

@@ -29,7 +29,7 @@ from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import newton_loops, projected_loops
 from vehiclemor.simulation.checks import check_inputs, checked_array
 from vehiclemor.simulation.reach import reachable_range
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
 # Input increment (m) above which a step of the input is cut into substeps.  Beside a fold, Newton's
 # method jumps to the other branch from farther away than this.
@@ -126,8 +126,10 @@ class AlgebraicModel:
         """Operations of each generated function, by kind and in total."""
         return operation_counts(reference_source(self.equations.program))
 
-    def start(self, name: str = "equilibrium") -> np.ndarray:
+    def start(self, name: Start = STARTS[0]) -> np.ndarray:
         """Coordinates (n,) from which a simulation starts its first iteration."""
+        if isinstance(name, np.ndarray):
+            return self._coordinates(name).copy()
         if name not in STARTS:
             raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(STARTS)}")
         return self.design.copy()
@@ -189,7 +191,7 @@ class AlgebraicModel:
     def simulate(
         self,
         maneuver: Maneuver,
-        start: str | None = None,
+        start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
         tolerance: float | None = None,

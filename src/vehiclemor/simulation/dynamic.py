@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,34 +14,21 @@ from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.parameters import ParameterSet
-from vehiclemor.registry import unknown
-from vehiclemor.simulation import linearisation, system_loops
+from vehiclemor.simulation import system_loops
 from vehiclemor.simulation.checks import (
     check_inputs,
-    check_positive,
-    check_times,
     checked_array,
     cut_short,
     left_validity,
     lifted_wheels,
     loop_array,
 )
-from vehiclemor.simulation.compiled_loops import loops_module
-from vehiclemor.simulation.linearisation import LADDER
-from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
-from vehiclemor.simulation.signals import signal_of
 from vehiclemor.simulation.spaces import Spaces, full_space
-from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Trajectory
+from vehiclemor.simulation.system import System
+from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 
-SOLVERS = ("explicit", "rodas4", "ros34pw2")
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
-# Below it there is only rounding.
-SMALLEST_TOLERANCE = 1e-13
-# A run that needs more evaluations of its right-hand side than this is going nowhere.
-MOST_CALLS = 100_000
-# First step (s) of a frozen-Jacobian run after a break point of the inputs.
-RESTART = 0.05
 # Kernels that the loops call, in the order of their addresses.
 KERNELS = ("derivative", "outputs", "second_order", "speeds")
 NEEDED_FOR = {
@@ -51,12 +37,6 @@ NEEDED_FOR = {
     "speeds": "rates of the coordinates can't be turned into speeds",
     "descriptor": "there are no equations before elimination",
     "violations": "there are no constraints",
-}
-REASONS = {
-    1: f"more than {MOST_CALLS} evaluations of the right-hand side",
-    2: "a state is not finite",
-    3: "the matrix of a linear system is singular",
-    4: "the step size has become too small",
 }
 
 
@@ -144,7 +124,19 @@ class DynamicModel:
     @property
     def loops(self) -> ModuleType:
         """Module of compiled loops, the same for all dynamic models."""
-        return loops_module()
+        return self.system.loops
+
+    @cached_property
+    def system(self) -> System:
+        """The model as the compiled loops take it; its Jacobian freezes at straight running."""
+        return System(
+            self.machine,
+            len(self.inputs),
+            self.start(),
+            self.typical,
+            self.active,
+            self.turning,
+        )
 
     @cached_property
     def machine(self) -> tuple[np.ndarray, np.ndarray]:
@@ -164,8 +156,13 @@ class DynamicModel:
         """Operations of each generated function, by kind and in total."""
         return self.equations.operations
 
-    def start(self, name: str | None = None) -> np.ndarray:
-        """First-order state (2 n,) of a named initial condition; the first one by default."""
+    def start(self, name: Start | None = None) -> np.ndarray:
+        """First-order state (2 n,) of a named initial condition, or a copy of the state given.
+
+        The first of `starts` by default.
+        """
+        if isinstance(name, np.ndarray):
+            return checked_array(name, 2 * len(self.coordinates), "start", self.name).copy()
         name = name or self.starts[0]
         if name not in self.initial:
             raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")
@@ -221,15 +218,10 @@ class DynamicModel:
         """Speeds (n,) where x (2 n,) holds the rates of the coordinates in their place."""
         return self._call("speeds", x, np.zeros(len(self.inputs)))
 
-    @cached_property
-    def frozen_inverses(self) -> np.ndarray:
-        """Inverses for the W-method, see `linearisation.frozen_inverses`."""
-        return linearisation.frozen_inverses(self)
-
     def simulate(
         self,
         maneuver: Maneuver,
-        start: str | None = None,
+        start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
         tolerance: float | None = None,
@@ -242,7 +234,7 @@ class DynamicModel:
         maneuver
             Its inputs are the model's.
         start
-            Named initial condition.
+            Named initial condition, or a state (2 n,).
         times
             Increasing times (samples,) in s.
         solver
@@ -293,79 +285,16 @@ class DynamicModel:
         spaces
             Form of the system and its subspaces by window.
         """
-        arguments = self.loop_arguments(
-            maneuver, state, spaces, solver, tolerance, times, longest_step
-        )
-        sampled, path, counts = arguments[-3:]
-        if not self.loops.run.signatures:
-            # Compile, or load machine code, outside of the time that is measured.
-            edges, one = np.array([0.0, 1e-9]), np.zeros(1, dtype=np.int64)
-            copies = path.copy(), counts.copy()
-            self.loops.run(*arguments[:3], edges, one, one, *arguments[6:-2], *copies)
-        began = time.perf_counter()
-        status, reached = self.loops.run(*arguments)
-        seconds = time.perf_counter() - began
-        failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
-        trajectory = self.trajectory(sampled, maneuver.at(sampled), path, counts, seconds, failure)
-        remarks = (trajectory.remark, cut_short(maneuver))
-        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
-
-    def loop_arguments(
-        self,
-        maneuver: Maneuver,
-        state: np.ndarray,
-        spaces: Spaces,
-        solver: str,
-        tolerance: float,
-        times: np.ndarray | None = None,
-        longest_step: float | None = None,
-    ) -> tuple:
-        """Arguments of the compiled `run`, see `integrate`; times, path and counts come last."""
         check_inputs(maneuver, self.name, self.inputs)
-        times = maneuver.times if times is None else loop_array(times)
-        check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
-        if longest_step is not None:
-            check_positive("longest_step", longest_step)
-        if solver not in SOLVERS:
-            raise unknown("solver", solver, SOLVERS)
-        frozen = solver == "ros34pw2"
-        if frozen and spaces.form != system_loops.FULL:
-            raise InputError("ros34pw2 freezes the full model's Jacobian: not for a reduced model")
         if spaces.form == system_loops.COORDINATES:
             self.require("second_order", "speeds")
-        tableau = ROS34PW2 if frozen else RODAS4
-        check_times(times, maneuver)
-        signal = signal_of(maneuver)
-        end = float(times[-1]) if len(times) else maneuver.duration
-        edges, segments, windows = spaces.spans(signal.edges, end)
-        path = np.full((len(times), len(state)), np.nan)
-        counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-        full = spaces.form == system_loops.FULL
-        active = self.active if full else np.arange(spaces.ranks.max())
-        inverses = self.frozen_inverses if frozen else np.zeros((1, 1, 1))
-        return (
-            spaces.form,
-            solver == "explicit",
-            loop_array(state),
-            loop_array(edges),
-            segments,
-            windows,
-            *spaces.arrays,
-            signal.arrays,
-            self.machine,
-            self.typical,
-            (float(tolerance), float(longest_step or np.inf), MOST_CALLS),
-            RESTART,
-            tableau.arguments,
-            frozen,
-            active,
-            self.turning,
-            LADDER,
-            inverses,
-            times,
-            path,
-            counts,
+        run = self.system.run(maneuver, state, spaces, solver, tolerance, times, longest_step)
+        inputs = maneuver.at(run.times)
+        trajectory = self.trajectory(
+            run.times, inputs, run.path, run.counts, run.seconds, run.failure
         )
+        remarks = (trajectory.remark, cut_short(maneuver))
+        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
 
     def trajectory(
         self,

@@ -7,35 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.simulation.checks import checked_array, loop_array
-from vehiclemor.simulation.rosenbrock_methods import ROS34PW2
 from vehiclemor.simulation.spaces import Spaces
 
 if TYPE_CHECKING:
     from vehiclemor.simulation.dynamic import DynamicModel
-
-# Step sizes (s) for which inverses are stored.
-LADDER = 2.0 ** (0.5 * np.arange(-32, 7))
 
 
 def jacobian(model: DynamicModel, x: Any, u: Any) -> np.ndarray:
     """df/dx (2 n, 2 n) by central differences; columns of cyclic states are zero."""
     x = checked_array(x, 2 * len(model.coordinates), "x", model.name)
     u = checked_array(np.atleast_1d(u), len(model.inputs), "u", model.name)
-    result = np.empty((len(x), len(x)))
-    model.loops.jacobian_at(x, u, model.machine, model.active, result)
-    return result
-
-
-def frozen_inverses(model: DynamicModel) -> np.ndarray:
-    """Transposed active columns of (I - gamma h J)^-1 on the ladder of step sizes.
-
-    J belongs to the first start with all inputs zero: straight running.
-    """
-    x = model.start()
-    straight = jacobian(model, x, np.zeros(len(model.inputs)))
-    identity = np.eye(len(x))
-    inverses = [np.linalg.inv(identity - ROS34PW2.gamma * h * straight) for h in LADDER]
-    return loop_array(np.stack([inverse[:, model.active].T for inverse in inverses]))
+    return model.system.jacobian(x, u)
 
 
 def reduced_jacobian(model: DynamicModel, spaces: Spaces, window: int, y: np.ndarray) -> np.ndarray:

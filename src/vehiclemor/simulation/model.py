@@ -13,7 +13,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.registry import component
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Algebraic equations; ordinary differential equations; those with constraints.
 KINDS = ("ae", "ode", "dae")
@@ -95,14 +95,14 @@ class Model(Protocol):
         """Operations of each generated function, by kind and in total."""
         ...
 
-    def start(self, name: str) -> np.ndarray:
-        """State (n,) of an initial condition; `InputError` if there is none of that name."""
+    def start(self, name: Start) -> np.ndarray:
+        """State (n,) of an initial condition, or the one given; `InputError` if it is neither."""
         ...
 
     def simulate(
         self,
         maneuver: Maneuver,
-        start: str | None = None,
+        start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
         tolerance: float | None = None,

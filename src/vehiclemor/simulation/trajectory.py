@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from vehiclemor.simulation.model import Model
 
+# A named initial condition of a model, or a state (n,).
+Start = str | np.ndarray
 STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {
