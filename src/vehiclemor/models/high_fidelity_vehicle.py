@@ -81,6 +81,8 @@ CONSTRAINTS = tuple(
 # The right-hand side does not depend on them; it turns with the heading.
 CYCLIC = ("x", "y", *(f"gamma_{wheel}" for wheel in WHEELS))
 HEADING = ("psi", (("x", "y"), ("x_dot", "y_dot")))
+# Position on the road and heading: all else moves as the same wherever the vehicle is.
+PLANAR = ("x", "y", "psi")
 # Magnitudes below which errors count absolutely.  A heading that is off integrates to a lateral
 # position that is off: no other error matters as much.
 TYPICAL = dict.fromkeys([q.name for q in (*COORDINATES, *SPEEDS)], 10.0) | {

@@ -39,6 +39,7 @@ MANEUVER = "lane_change"
 FRONT = (True, True, False, False)
 LEFT = (True, False, True, False)
 # The right-hand side does not depend on them.
+PLANAR = ("X", "Y", "psi")
 CYCLIC = ("X", "Y", *(f"gamma_{wheel}" for wheel in WHEELS))
 
 COORDINATES = (

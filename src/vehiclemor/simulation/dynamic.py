@@ -71,6 +71,8 @@ class DynamicModel:
     turning
         Numbers of the heading angle and of the pairs of states that turn with it; empty where the
         states are components in the vehicle.
+    planar
+        Numbers of the two positions on the road and of the heading; empty for other systems.
     """
 
     name: str
@@ -87,6 +89,7 @@ class DynamicModel:
     validity: Mapping[str, tuple[float, float]]
     loads: tuple[str, ...]
     turning: np.ndarray
+    planar: np.ndarray
 
     counts = DYNAMIC_COUNTS
     evaluations = "rhs_calls"

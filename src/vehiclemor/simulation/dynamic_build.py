@@ -58,6 +58,7 @@ def build(
         getattr(definition, "VALIDITY", {}),
         tuple(getattr(definition, "LOADS", ())),
         _turning(definition, states),
+        np.array([states.index(q) for q in getattr(definition, "PLANAR", ())], dtype=np.int64),
     )
 
 

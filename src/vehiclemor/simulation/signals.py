@@ -77,7 +77,7 @@ def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.
     from scipy.interpolate import make_interp_spline
 
     # One-sided values at the ends, where the input may jump.
-    inside = 1e-12 * (b - a)
+    inside = 1e-13 * (b - a)
     pieces = 8
     while pieces <= MOST_PIECES:
         knots = np.linspace(a, b, pieces + 1)

@@ -63,6 +63,11 @@ class Spaces:
 
 def full_space(n: int) -> Spaces:
     """The whole state space of a model with n coordinates, in one window."""
+    return whole_space(2 * n)
+
+
+def whole_space(dim: int) -> Spaces:
+    """The whole space of a system with `dim` states, in one window."""
     nothing = np.zeros((1, 1, 1))
     return Spaces(
         FULL,
@@ -70,5 +75,5 @@ def full_space(n: int) -> Spaces:
         np.zeros((1, 1)),
         nothing,
         nothing,
-        np.array([2 * n], dtype=np.int64),
+        np.array([dim], dtype=np.int64),
     )

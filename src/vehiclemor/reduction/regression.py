@@ -1,0 +1,28 @@
+"""Linear regression on features."""
+
+import numpy as np
+
+
+def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
+    """Coefficients (terms,) or (terms, targets) of the fit of values on columns.
+
+    Minimises the mean square error plus `weight` times the squares of the coefficients.
+
+    Parameters
+    ----------
+    columns
+        Features (samples, terms).
+    values
+        Targets (samples,) or (samples, targets).
+    weight
+        Of the coefficients' size (ridge regression: A. E. Hoerl, R. W. Kennard, Technometrics 12
+        (1970), 55-67).
+    """
+    normal = columns.T @ columns + weight * len(columns) * np.eye(columns.shape[1])
+    return np.linalg.solve(normal, columns.T @ values)
+
+
+def largest(values: np.ndarray) -> np.ndarray:
+    """Largest magnitude in each column (samples, n) -> (n,); 1 where a column is zero."""
+    found = np.abs(values).max(axis=0)
+    return np.where(found > 0.0, found, 1.0)

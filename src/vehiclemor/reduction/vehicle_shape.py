@@ -1,0 +1,153 @@
+"""Shape of a vehicle: its state without where it is and where it heads.
+
+The equations of motion of a vehicle on a plane road don't depend on its place, and turn with its
+heading.  So a reduced model needs the shape alone (speeds as components in the heading frame); the
+heading and the place follow by quadratures:
+
+    shape' = f(shape, u);  psi' = r,  X' = U cos(psi) - V sin(psi),  Y' = U sin(psi) + V cos(psi)
+
+with r, U, V functions of shape and u.  Angles of the wheels' spin are left out for the same reason.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
+
+STEP = 6e-6
+INPUT_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Derivatives of shape, motion (psi', U, V) and outputs at straight running.
+
+    Attributes
+    ----------
+    a, b
+        Of the rate of the shape (n, n) and (n, inputs).
+    motion_a, motion_b
+        Of (psi', U, V): (3, n), (3, inputs).
+    output_a, output_b
+        Of the outputs.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    motion_a: np.ndarray
+    motion_b: np.ndarray
+    output_a: np.ndarray
+    output_b: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleShape:
+    """Shape coordinates of one vehicle model.
+
+    Attributes
+    ----------
+    model
+        With positions on the road and a heading.
+    """
+
+    model: DynamicModel
+
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """Numbers of the states that make the shape."""
+        left_out = set(self.model.planar)
+        return np.array([i for i in self.model.active if i not in left_out])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the shape's states."""
+        states = (*self.model.coordinates, *self.model.speeds)
+        return tuple(states[i] for i in self.kept)
+
+    @cached_property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Numbers of pairs of states, other than the place, that are components in space."""
+        turning, place = self.model.turning, set(self.model.planar)
+        pairs = [(int(a), int(b)) for a, b in zip(turning[1::2], turning[2::2], strict=True)]
+        return [pair for pair in pairs if not set(pair) <= place]
+
+    @cached_property
+    def reference(self) -> np.ndarray:
+        """Shape (n,) of straight running at the model's own speed."""
+        return self.of(self.model.start()[None])[0]
+
+    @property
+    def speed(self) -> float:
+        """Speed of straight running in m/s."""
+        return float(self.motion(self.reference[None], self._no_input(1))[1][0, 1])
+
+    def of(self, states: np.ndarray) -> np.ndarray:
+        """Shapes (samples, n) of states (samples, 2 n)."""
+        return _turned(states, self.pairs, -states[:, self.model.planar[2]])[:, self.kept]
+
+    def states(self, shapes: np.ndarray, planar: np.ndarray) -> np.ndarray:
+        """States of shapes (samples, n) at places and headings (samples, 3); wheels don't turn."""
+        states = np.zeros((len(shapes), 2 * len(self.model.coordinates)))
+        states[:, self.kept] = shapes
+        states[:, self.model.planar] = planar
+        return _turned(states, self.pairs, planar[:, 2])
+
+    def motion(self, shapes: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates of the shapes (samples, n), and psi', U, V (samples, 3), by the full equations."""
+        states = self.states(shapes, np.zeros((len(shapes), 3)))
+        rates = self.model.derivatives_at(states, inputs)
+        x, y, heading = self.model.planar
+        turn = rates[:, heading]
+        for a, b in self.pairs:
+            # Components in a frame that turns.
+            rates[:, a] += turn * states[:, b]
+            rates[:, b] -= turn * states[:, a]
+        return rates[:, self.kept], rates[:, [heading, x, y]]
+
+    @cached_property
+    def linearised(self) -> Linearisation:
+        """Derivatives at straight running without steering, by central differences."""
+        n, inputs = len(self.kept), len(self.model.inputs)
+        steps = STEP * np.maximum(1.0, np.abs(self.reference))
+        shapes = np.tile(self.reference, (2 * (n + inputs), 1))
+        values = self._no_input(len(shapes))
+        for j in range(n):
+            shapes[2 * j, j] += steps[j]
+            shapes[2 * j + 1, j] -= steps[j]
+        for j in range(inputs):
+            values[2 * (n + j), j] += INPUT_STEP
+            values[2 * (n + j) + 1, j] -= INPUT_STEP
+        widths = 2.0 * np.concatenate([steps, np.full(inputs, INPUT_STEP)])
+        outputs = self.model.outputs_at(
+            self.states(shapes, np.zeros((len(shapes), 3))), np.ascontiguousarray(values)
+        )
+        parts = []
+        for image in (*self.motion(shapes, values), outputs):
+            slopes = (image[0::2] - image[1::2]).T / widths
+            parts += [slopes[:, :n], slopes[:, n:]]
+        return Linearisation(*parts)
+
+    def _no_input(self, samples: int) -> np.ndarray:
+        return np.zeros((samples, len(self.model.inputs)))
+
+
+def is_vehicle(model: Model) -> tuple[bool, str]:
+    """Whether a model moves on a road, and why not."""
+    if len(getattr(model, "planar", ())) == 3:
+        return True, ""
+    return False, f"{model.name} is no vehicle with a place and a heading on the road"
+
+
+def _turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray) -> np.ndarray:
+    """States with their pairs of components turned by angles (samples,)."""
+    turned = states.copy()
+    cosine, sine = np.cos(angles), np.sin(angles)
+    for a, b in pairs:
+        turned[:, a] = cosine * states[:, a] - sine * states[:, b]
+        turned[:, b] = sine * states[:, a] + cosine * states[:, b]
+    return turned
