@@ -26,7 +26,7 @@ from numba.core.errors import TypingError
 from numba.core.typing import signature
 from numba.extending import intrinsic
 
-from vehiclemor.codegen import arctangent, exponential, sincos
+from vehiclemor.codegen import arctangent, exponential, sincos, weighted_sums
 from vehiclemor.codegen.batches import LANES, RESULTS
 
 # A product and a sum may become one operation, as in the loops that are compiled with them.
@@ -72,7 +72,7 @@ Library = Callable[[str, Sequence[Any]], Any]
 
 def source_hash() -> str:
     """Hash of the source that makes the machine code: this module and the elementary functions."""
-    modules = [inspect.getmodule(source_hash), *SOURCES.values()]
+    modules = [inspect.getmodule(source_hash), weighted_sums, *SOURCES.values()]
     texts = [inspect.getsource(module) for module in modules if module is not None]
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
@@ -233,6 +233,12 @@ class _Kernel:
                 place = _places(node)
                 flat = place[0] if len(place) == 1 else place[0] * self.columns + place[1]
                 self.sizes[name] = max(self.sizes[name], flat + 1)
+            match node:
+                case ast.Assign(
+                    [ast.Tuple(targets)], ast.Call(ast.Name("weighted_sums"), [array, *_]) as call
+                ):
+                    read = weighted_sums.reach(call, len(targets))
+                    self.sizes[ast.unparse(array)] = max(self.sizes[ast.unparse(array)], read)
 
     @property
     def pointers(self) -> list[str]:
@@ -309,6 +315,20 @@ def emit(text: str, builder: Any, pointers: Mapping[str, Any], library: Library)
             ) if len(elements) == 2:
                 results = expressions.elementary(
                     "sincos", expressions.value(argument, read, DOUBLE)
+                )
+                values |= zip((ast.unparse(e) for e in elements), results, strict=True)
+            case ast.Assign(
+                [ast.Tuple(elements)],
+                ast.Call(
+                    ast.Name("weighted_sums"),
+                    [ast.Name(array), ast.Constant(int() as first), ast.Tuple(terms)],
+                    [],
+                ),
+            ):
+                # One by one, each used at once: registers are few.
+                factors = (expressions.value(term, read, DOUBLE) for term in terms)
+                results = weighted_sums.weighted_sums(
+                    builder, address(array, first), factors, len(elements)
                 )
                 values |= zip((ast.unparse(e) for e in elements), results, strict=True)
             case ast.Expr(

@@ -19,6 +19,7 @@ import numpy as np
 
 from vehiclemor.codegen.cache import load_module
 from vehiclemor.codegen.link import kernels_source
+from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.simulation.system import System
 
 # After the reduced coordinates z come heading and place.
@@ -38,15 +39,21 @@ class Features:
         parameters `p[i]`.
     terms
         Expression of each feature.
-    targets
-        For each feature the columns of C that it has part in; all if empty.
+    groups
+        (numbers of features, columns of C) of each block of C that is not zero; all if empty.
     """
 
     states: int
     inputs: int
     lines: tuple[tuple[str, str], ...]
     terms: tuple[str, ...]
-    targets: tuple[tuple[int, ...], ...] = ()
+    groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
+
+    @property
+    def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
+        """Blocks of C: numbers of features, columns."""
+        everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
+        return self.groups or (everything,)
 
     # What is evaluated is text of this package, not of a user.
     def at(self, z: np.ndarray, u: np.ndarray, parameters: np.ndarray) -> np.ndarray:
@@ -61,24 +68,19 @@ class Features:
 
     def kernel(self, parameters: int) -> str:
         """Source of the kernel of the reduced vehicle; constants are parameters, then C."""
-        count = self.states + PLANAR
         body = [f"z{i} = _x[{i}]" for i in range(self.states)]
         body += [f"u{i} = _u[{i}]" for i in range(self.inputs)]
         body += [f"{name} = {_constants(text)}" for name, text in self.lines]
-        started: set[str] = set()
-        for j, term in enumerate(self.terms):
-            body.append(f"f{j} = {_constants(term)}")
-            for i in self.targets[j] if self.targets else range(count):
-                # One row of coefficients for each feature: neighbours become one vector.
-                product = f"_constants[{parameters + j * count + i}] * f{j}"
-                # Even and odd features apart: two short chains of sums instead of a long one.
-                name = f"t{j % 2}_{i}"
-                body.append(
-                    f"{name} = {name} + {product}" if name in started else f"{name} = {product}"
-                )
-                started.add(name)
-        sums = [[name for h in (0, 1) if (name := f"t{h}_{i}") in started] for i in range(count)]
-        totals = [" + ".join(names) or "0.0" for names in sums]
+        first = parameters
+        sums: dict[int, list[str]] = {}
+        for b, (terms, columns) in enumerate(self.blocks):
+            names = ", ".join(f"t{b}_{i}" for i in columns)
+            factors = ", ".join(_constants(self.terms[j]) for j in terms)
+            body.append(f"({names},) = weighted_sums(_constants, {first}, ({factors},))")
+            first += len(terms) * padded(len(columns))
+            for i in columns:
+                sums.setdefault(i, []).append(f"t{b}_{i}")
+        totals = [" + ".join(sums.get(i, ["0.0"])) for i in range(self.states + PLANAR)]
         k = self.states
         body += [f"_result[{i}] = {totals[i]}" for i in range(k + 1)]
         body += [f"forward = {totals[k + 1]}", f"sideward = {totals[k + 2]}"]
@@ -107,10 +109,13 @@ class Features:
         reference
             Reduced coordinates (states,) at which the Jacobian is frozen.
         """
-        sizes = {"WORK": 0, "CONSTANTS": len(parameters) + coefficients.size}
+        blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in self.blocks]
+        for block, (terms, columns) in zip(blocks, self.blocks, strict=True):
+            block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
+        constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
+        sizes = {"WORK": 0, "CONSTANTS": len(constants)}
         text = self.kernel(len(parameters))
         kernels = load_module("features", kernels_source(text, sizes, "features"))
-        constants = np.concatenate([parameters, coefficients.ravel()])
         addresses = np.array([kernels._derivative_machine.address, 0, 0, 0], dtype=np.int64)
         dim = self.states + PLANAR
         return System(

@@ -226,10 +226,11 @@ def _feature_table(
         odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
         odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
     even = ["1.0", f"z{k}", *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
-    targets = [(*range(k), k + 1, k + 3)] * len(odd) + [(k, k + 2)] * len(even)
-    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), tuple(targets))
-    numbers = list(range(len(odd) + len(even)))
-    return _Table(features, parameters, numbers[: len(odd)], numbers[len(odd) :])
+    numbers = tuple(range(len(odd) + len(even)))
+    lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
+    groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
+    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups)
+    return _Table(features, parameters, list(lateral), list(symmetric))
 
 
 def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:

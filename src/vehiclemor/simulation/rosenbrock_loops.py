@@ -1,12 +1,10 @@
-"""Rosenbrock and W-methods for compiled systems, with fresh or frozen Jacobians.
+"""Rosenbrock methods for compiled systems, with fresh Jacobians.
 
 Transformed stages (no product with the Jacobian): E. Hairer, G. Wanner, Solving Ordinary
 Differential Equations II (2nd ed., Springer 1996), section IV.7:
 
     (I / (gamma h) - A) U_i = f(t + alpha_i h, y + sum a_ij U_j) + sum c_ij / h U_j + d_i h f_t
 """
-
-import math
 
 from vehiclemor.simulation.system_loops import FULL, error_norm, lifted, slope, slope_apart
 
@@ -71,37 +69,6 @@ def substitute(matrix, dim, rows, b):
             b[i] -= matrix[i, k] * value
 
 
-def frozen_solve(inverse, dim, active, b, result):
-    """Product of a stored inverse with b: its active columns, the others are the identity's."""
-    for i in range(dim):
-        result[i] = b[i]
-    for j in active:
-        result[j] = 0.0
-    # Four rows at a time: the result is loaded and stored a quarter as often.
-    place = 0
-    while place + 3 < len(active):
-        w0, w1 = b[active[place]], b[active[place + 1]]
-        w2, w3 = b[active[place + 2]], b[active[place + 3]]
-        for i in range(dim):
-            result[i] += (inverse[place, i] * w0 + inverse[place + 1, i] * w1) + (
-                inverse[place + 2, i] * w2 + inverse[place + 3, i] * w3
-            )
-        place += 4
-    while place < len(active):
-        w0 = b[active[place]]
-        for i in range(dim):
-            result[i] += inverse[place, i] * w0
-        place += 1
-
-
-def turn(vector, turning, cosine, sine):
-    """Rotate the pairs of states that turn with the heading, in place."""
-    for k in range(1, len(turning), 2):
-        a, b = vector[turning[k]], vector[turning[k + 1]]
-        vector[turning[k]] = cosine * a - sine * b
-        vector[turning[k + 1]] = sine * a + cosine * b
-
-
 def rosenbrock_span(
     form,
     times,
@@ -118,11 +85,7 @@ def rosenbrock_span(
     vectors,
     matrices,
     tableau,
-    frozen,
     active,
-    turning,
-    ladder,
-    inverses,
     samples,
     sample,
     path,
@@ -135,15 +98,8 @@ def rosenbrock_span(
     tableau
         a (s, s), c (s, s), alpha, d, m, e (s) with e the error weights, gamma, exponent of the step
         size control.
-    frozen
-        Whether stored inverses are used instead of fresh Jacobians.
     active
         Numbers of the states that the right-hand side depends on.
-    turning
-        Numbers of the heading and of pairs of states that turn with it: the stored inverses belong
-        to heading zero.  May be empty.
-    ladder, inverses
-        Step sizes (L) in s and transposed active columns of (I - gamma h J)^-1 (L, active, dim).
     """
     t, end = times
     tolerance, longest, most_calls = limits
@@ -180,47 +136,37 @@ def rosenbrock_span(
             h = 0.5 * (end - t)
         if not h > 1e-14 * (1.0 + abs(t)):
             return 4, t, step, sample
-        rung = 0
-        cosine, sine = 1.0, 0.0
-        if frozen:
-            if len(turning) > 0:
-                cosine, sine = math.cos(y[turning[0]]), math.sin(y[turning[0]])
-            while rung < len(ladder) - 1 and ladder[rung] < 0.999 * h:
-                rung += 1
+        if not fresh:
+            difference_jacobian(
+                form,
+                t,
+                segment,
+                y,
+                f,
+                dim,
+                active,
+                signal,
+                space,
+                model,
+                scratch,
+                mid,
+                image,
+                jacobian,
+            )
+            later = 1e-7 * (1.0 + abs(t))
+            slope_apart(form, t + later, segment, y, dim, signal, space, model, scratch, f_t)
             for i in range(dim):
-                f_t[i] = 0.0
-        else:
-            if not fresh:
-                difference_jacobian(
-                    form,
-                    t,
-                    segment,
-                    y,
-                    f,
-                    dim,
-                    active,
-                    signal,
-                    space,
-                    model,
-                    scratch,
-                    mid,
-                    image,
-                    jacobian,
-                )
-                later = 1e-7 * (1.0 + abs(t))
-                slope_apart(form, t + later, segment, y, dim, signal, space, model, scratch, f_t)
-                for i in range(dim):
-                    f_t[i] = (f_t[i] - f[i]) / later
-                counts[0] += min(len(active), dim) + 1
-                counts[3] += 1
-                fresh = True
-            for i in range(dim):
-                for j in range(dim):
-                    matrix[i, j] = -jacobian[i, j]
-                matrix[i, i] += 1.0 / (gamma * h)
-            counts[4] += 1
-            if not factorise(matrix, dim, rows):
-                return 3, t, step, sample
+                f_t[i] = (f_t[i] - f[i]) / later
+            counts[0] += min(len(active), dim) + 1
+            counts[3] += 1
+            fresh = True
+        for i in range(dim):
+            for j in range(dim):
+                matrix[i, j] = -jacobian[i, j]
+            matrix[i, i] += 1.0 / (gamma * h)
+        counts[4] += 1
+        if not factorise(matrix, dim, rows):
+            return 3, t, step, sample
         for stage in range(stage_count):
             if stage == 0:
                 for i in range(dim):
@@ -245,18 +191,9 @@ def rosenbrock_span(
                 for i in range(dim):
                     b[i] += d[stage] * h * f_t[i]
             counts[5] += 1
-            if frozen:
-                for i in range(dim):
-                    b[i] *= gamma * h
-                turn(b, turning, cosine, -sine)
-                frozen_solve(inverses[rung], dim, active, b, image)
-                turn(image, turning, cosine, sine)
-                for i in range(dim):
-                    stages[stage, i] = image[i]
-            else:
-                substitute(matrix, dim, rows, b)
-                for i in range(dim):
-                    stages[stage, i] = b[i]
+            substitute(matrix, dim, rows, b)
+            for i in range(dim):
+                stages[stage, i] = b[i]
         for i in range(dim):
             total, change = 0.0, 0.0
             for stage in range(stage_count):

@@ -16,6 +16,7 @@ from vehiclemor.simulation.system_loops import (
     scratch_space,
     slope,
 )
+from vehiclemor.simulation.w_method_loops import w_method_span
 
 
 def run(
@@ -120,6 +121,32 @@ def run(
                 path,
                 counts,
             )
+        elif frozen:
+            status, t, step, sample = w_method_span(
+                form,
+                times,
+                segment,
+                y,
+                dim,
+                step,
+                limits,
+                signal,
+                space,
+                model,
+                scratch,
+                typical,
+                vectors,
+                matrices[2],
+                tableau,
+                active,
+                turning,
+                ladder,
+                inverses,
+                samples,
+                sample,
+                path,
+                counts,
+            )
         else:
             status, t, step, sample = rosenbrock_span(
                 form,
@@ -137,11 +164,7 @@ def run(
                 vectors,
                 matrices,
                 tableau,
-                frozen,
                 active,
-                turning,
-                ladder,
-                inverses,
                 samples,
                 sample,
                 path,

@@ -1,0 +1,88 @@
+"""Sums of many terms with the same weights' layout, as vector instructions.
+
+A kernel of a regression multiplies dozens of features by the coefficients of a handful of targets.
+Written out as scalars that is the whole cost of it.  The statement
+
+    a, b, c = weighted_sums(_constants, 7, (f0, f1, ...))
+
+gives a = sum_j _constants[7 + width j] f_j, b the same one place further on, and so on; rows of
+coefficients are padded to `width`, a multiple of the vectors' length.
+"""
+
+import ast
+from collections.abc import Iterable
+from typing import Any
+
+from llvmlite import ir
+
+FLAGS = ("contract",)
+# Floats in a vector, as in the batches of elementary functions.
+WIDTH = 4
+DOUBLE = ir.DoubleType()
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
+# Sums in turn, so that no addition waits for the one before it.
+CHAINS = 2
+
+
+def padded(targets: int) -> int:
+    """Length of a row of coefficients for a number of targets."""
+    return -(-targets // WIDTH) * WIDTH
+
+
+def weighted_sums(
+    builder: Any, coefficients: Any, terms: Iterable[Any], targets: int
+) -> list[ir.Value]:
+    """Write the instructions of the sums.
+
+    Parameters
+    ----------
+    builder
+        Where the instructions go.
+    coefficients
+        Pointer to the first coefficient of rows of `padded(targets)` floats, one for each term.
+    terms
+        Values of the terms.
+    targets
+        Number of sums.
+    """
+    vectors = padded(targets) // WIDTH
+    chains: list[list[Any]] = [[None] * vectors for _ in range(CHAINS)]
+    for j, term in enumerate(terms):
+        spread = _spread(builder, term)
+        sums = chains[j % CHAINS]
+        for v in range(vectors):
+            place = builder.gep(
+                coefficients, [ir.Constant(ir.IntType(64), (j * vectors + v) * WIDTH)]
+            )
+            row = builder.load(builder.bitcast(place, VECTOR.as_pointer()), align=8)
+            product = builder.fmul(row, spread, flags=FLAGS)
+            before = sums[v]
+            sums[v] = product if before is None else builder.fadd(before, product, flags=FLAGS)
+    totals = []
+    for v in range(vectors):
+        parts = [chain[v] for chain in chains if chain[v] is not None]
+        total = parts[0]
+        for part in parts[1:]:
+            total = builder.fadd(total, part, flags=FLAGS)
+        totals.append(total)
+    lane = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
+    return [builder.extract_element(totals[i // WIDTH], lane[i % WIDTH]) for i in range(targets)]
+
+
+def reach(call: ast.Call, targets: int) -> int:
+    """How many floats of its array a call of `weighted_sums` reads, from the array's beginning."""
+    _, first, terms = call.args
+    assert isinstance(first, ast.Constant)
+    assert isinstance(first.value, int)
+    assert isinstance(terms, ast.Tuple)
+    return first.value + padded(targets) * len(terms.elts)
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """A vector with the same value in all places."""
+    single = builder.insert_element(
+        ir.Constant(VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
+    )
+    nowhere = ir.Constant(VECTOR, ir.Undefined)
+    first = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(single, nowhere, first)
