@@ -23,12 +23,12 @@ class Arm:
     rear, front
         Pivots on the chassis.
     angle
-        Rotation from the design position in rad.
+        Rotation from the design position.
     """
 
     rear: g.Vector
     front: g.Vector
-    angle: sp.Symbol
+    angle: g.Angle
 
     def axis(self, tape: Tape) -> g.Vector:
         """Unit axis."""

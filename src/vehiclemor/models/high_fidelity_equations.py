@@ -12,64 +12,39 @@ from typing import Any
 import sympy as sp
 
 from vehiclemor.models import double_wishbone_linkage as linkage
+from vehiclemor.models import high_fidelity_parts as parts
 from vehiclemor.models import vehicle_body as body
 from vehiclemor.models import vehicle_corners as corners
-from vehiclemor.models.double_wishbone_points import POINTS
 from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity_vehicle import (
     CONSTRAINTS,
     COORDINATES,
     INPUTS,
     OUTPUTS,
-    PARAMETERS,
-    SOLVED,
     SPEEDS,
 )
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
-from vehiclemor.symbolic.elimination import eliminate_several, eliminate_symmetric
+from vehiclemor.symbolic.elimination import eliminate_several
 from vehiclemor.symbolic.joints import Rate, free_rate
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
 
-# 1 on the left, -1 on the right: FL, FR, RL, RR.
-SIDES = (1, -1, 1, -1)
-FRONT_POINTS = (
-    *POINTS,
-    "front_spring_chassis_point",
-    "front_spring_arm_point",
-    "upper_arm_centre",
-    "lower_arm_centre",
-    "carrier_centre",
-)
-REAR_POINTS = (
-    "rear_arm_pivot",
-    "rear_arm_centre",
-    "rear_spring_chassis_point",
-    "rear_spring_arm_point",
-)
 # Places of the front corners' coordinates, and of the arms that carry the springs.
 CORNER = (range(6, 13), range(13, 20))
 LOWER_ARMS = (10, 17)
-REAR_ARMS = (20, 21)
-SPINS = (22, 23, 24, 25)
+NUMBERS = parts.Numbers(len(COORDINATES), LOWER_ARMS, (20, 21), (22, 23, 24, 25))
 # Pivots (closure, coordinate of the six without the lower arm's) at the design position.
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
-# Accelerations that are solved for: each but the last six couples to these and to one other.
-INDEPENDENT = (*SPINS, *LOWER_ARMS, *REAR_ARMS, *range(6))
 
 
 @dataclass(frozen=True)
 class _Mechanism:
-    """What both forms of the equations share: chassis, front linkages, design points, symbols."""
+    """The vehicle, its front linkages in any position, and displacement and motion of the rack."""
 
-    chassis: corners.Chassis
+    vehicle: parts.Vehicle
     linkages: tuple[linkage.Linkage, ...]
-    points: tuple[dict[str, g.Vector], ...]
-    q: list[sp.Symbol]
-    rates: list[sp.Symbol]
     rack: tuple[sp.Symbol, ...]
-    p: dict[str, sp.Expr]
 
 
 def derive() -> DynamicEquations:
@@ -77,26 +52,15 @@ def derive() -> DynamicEquations:
     tape = Tape()
     q, rates = body.symbols(COORDINATES), body.symbols(SPEEDS)
     rack = body.symbols(INPUTS)
-    p, flat = _parameters()
-    attitude = body.attitude(tape, q)
-    speeds = body.speeds(tape, attitude, rates)
-    up = attitude.road_normal
-    # The first three speeds are velocities in space, and gravity an acceleration upwards.
-    frame = mechanics.MovingFrame(
-        g.vector(speeds[:3]),
-        g.vector(speeds[3:6]),
-        first=0,
-        acceleration=g.named(tape, g.scale(p["gravity"], up)),
-    )
-    points = _points(tape, p)
+    p, flat = parts.parameters()
+    vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
     mechanism = _Mechanism(
-        corners.Chassis(frame, up, q[2]),
-        tuple(linkage.assembled(tape, _own(q, k), rack[0], points[k], SIDES[k]) for k in range(2)),
-        points,
-        q,
-        rates,
+        vehicle,
+        tuple(
+            linkage.assembled(tape, _own(q, k), rack[0], vehicle.points[k], parts.SIDES[k])
+            for k in range(2)
+        ),
         tuple(rack),
-        p,
     )
     free = [free_rate(k, rate) for k, rate in enumerate(rates)]
     gaps, motions = _closures(tape, mechanism, free)
@@ -109,21 +73,14 @@ def derive() -> DynamicEquations:
     ]
 
     bound = _bound_rates(tape, motions, gamma, free)
-    vehicle = _corners(tape, mechanism, bound)
-    mass, force = _kane(tape, mechanism, vehicle)
-    chosen = sorted(INDEPENDENT)
-    solved = eliminate_symmetric(
-        tape,
-        [[mass[j][k] for k in chosen] for j in chosen],
-        [force[j] for j in chosen],
-        [chosen.index(k) for k in INDEPENDENT],
-    )
-    accelerations = _accelerations(
-        tape, attitude, bound, dict(zip(chosen, solved, strict=True)), speeds
-    )
+    closed = _corners(tape, mechanism, bound)
+    solved = parts.solved(tape, vehicle, closed)
+    accelerations = [
+        *parts.chassis_accelerations(tape, attitude, solved, speeds),
+        *_joint_accelerations(tape, bound, solved)[6:],
+    ]
 
-    open_vehicle = _corners(tape, mechanism, free)
-    mass, force = _kane(tape, mechanism, open_vehicle)
+    mass, force = parts.kane(tape, vehicle, _corners(tape, mechanism, free))
     zero = g.vector((0, 0, 0))
     open_form = body.in_coordinates(tape, attitude, speeds, mass, force, velocity_bias=zero)
     n = len(COORDINATES)
@@ -146,7 +103,7 @@ def derive() -> DynamicEquations:
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (
-                _outputs(tape, mechanism, vehicle, speeds, gaps, gap_rates),
+                _outputs(tape, mechanism, closed, speeds, gaps, gap_rates),
                 (len(OUTPUTS),),
             ),
             "second_order": (second_order, (n, n + 1)),
@@ -161,38 +118,9 @@ def derive() -> DynamicEquations:
     return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program, CONSTRAINTS)
 
 
-def _parameters() -> tuple[dict[str, sp.Expr], list[sp.Symbol]]:
-    """Symbols of the parameters by name, components of points apart, and in order."""
-    flat = []
-    for name, declared in PARAMETERS.items():
-        flat += [name] if declared.size == 1 else [f"{name}_{axis}" for axis in "xyz"]
-    flat += SOLVED
-    symbols = {name: sp.Symbol(f"p_{name}", real=True) for name in flat}
-    return dict(symbols), list(symbols.values())
-
-
-def _points(tape: Tape, p: Mapping[str, sp.Expr]) -> tuple[dict[str, g.Vector], ...]:
-    """Design points of the four corners, chassis frame."""
-
-    def vector(name: str) -> g.Vector:
-        return g.vector([p[f"{name}_{axis}"] for axis in "xyz"])
-
-    origin = vector("chassis_centre")
-    front = g.named(tape, g.subtract(vector("front_frame_origin"), origin))
-    rear = g.named(tape, g.subtract(vector("rear_wheel_centre"), origin))
-    left = {name: g.named(tape, g.add(vector(name), front)) for name in FRONT_POINTS}
-    behind = {name: g.named(tape, g.add(vector(name), rear)) for name in REAR_POINTS}
-    behind["rear_wheel_centre"] = rear
-
-    def mirrored(points: dict[str, g.Vector]) -> dict[str, g.Vector]:
-        return {name: (x, -y, z) for name, (x, y, z) in points.items()}
-
-    return left, mirrored(left), behind, mirrored(behind)
-
-
 def _motions(tape: Tape, m: _Mechanism, rates: Sequence[Rate], k: int) -> corners.LinkageMotions:
     rack = (m.rack[1], m.rack[2])
-    return corners.linkage_motions(tape, m.linkages[k], _own(m.q, k), _own(rates, k), rack)
+    return corners.linkage_motions(tape, m.linkages[k], _own(m.vehicle.q, k), _own(rates, k), rack)
 
 
 def _own(values: Sequence[Any], k: int) -> Sequence[Any]:
@@ -216,7 +144,7 @@ def _closures(
     gaps, motions = [], []
     for k in range(2):
         own = _motions(tape, m, free, k)
-        new, moving = corners.closures(tape, m.linkages[k], own, m.points[k])
+        new, moving = corners.closures(tape, m.linkages[k], own, m.vehicle.points[k])
         gaps += new
         motions += moving
     return gaps, motions
@@ -243,68 +171,18 @@ def _bound_rates(
 
 
 def _corners(tape: Tape, m: _Mechanism, rates: Sequence[Rate]) -> list[corners.Corner]:
-    result = []
-    for k in range(4):
-        spin = corners.Spin(SPINS[k], m.rates[SPINS[k]])
-        if k < 2:
-            own, number = _motions(tape, m, rates, k), LOWER_ARMS[k]
-            result.append(
-                corners.front_corner(
-                    tape, m.chassis, m.linkages[k], own, m.points[k], spin, m.p, number, SIDES[k]
-                )
-            )
-        else:
-            number = REAR_ARMS[k - 2]
-            result.append(
-                corners.rear_corner(
-                    tape,
-                    m.chassis,
-                    m.q[number],
-                    rates[number],
-                    m.points[k],
-                    spin,
-                    m.p,
-                    number,
-                    SIDES[k],
-                )
-            )
-    return result
+    front = [
+        parts.front_corner(tape, m.vehicle, m.linkages[k], _motions(tape, m, rates, k), k)
+        for k in range(2)
+    ]
+    return [*front, *(parts.rear_corner(tape, m.vehicle, rates, k) for k in (2, 3))]
 
 
-def _kane(
-    tape: Tape, m: _Mechanism, vehicle: Sequence[corners.Corner]
-) -> tuple[list[list[sp.Expr]], list[sp.Expr]]:
-    """Mass matrix and forces of all bodies, springs added."""
-    frame, p = m.chassis.frame, m.p
-    inertia = corners.diagonal(p, "chassis_inertia")
-    chassis = mechanics.Body(
-        p["chassis_mass"],
-        frame.origin(tape),
-        mechanics.ZERO,
-        frame.rotation(tape, inertia),
-        inertia,
-    )
-    bodies = [chassis, *(part for corner in vehicle for part in corner.bodies)]
-    mass, force = mechanics.kane(tape, len(COORDINATES), bodies)
-    for number, corner in zip((*LOWER_ARMS, *REAR_ARMS), vehicle, strict=True):
-        force[number] = tape.let(force[number] + corner.spring_moment)
-    return mass, force
-
-
-def _accelerations(
-    tape: Tape,
-    attitude: body.Attitude,
-    rates: Sequence[Rate],
-    solved: Mapping[int, sp.Expr],
-    speeds: Sequence[sp.Expr],
+def _joint_accelerations(
+    tape: Tape, rates: Sequence[Rate], solved: Mapping[int, sp.Expr]
 ) -> list[sp.Expr]:
-    """Second derivatives of all coordinates."""
-    turning = g.vector(speeds[3:6])
-    position = g.rotate(tape, attitude.rotation, g.vector([solved[k] for k in range(3)]))
-    bias = body.angle_bias(tape, attitude, turning)
-    change = g.named(tape, g.subtract(g.vector([solved[k] for k in range(3, 6)]), bias))
-    angles = body.angle_rates(tape, attitude, change)
-    joints = [
+    """Derivatives of rates, from those that are solved for."""
+    return [
         solved[k]
         if k in solved
         else tape.let(
@@ -312,34 +190,22 @@ def _accelerations(
         )
         for k, rate in enumerate(rates)
     ]
-    return [*position, *angles, *joints[6:]]
 
 
 def _outputs(
     tape: Tape,
     m: _Mechanism,
-    vehicle: Sequence[corners.Corner],
+    corner_parts: Sequence[corners.Corner],
     speeds: Sequence[sp.Expr],
     gaps: Sequence[sp.Expr],
     gap_rates: Sequence[sp.Expr],
 ) -> list[sp.Expr]:
-    q = m.q
-    contacts = [corner.contact for corner in vehicle]
-    tires = [corner.tire for corner in vehicle]
-
     def norm(values: Sequence[sp.Expr]) -> sp.Expr:
         return tape.let(sp.sqrt(tape.let(sp.Add(*[value**2 for value in values]))))
 
+    carriers = [part.carrier for part in m.linkages]
     return [
-        *(q[0], q[1], q[3], q[4], q[5]),
-        *(speeds[0], speeds[1], m.rates[2], speeds[5]),
-        *(tire.longitudinal for tire in tires),
-        *(tire.lateral for tire in tires),
-        *(contact.load for contact in contacts),
-        *(tire.aligning for tire in tires),
-        *(contact.slip_ratio for contact in contacts),
-        *(tape.let(sp.atan(contact.tan_slip)) for contact in contacts),
-        *(tape.let(sp.atan2(-part.carrier[0][1], part.carrier[1][1])) for part in m.linkages),
+        *parts.outputs(tape, m.vehicle, corner_parts, speeds, carriers),
         norm(gaps),
         norm(gap_rates),
     ]

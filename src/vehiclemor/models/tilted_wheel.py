@@ -90,12 +90,7 @@ def tilted_contact(
     forward, lateral = let(g.dot(sliding, heading)), let(g.dot(sliding, leftward))
     rise = let(g.dot(sliding, up))
 
-    pressed = let(p["tire_radius"] - radius)
-    elastic = let(let(p["tire_stiffness"] / 2) * (pressed + sp.Abs(pressed)))
-    damping = let(-p["tire_damping"] * let(rise * inverse))
-    total = let(elastic + minimum(tape, elastic, damping))
-    load = let((total + sp.Abs(total)) / 2)
-
+    load = vertical_load(tape, radius, rise * inverse, p)
     per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
     return TiltedContact(
         arm,
@@ -106,6 +101,22 @@ def tilted_contact(
         let(let(spin * radius - forward) * per_speed),
         let(lateral * per_speed),
     )
+
+
+def vertical_load(tape: Tape, radius: sp.Expr, rate: sp.Expr, p: Mapping[str, sp.Expr]) -> sp.Expr:
+    """Vertical force of a wheel that pushes and never pulls, from its loaded radius and the rate.
+
+    Parameters
+    ----------
+    p
+        `tire_radius`, `tire_stiffness`, `tire_damping`.
+    """
+    let = tape.let
+    pressed = let(p["tire_radius"] - radius)
+    elastic = let(let(p["tire_stiffness"] / 2) * (pressed + sp.Abs(pressed)))
+    damping = let(-p["tire_damping"] * let(rate))
+    total = let(elastic + minimum(tape, elastic, damping))
+    return let((total + sp.Abs(total)) / 2)
 
 
 def tire_on(tape: Tape, contact: TiltedContact, p: Mapping[str, sp.Expr]) -> TireForces:

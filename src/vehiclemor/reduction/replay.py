@@ -38,13 +38,26 @@ class ReplayModel:
         return 0
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """The training trajectory whose input is nearest (root mean square) to the maneuver's."""
+        """The training trajectory whose input is nearest (root mean square) to the maneuver's.
+
+        Runs of the maneuver's own output times come first.  If there are none, inputs are compared
+        over the time that a run and the maneuver share, and the run is read at the maneuver's
+        times: between samples linearly, after its end its last value.
+        """
         self.model.start(start)
-        inputs = maneuver.at(maneuver.times)
-        nearest = min(self.recorded, key=lambda run: float(np.sum((run.inputs - inputs) ** 2)))
+        times = maneuver.times
+        inputs = maneuver.at(times)
+        alike = [run for run in self.recorded if np.array_equal(run.time, times)]
+        nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
+        if not alike:
+            nearest = replace(
+                nearest,
+                coordinates=_resampled(nearest.time, nearest.coordinates, times),
+                speeds=_resampled(nearest.time, nearest.speeds, times),
+            )
         return replace(
             nearest,
-            time=maneuver.times,
+            time=times,
             inputs=inputs,
             outputs=self.model.outputs_at(nearest.states, inputs),
             counts=dict.fromkeys(self.model.counts, 0),
@@ -54,6 +67,21 @@ class ReplayModel:
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
         del states
+
+
+def _distance(run: Trajectory, times: np.ndarray, inputs: np.ndarray) -> float:
+    """Mean square of the difference of the inputs over the time that both cover."""
+    shared = times <= run.time[-1]
+    difference = _resampled(run.time, run.inputs, times[shared]) - inputs[shared]
+    return float(np.mean(difference**2))
+
+
+def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Columns of `values` (samples, k) at other times, the last value after the end."""
+    if np.array_equal(before, times):
+        return values
+    columns = [np.interp(times, before, column) for column in values.T]
+    return np.array(columns).reshape(len(columns), len(times)).T
 
 
 def settings(kind: str) -> dict[str, Setting]:

@@ -25,15 +25,16 @@ import numpy as np
 
 from vehiclemor.reduction.features import PLANAR, Features, monomials
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
 from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.regression import largest, ridge_fit
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.slow_modes import SlowModes, slow_modes
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.trajectory_fit import improved, targets
 from vehiclemor.reduction.vehicle_shape import VehicleShape, is_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "slow modes with a right-hand side fitted on training runs, fast motion slaved"
@@ -55,6 +56,9 @@ _SETTINGS = {
     ),
     "ridge": Setting("number", 1e-10, "weight of the coefficients' size in the fit", minimum=0.0),
     "refits": Setting("integer", 2, "how often the heading is fitted on reduced runs", minimum=0),
+    "sweeps": Setting(
+        "integer", 4, "Gauss-Newton steps of all coefficients on whole training runs", minimum=0
+    ),
     "hull": Setting(
         "number",
         1.1,
@@ -62,12 +66,7 @@ _SETTINGS = {
         minimum=0.0,
         above=True,
     ),
-    "solver": Setting(
-        "text", "ros34pw2", "as of full_order; ros34pw2 freezes its Jacobian", choices=SOLVERS
-    ),
-    "tolerance": Setting(
-        "number", 3e-3, "largest local error of a state relative to its typical size", minimum=1e-13
-    ),
+    **ONLINE_SETTINGS,
 }
 
 
@@ -152,6 +151,10 @@ def fit(
     )
     for _ in range(int(settings["refits"])):
         reduced = _with_heading(reduced, training, runs, odd, k + 1)
+    if int(settings["sweeps"]):
+        free = [(curved, column) for column in range(k)] + [(odd, k + 1), (odd, k + 3)]
+        goals = targets(reduced, training, runs)
+        reduced = improved(reduced, goals, free, int(settings["sweeps"]))
     evaluations = sum(run.counts[model.evaluations] for run in runs) + len(u)
     offline = Offline(time.perf_counter() - began, evaluations)
     return replace(

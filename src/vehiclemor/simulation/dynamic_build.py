@@ -38,9 +38,9 @@ def build(
     }
     definition.check(values)
     equations, kernels, digest = compiled(name, definition)
-    values |= _solved(definition, values, parameters, kernels)
+    values |= solved_parameters(definition, values, parameters, kernels)
     solved = [float(values[key]) for key in _to_solve(definition)]
-    constants = _constants(kernels, parameters, solved)
+    constants = hoisted_constants(kernels, parameters, solved)
     states = [q.name for q in (*equations.coordinates, *equations.speeds)]
     typical = dict.fromkeys(states, 1.0) | dict(getattr(definition, "TYPICAL", {}))
     return DynamicModel(
@@ -74,7 +74,9 @@ def _to_solve(definition: Any) -> tuple[str, ...]:
     return tuple(getattr(definition, "SOLVED", ()))
 
 
-def _constants(kernels: ModuleType, parameters: ParameterSet, solved: list[float]) -> np.ndarray:
+def hoisted_constants(
+    kernels: ModuleType, parameters: ParameterSet, solved: list[float]
+) -> np.ndarray:
     """Hoisted constants of a parameter set."""
     constants = np.empty(kernels.CONSTANTS)
     flat = np.concatenate([parameters.flat(), solved])
@@ -82,7 +84,7 @@ def _constants(kernels: ModuleType, parameters: ParameterSet, solved: list[float
     return constants
 
 
-def _solved(
+def solved_parameters(
     definition: Any, values: Mapping[str, Any], parameters: ParameterSet, kernels: ModuleType
 ) -> dict[str, float]:
     """What a model solves for before it can start, by name."""
@@ -92,7 +94,7 @@ def _solved(
 
     def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
         result = np.empty(len(x))
-        kernels.derivative(x, u, _constants(kernels, parameters, solved), work, result)
+        kernels.derivative(x, u, hoisted_constants(kernels, parameters, solved), work, result)
         return result
 
     return definition.settle(values, derivative)

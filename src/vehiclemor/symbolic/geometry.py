@@ -11,6 +11,8 @@ from vehiclemor.symbolic.tape import Tape
 
 Vector = tuple[sp.Expr, sp.Expr, sp.Expr]
 Rotation = tuple[Vector, Vector, Vector]
+# An angle in rad, or its cosine and sine where no angle is known.
+Angle = sp.Expr | tuple[sp.Expr, sp.Expr]
 
 
 def vector(components: Sequence[sp.Expr | float]) -> Vector:
@@ -77,8 +79,18 @@ def euler_321(tape: Tape, yaw: sp.Expr, pitch: sp.Expr, roll: sp.Expr) -> Rotati
     )
 
 
-def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: sp.Expr) -> Vector:
-    """Rotate a vector about a unit axis by an angle in rad (Rodrigues' formula).
+def cosine(tape: Tape, angle: Angle) -> sp.Expr:
+    """Cosine of an angle, named on the tape."""
+    return angle[0] if isinstance(angle, tuple) else tape.let(sp.cos(angle))
+
+
+def sine(tape: Tape, angle: Angle) -> sp.Expr:
+    """Sine of an angle, named on the tape."""
+    return angle[1] if isinstance(angle, tuple) else tape.let(sp.sin(angle))
+
+
+def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: Angle) -> Vector:
+    """Rotate a vector about a unit axis by an angle (Rodrigues' formula).
 
     The part along the axis and the two vectors that span the circle are named on the tape, so that
     they are hoisted out of the kernel where they depend on parameters alone.
@@ -86,5 +98,5 @@ def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: sp.Expr) -> Ve
     along = named(tape, scale(tape.let(dot(axis, a)), axis))
     across = named(tape, subtract(a, along))
     quarter_turn = named(tape, cross(axis, a))
-    cosine, sine = tape.let(sp.cos(angle)), tape.let(sp.sin(angle))
-    return named(tape, add(along, add(scale(cosine, across), scale(sine, quarter_turn))))
+    c, s = cosine(tape, angle), sine(tape, angle)
+    return named(tape, add(along, add(scale(c, across), scale(s, quarter_turn))))

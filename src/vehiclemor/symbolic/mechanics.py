@@ -267,8 +267,8 @@ def _add_rotor(tape: Tape, body: Body, mass: list[list[sp.Expr]], force: list[sp
     return g.cross(rotation.value, spin)
 
 
-def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: sp.Expr) -> Tensor:
-    """Tensor R T R^T of a body that has turned about a unit axis by an angle in rad.
+def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: g.Angle) -> Tensor:
+    """Tensor R T R^T of a body that has turned about a unit axis by an angle.
 
     A polynomial in sine and cosine whose coefficients, where tensor and axis are parameters, are
     hoisted out of the kernel.
@@ -283,7 +283,7 @@ def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: sp.Expr) -> T
         columns = [g.named(tape, product(tensor, g.vector(row))) for row in right]
         return [[tape.let(g.dot(g.vector(row), column)) for column in columns] for row in left]
 
-    sine, cosine = tape.let(sp.sin(angle)), tape.let(sp.cos(angle))
+    sine, cosine = g.sine(tape, angle), g.cosine(tape, angle)
     both, square = tape.let(sine * cosine), tape.let(sine * sine)
     still, full = sandwich(along, along), sandwich(across, across)
     turned, first = sandwich(quarter, quarter), sandwich(along, across)
