@@ -198,14 +198,31 @@ def run_study(
 
 
 def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:
-    """Published beside reproduced; studies and timings that are missing are run first.
+    """A comparison as a table; studies and timings that are missing are run first.
+
+    Parameters
+    ----------
+    what
+        `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
+        not seen, beside full-order integrators.
+    out
+        Results folder.
+    jobs
+        Number of processes.
 
     Returns
     -------
     pandas.DataFrame
-        Columns model, item, published, reproduced, unit, floor, replay, verdict (`met`, `missed`
-        or `not_comparable`), reason.
+        Of `paper` the columns model, item, published, reproduced, unit, floor, replay, verdict
+        (`met`, `missed` or `not_comparable`), reason; those of `predictive` are described at
+        `vehiclemor.report.predictive.predictive_comparison`.
     """
+    if what == "predictive":
+        from vehiclemor.report.predictive import predictive_comparison
+
+        return predictive_comparison(Path(out), jobs)
+    if what != "paper":
+        raise registry.unknown("comparison", what, ["paper", "predictive"])
     from vehiclemor.report.compare import comparison
 
     return comparison(what, Path(out), jobs)

@@ -223,14 +223,15 @@ def compare(
     out: Path = api.RESULTS,
     jobs: int = 1,
 ) -> int:
-    """Set published numbers and claims beside reproduced ones.
+    """Set published numbers beside reproduced ones, or reduced models beside full order.
 
-    Exit status 1 if a published bound is missed.
+    Exit status 1 if a bound is missed.
 
     Parameters
     ----------
     what
-        The comparison: paper.
+        The comparison: paper (published beside reproduced), or predictive (reduced models on inputs
+        that they have not seen).
     json_output
         Print JSON.
     out
@@ -242,11 +243,16 @@ def compare(
     if json_output:
         print(rows.to_json(orient="records", indent=2))
     else:
-        _print_comparison(rows, out)
+        _print_comparison(what, rows, out)
     return MISSED if "missed" in set(rows["verdict"]) else 0
 
 
-def _print_comparison(rows: pd.DataFrame, out: Path) -> None:
+def _print_comparison(what: str, rows: pd.DataFrame, out: Path) -> None:
+    if what == "predictive":
+        from vehiclemor.report import predictive_text
+
+        print(predictive_text.printed(rows))
+        return
     from vehiclemor.report.compare import printed
     from vehiclemor.report.costs import printed_costs
 

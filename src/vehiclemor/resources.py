@@ -6,7 +6,7 @@ from vehiclemor.errors import FileError
 
 
 def data_folder() -> Path:
-    """Folder with `parameters`, `published`, `studies` and `reference`.
+    """Folder with `parameters`, `published`, `studies`, `protocols` and `reference`.
 
     Raises
     ------

@@ -9,16 +9,16 @@ import math
 
 from vehiclemor.simulation.system_loops import error_norm, slope, slope_apart
 
-INLINED = ("hermite",)
+INLINED = ("cubic",)
 
 
-def hermite(y, new, f, f_new, h, z, dim, result):
-    """Cubic between the ends of a step of length h, at the part z of it."""
-    after = z * z * (3.0 - 2.0 * z)
-    before = 1.0 - after
-    left, right = h * z * (1.0 - z) * (1.0 - z), h * z * z * (z - 1.0)
+def cubic(y, new, f, f_new, h, dim, coefficients):
+    """Cubic in the part of a step that has passed, by values and slopes at its ends."""
     for i in range(dim):
-        result[i] = before * y[i] + after * new[i] + left * f[i] + right * f_new[i]
+        rise, before, after = new[i] - y[i], h * f[i], h * f_new[i]
+        coefficients[0, i] = before
+        coefficients[1, i] = 3.0 * rise - 2.0 * before - after
+        coefficients[2, i] = before + after - 2.0 * rise
 
 
 def frozen_solve(inverse, dim, active, b, result):
@@ -96,6 +96,7 @@ def w_method_span(
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
     f, mid, new, b, f_new = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     s0, s1, s2, s3 = stages[0], stages[1], stages[2], stages[3]
+    curve = stages[4:7]
     turns = len(turning) > 0
     slope_apart(form, t, segment, y, dim, signal, space, model, scratch, f)
     counts[0] += 1
@@ -176,9 +177,15 @@ def w_method_span(
         whole = t + 1.0001 * h <= end
         slope_apart(form, t + h, segment, new, dim, signal, space, model, scratch, f_new)
         counts[0] += 1
-        while sample < len(samples) and samples[sample] <= t + h + 1e-12 * (1.0 + abs(t)):
-            hermite(y, new, f, f_new, h, (samples[sample] - t) / h, dim, path[sample])
-            sample += 1
+        reached = t + h + 1e-12 * (1.0 + abs(t))
+        if sample < len(samples) and samples[sample] <= reached:
+            cubic(y, new, f, f_new, h, dim, curve)
+            per_step = 1.0 / h
+            while sample < len(samples) and samples[sample] <= reached:
+                z = (samples[sample] - t) * per_step
+                for i in range(dim):
+                    path[sample, i] = y[i] + z * (curve[0, i] + z * (curve[1, i] + z * curve[2, i]))
+                sample += 1
         factor = min(6.0, max(0.2, 0.9 * max(error, 1e-10) ** -exponent))
         if rejected:
             factor = min(1.0, factor)

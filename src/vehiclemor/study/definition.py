@@ -36,11 +36,13 @@ class MethodEntry(FileSchema):
 class StudyFile(FileSchema):
     """Schema of `data/studies/*.toml`.
 
-    Either a grid of one model, or a collection that names other studies.
+    Either a grid of one model, or a collection that names other studies, or protocols (see
+    `study/protocol.py`).
     """
 
     title: str
     studies: list[str] = Field(default_factory=list)
+    protocols: list[str] = Field(default_factory=list)
     model: str = ""
     maneuver: str = ""
     start: list[str] = Field(default_factory=list)
@@ -71,9 +73,11 @@ class StudyFile(FileSchema):
 
     @model_validator(mode="after")
     def _complete(self) -> "StudyFile":
-        if self.studies:
-            if self.model or self.grid or self.methods:
-                raise ValueError("a collection names studies and nothing else")
+        if self.protocols and (self.studies or self.model or self.grid or self.methods):
+            raise ValueError("a study of protocols names them and nothing else")
+        if self.studies and (self.model or self.grid or self.methods):
+            raise ValueError("a collection names studies and nothing else")
+        if self.studies or self.protocols:
             return self
         for name in ("model", "methods"):
             if not getattr(self, name):

@@ -12,7 +12,13 @@ from vehiclemor.registry import component
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
 # Layers whose source determines results; tables, figures and the command line come after them.
 LAYERS = ("models", "symbolic", "codegen", "simulation", "reduction")
-FILES = ("parameters.py", "maneuvers.py", "metrics.py", "study/execution.py")
+FILES = (
+    "parameters.py",
+    "maneuvers.py",
+    "steering_maneuvers.py",
+    "metrics.py",
+    "study/execution.py",
+)
 
 
 @cache
@@ -42,11 +48,11 @@ def machine() -> str:
 
 
 @cache
-def code_digest(model: str, method: str) -> str:
-    """Hash of the source that computes a cell.
+def code_digest(model: str, method: str, further: tuple[str, ...] = ()) -> str:
+    """Hash of the source that computes a cell, and of further files.
 
     These are the layers of this package and, for a plug-in, all of its top-level package and its
     version.  Results computed by other source are never taken for finished cells.
     """
     parts = (component("model", model), component("method", method))
-    return source_digest(LAYERS, FILES, parts)
+    return source_digest(LAYERS, (*FILES, *further), parts)

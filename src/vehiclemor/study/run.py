@@ -11,6 +11,7 @@ from vehiclemor.study.cells import Cell, Grid, expand
 from vehiclemor.study.combine import cells_digest, combined
 from vehiclemor.study.definition import load_studies
 from vehiclemor.study.execution import compute_cell
+from vehiclemor.study.predictive import run_protocols
 from vehiclemor.study.store import cell_path, prepare_folder, read_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -38,13 +39,18 @@ def run_studies(
     Returns
     -------
     dict
-        Study name -> combined dataset, stored as `studies/<name>.nc` too.
+        Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
+        is `predictive-<protocol>`.
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; it must be at least 1")
-    grids = [expand(name, definition) for name, definition in load_studies(study).items()]
+    definitions = load_studies(study)
+    protocols = [name for d in definitions.values() for name in d.protocols]
+    grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
     prepare_folder(folder)
     results: dict[str, xr.Dataset] = {}
+    if protocols:
+        results |= run_protocols(protocols, folder, jobs, progress)
     for grid in grids:
         _compute_missing(grid, folder, jobs, progress)
         results[grid.name] = _combine_and_store(grid, folder)

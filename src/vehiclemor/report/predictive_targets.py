@@ -1,0 +1,98 @@
+"""What the winner of the predictive comparison must reach, and what it has reached."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from vehiclemor.study.protocol_file import ProtocolFile, Straight, Target
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Row = dict[str, Any]
+
+
+def error_columns(protocol: ProtocolFile) -> dict[str, tuple[str, str]]:
+    """Column -> (output, measure) of the bounded outputs and those reported beside them."""
+    bounded = {
+        f"worst_{bound.measure}_{output}": (output, bound.measure)
+        for output, bound in protocol.bounds.items()
+    }
+    return bounded | {f"worst_rms_{output}": (output, "rms") for output in protocol.reported}
+
+
+def ratio(other: Row | None, row: Row) -> float:
+    """How many times the other's time a row's is; none for a row that computes nothing."""
+    return other["seconds"] / row["seconds"] if other and row["seconds"] > 0.0 else math.nan
+
+
+def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row]) -> list[Row]:
+    """What the winner must reach: bounds, ratios, and the straight line without steering."""
+    winner = next((row for row in methods if row["winner"]), None)
+    if winner is None:
+        return []
+    rows = [_bound_row(dataset, protocol, winner, output) for output in protocol.bounds]
+    stable = winner["stable_share"]
+    rows.append(_at_least("share of stable runs", 1.0, stable, winner["failure"] or "test set"))
+    if protocol.straight is not None:
+        rows.append(_straight_row(dataset, protocol.straight, winner))
+    rows += [_ratio_row(target, winner, methods) for target in protocol.targets]
+    name = {"kind": "target", "model": protocol.model, "method": winner["method"]}
+    return [name | row for row in rows]
+
+
+def _at_most(item: str, bound: float, measured: float, unit: str, reason: str) -> Row:
+    row = {"item": item, "bound": bound, "measured": measured, "unit": unit, "reason": reason}
+    return row | {"verdict": "met" if measured <= bound else "missed"}
+
+
+def _at_least(item: str, bound: float, measured: float, reason: str) -> Row:
+    row = {"item": item, "bound": bound, "measured": measured, "unit": "1", "reason": reason}
+    return row | {"verdict": "met" if measured >= bound else "missed"}
+
+
+def _bound_row(dataset: xr.Dataset, protocol: ProtocolFile, winner: Row, output: str) -> Row:
+    bound = protocol.bounds[output]
+    word = {"rms": "RMS", "max": "largest"}[bound.measure]
+    return _at_most(
+        f"worst {word} error of {output}",
+        bound.bound,
+        winner[f"worst_{bound.measure}_{output}"],
+        _unit(dataset, output),
+        f"test set; settings chosen on validation: {winner['settings']}",
+    )
+
+
+def _straight_row(dataset: xr.Dataset, straight: Straight, winner: Row) -> Row:
+    """Largest value of an output in the scenarios without steering."""
+    here = [str(s).startswith(f"{straight.maneuver},") for s in dataset["scenario"].values]
+    part = dataset.isel(scenario=here).sel(row=winner["method"], output=straight.output)
+    measured = float(part["largest_output"].max(skipna=False)) if any(here) else math.nan
+    return _at_most(
+        f"largest {straight.output} without steering",
+        straight.bound,
+        measured,
+        _unit(dataset, straight.output),
+        f"first 10 s of {straight.maneuver}, {sum(here)} runs",
+    )
+
+
+def _unit(dataset: xr.Dataset, output: str) -> str:
+    return str(dataset["output_unit"].sel(output=output).item())
+
+
+def _ratio_row(target: Target, winner: Row, methods: list[Row]) -> Row:
+    """Speed-up of the winner against a full-order row."""
+    aim = f"; the aim is {target.aim:g}" if target.aim else ""
+    if target.against == "equal accuracy":
+        other, factor = winner["equal_accuracy"], winner["ratio_equal_accuracy"]
+        if not winner["equal_accuracy_reached"]:
+            other += ", the most accurate; none is as accurate"
+    elif target.against == "within bounds":
+        other, factor = winner["within"], winner["ratio_within"]
+    else:
+        row = next(row for row in methods if row["method"] == target.against)
+        other, factor = target.against, ratio(row, winner)
+    reason = f"against {other}" if other else "no full-order row to compare with"
+    return _at_least(f"speed-up, {target.against}", target.ratio, factor, reason + aim)

@@ -1,0 +1,91 @@
+"""Scores against bounds, and the choice of settings from validation results alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.study.protocol import Contestant
+from vehiclemor.study.protocol_file import Bound
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Scores nearer to each other than this share are a tie, which the cheaper candidate wins.
+TIE = 0.05
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What the choice may know of a candidate.
+
+    Attributes
+    ----------
+    stable
+        Share of the validation scenarios whose run has the status ok.
+    score
+        Largest error of a bounded output in any validation scenario as a multiple of its bound;
+        infinite if a run has failed.
+    evaluations
+        Evaluations of the equations, mean of the validation scenarios.
+    """
+
+    stable: float
+    score: float
+    evaluations: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """A contestant with the candidate that is reported, and the validation of all candidates."""
+
+    contestant: Contestant
+    candidate: int
+    validation: tuple[Validation, ...]
+
+    @property
+    def label(self) -> str:
+        """Label of the row."""
+        return self.contestant.row_label(self.candidate)
+
+
+def validation_of(dataset: xr.Dataset, bounds: Mapping[str, Bound], count: str) -> Validation:
+    """Validation result of a candidate from its stored file.
+
+    Parameters
+    ----------
+    count
+        Name of the count of evaluations, `Model.evaluations`.
+    """
+    return Validation(
+        float(np.mean(dataset["status"].values == "ok")),
+        float(scores(dataset, bounds).max()),
+        float(dataset[count].mean()),
+    )
+
+
+def scores(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> np.ndarray:
+    """Largest error as a multiple of its bound, for every scenario (scenarios,); inf if failed."""
+    parts = [
+        dataset[f"{bound.measure}_error"].sel(output=output).values / bound.bound
+        for output, bound in bounds.items()
+    ]
+    worst = np.max(parts, axis=0)
+    return np.where((dataset["status"].values == "ok") & np.isfinite(worst), worst, np.inf)
+
+
+def choose(results: Sequence[Validation]) -> int:
+    """Number of the chosen candidate.
+
+    Among those that are stable in all validation scenarios the one with the smallest score; within
+    5 % of it the one with the fewest evaluations.  If none is stable, the one that is stable most
+    often: it is reported with its failures.
+    """
+    most = max(result.stable for result in results)
+    stable = [i for i, result in enumerate(results) if result.stable == most]
+    best = min(results[i].score for i in stable)
+    tied = [i for i in stable if results[i].score <= (1.0 + TIE) * best]
+    return min(tied, key=lambda i: (results[i].evaluations, results[i].score, i))

@@ -1,0 +1,98 @@
+"""Combined dataset of a protocol: every row on every test scenario."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.study.choice import Row, Validation
+from vehiclemor.study.protocol import Protocol
+from vehiclemor.study.provenance import machine, versions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def combined(
+    protocol: Protocol,
+    rows: Sequence[Row],
+    found: dict[str, list[xr.Dataset]],
+    timed: xr.Dataset,
+) -> xr.Dataset:
+    """Results of all rows on the dimensions `row`, `scenario` and `output`.
+
+    `scenario_set` tells which scenarios are of the test set and which lie outside; `validation` of
+    a row is the JSON list of its candidates' settings and validation results.
+    """
+    import xarray as xr
+
+    labels = [row.label for row in rows]
+    parts = [
+        xr.concat(datasets, dim="row", combine_attrs="drop").assign_coords(
+            scenario_set=("scenario", [purpose] * datasets[0].sizes["scenario"])
+        )
+        for purpose, datasets in found.items()
+    ]
+    # What does not depend on the scenario is the same in every set, but for seconds.
+    fixed = [n for n, v in parts[0].data_vars.items() if "scenario" not in v.dims]
+    rest = [part.drop_vars(fixed) for part in parts]
+    dataset = xr.concat(rest, dim="scenario", combine_attrs="drop").merge(parts[0][fixed])
+    # How the files store text holds for their own longest words only.
+    dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
+    dataset = dataset.assign_coords(row=labels)
+    online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
+    online[:, : timed.sizes["scenario"]] = timed["seconds"].values
+    per_row: dict[str, tuple[list[Any], dict[str, str]]] = {
+        "role": ([row.contestant.role for row in rows], {"long_name": "role in the protocol"}),
+        "method": ([row.contestant.method for row in rows], {"long_name": "method"}),
+        "settings": ([_settings(row) for row in rows], {"long_name": "chosen settings, JSON"}),
+        "validation": ([_validation(row) for row in rows], {"long_name": "all candidates, JSON"}),
+        "validation_score": (
+            [row.validation[row.candidate].score for row in rows],
+            {"units": "1", "long_name": "largest error in validation as a multiple of its bound"},
+        ),
+        "offline_seconds": (
+            [float(value) for value in timed["offline_seconds"]],
+            dict(timed["offline_seconds"].attrs),
+        ),
+    }
+    for name, (values, attributes) in per_row.items():
+        dataset[name] = ("row", values, attributes)
+    dataset["seconds"] = (("row", "scenario"), online, dict(timed["seconds"].attrs))
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "title": protocol.definition.title,
+        "source": "vehiclemor",
+        "references": "doi:10.1115/1.4029390",
+        "study": f"predictive-{protocol.name}",
+        "model": protocol.model.name,
+        "evaluations": protocol.model.evaluations,
+        "configuration": protocol.definition.model_dump_json(),
+        "kernel_hash": protocol.model.kernel_hash,
+        "versions": versions(),
+        "machine": machine(),
+    }
+    return dataset
+
+
+def _settings(row: Row) -> str:
+    return json.dumps(row.contestant.candidates[row.candidate], sort_keys=True)
+
+
+def _validation(row: Row) -> str:
+    """Every candidate's settings and validation result as JSON text; the chosen one is marked."""
+    pairs = zip(row.contestant.candidates, row.validation, strict=True)
+    content = [
+        {"settings": settings, "chosen": index == row.candidate, **_finite(result)}
+        for index, (settings, result) in enumerate(pairs)
+    ]
+    return json.dumps(content, sort_keys=True)
+
+
+def _finite(result: Validation) -> dict[str, float | None]:
+    """JSON has no infinity: a score that is infinite is null."""
+    return {name: value if np.isfinite(value) else None for name, value in asdict(result).items()}

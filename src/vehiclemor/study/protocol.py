@@ -1,0 +1,171 @@
+"""Protocols: training, validation and test scenarios of a model, and who competes on them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.registry import component, unknown
+from vehiclemor.resources import data_folder, data_names
+from vehiclemor.simulation.model import Model, build
+from vehiclemor.study.protocol_file import ContestantEntry, Group, ProtocolFile
+from vehiclemor.study.scenarios import Scenario, check, own_speed, same_run
+from vehiclemor.toml_files import read_toml
+
+SETS = ("training", "validation", "test", "outside")
+FULL_ORDER = "full order"
+Settings = dict[str, Value]
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """A method with the settings among which it may choose, and what it may learn from."""
+
+    label: str
+    method: str
+    role: str
+    candidates: tuple[Settings, ...]
+    training: tuple[Scenario, ...]
+
+    @property
+    def row_labels(self) -> list[str]:
+        """Labels of its rows."""
+        if self.role != FULL_ORDER:
+            return [self.label]
+        return [self.row_label(candidate) for candidate in range(len(self.candidates))]
+
+    def row_label(self, candidate: int) -> str:
+        """Label of a candidate's row; of a full-order contestant every candidate has its own."""
+        if self.role != FULL_ORDER:
+            return self.label
+        tolerance = f"{float(self.candidates[candidate].get('tolerance', 0.0)):.1e}"
+        return f"{self.label} {tolerance.replace('.0e', 'e').replace('e-0', 'e-')}"
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """A protocol file with all names resolved.
+
+    Attributes
+    ----------
+    sets
+        Name of `SETS` -> scenarios.
+    """
+
+    name: str
+    definition: ProtocolFile
+    model: Model
+    sets: dict[str, tuple[Scenario, ...]]
+    contestants: tuple[Contestant, ...]
+
+
+def load_protocol(protocol: str) -> Protocol:
+    """A protocol by the name of a file of the package's data, or by the path of a TOML file.
+
+    Raises
+    ------
+    VehiclemorError
+        If the file or anything that it names is wrong.
+    """
+    if protocol.endswith(".toml"):
+        path = Path(protocol)
+    elif protocol in data_names("protocols"):
+        path = data_folder() / "protocols" / f"{protocol}.toml"
+    else:
+        raise unknown("protocol", protocol, data_names("protocols"))
+    definition = read_toml(path, ProtocolFile)
+    try:
+        return _resolved(path.stem, definition)
+    except InputError as error:
+        raise FileError(f"{path}: {error}") from None
+
+
+def _resolved(name: str, definition: ProtocolFile) -> Protocol:
+    model = build(definition.model)
+    outputs = [*definition.bounds, *definition.reported]
+    if definition.straight:
+        outputs.append(definition.straight.output)
+    for output in outputs:
+        if output not in model.outputs:
+            raise unknown(f"output of {model.name}", output, model.outputs)
+    sets = {key: _scenarios(model, key, getattr(definition, key)) for key in SETS}
+    _check_apart(sets)
+    contestants = tuple(_contestant(model, entry, sets) for entry in definition.contestants)
+    labels = [label for contestant in contestants for label in contestant.row_labels]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise InputError(f"label {label!r} is used twice")
+    for target in definition.targets:
+        known = ["equal accuracy", "within bounds", *labels]
+        if target.against not in known:
+            raise unknown("row that a target is against", target.against, known)
+    return Protocol(name, definition, model, sets, contestants)
+
+
+def _scenarios(model: Model, key: str, groups: list[Group]) -> tuple[Scenario, ...]:
+    """Scenarios of one set, checked against the model and each once."""
+    found: list[Scenario] = []
+    for number, group in enumerate(groups, start=1):
+        speeds = group.speed or [own_speed(model)]
+        products = itertools.product(group.frequency or [1.0], group.amplitude or [1.0], speeds)
+        for point in group.points or products:
+            speed = point[2] if len(point) > 2 else own_speed(model)
+            for start in group.start or model.starts[:1]:
+                scenario = Scenario(
+                    group.maneuver,
+                    float(point[0] or 0.0),
+                    float(point[1] or 0.0),
+                    start,
+                    None if speed is None else float(speed),
+                )
+                try:
+                    check(model, scenario)
+                except InputError as error:
+                    raise InputError(f"{key}, group {number}: {error}") from None
+                found.append(scenario)
+    return tuple(found)
+
+
+def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
+    """No run stands twice: what a method has learned from or was chosen by can't test it."""
+    seen: dict[tuple, str] = {}
+    for key in SETS:
+        for scenario in sets[key]:
+            run = same_run(scenario)
+            if run in seen:
+                raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
+            seen[run] = key
+
+
+def _contestant(
+    model: Model, entry: ContestantEntry, sets: dict[str, tuple[Scenario, ...]]
+) -> Contestant:
+    method: Method = component("method", entry.method)
+    where = f"contestant {entry.label!r}"
+    candidates: list[Settings] = []
+    for given in entry.candidates:
+        settings: dict[str, object] = dict(given)
+        preset = settings.pop("preset", "recommended")
+        complete: Settings = {}
+        # A refused model is a result: settings for a model of another kind can't be judged here.
+        if method.accepts(model)[0]:
+            presets = method.presets(model)
+            if preset not in presets:
+                raise unknown(f"preset of {entry.method}", preset, presets)
+            defaults = presets[str(preset)]
+            complete = validated(entry.method, method.settings(model.kind), settings, defaults)
+        if complete in candidates and method.accepts(model)[0]:
+            raise InputError(f"{where} has the same candidate twice")
+        candidates.append(complete)
+    known = {scenario.maneuver for scenario in sets["training"]}
+    for name in entry.train_on:
+        if name not in known:
+            raise unknown(f"maneuver in the training of {where}", name, known)
+    training = tuple(
+        s for s in sets["training"] if not entry.train_on or s.maneuver in entry.train_on
+    )
+    return Contestant(entry.label, entry.method, entry.role, tuple(candidates), training)

@@ -1,0 +1,210 @@
+"""The runner of protocols: nothing is chosen by what it is tested on."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import vehiclemor as vm
+from vehiclemor.reduction import fixed_basis
+from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
+from vehiclemor.report.predictive_text import printed
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.study import predictive_timing
+from vehiclemor.study.choice import Validation, choose
+from vehiclemor.study.protocol import load_protocol
+from vehiclemor.study.run import run_studies
+from vehiclemor.study.scenarios import training_run
+from vehiclemor.study.trial_execution import reference_outputs
+
+OTHER_TEST = '[[test]]\nmaneuver = "sine_travel"\npoints = [[2.0, 0.3]]\n'
+OUTSIDE = '\n[[outside]]\nmaneuver = "sine_travel"\npoints = [[1.0, 1.5]]\n'
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _quick():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(predictive_timing, "ROUNDS", 2)
+        yield
+
+
+def study_of(folder, *texts):
+    """Study of protocols with these texts."""
+    names = []
+    for number, text in enumerate(texts):
+        path = folder / f"small{number}.toml"
+        path.write_text(text)
+        names.append(str(path))
+    study = folder / "mine.toml"
+    study.write_text(f'title = "mine"\nprotocols = {json.dumps(names)}\n')
+    return str(study)
+
+
+def files(folder, purpose=""):
+    """Content of the trials' files of a set, without seconds, by name."""
+    found = {}
+    for path in sorted((folder / "predictive").glob("*.nc")):
+        with xr.open_dataset(path) as dataset:
+            if dataset.attrs["title"].endswith(f", {purpose}" if purpose else ""):
+                found[path.name] = dataset.load()
+    return {
+        name: dataset.drop_vars(["seconds", "offline_seconds"])
+        for name, dataset in found.items()
+        if "timing" not in name
+    }
+
+
+def assert_same(one, other):
+    assert set(one) == set(other)
+    for name, dataset in one.items():
+        xr.testing.assert_identical(dataset, other[name])
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory, protocol_text):
+    """Folder, study and combined dataset of the small protocol."""
+    folder = tmp_path_factory.mktemp("predictive")
+    study = study_of(folder, protocol_text)
+    return folder, study, run_studies(study, folder)["predictive-small0"]
+
+
+def test_all_full_order_candidates_are_kept_and_one_of_every_other(done):
+    _, _, dataset = done
+    assert list(dataset["row"].values) == ["newton 1e-12", "newton 1e-6", "replay", "fixed basis"]
+    assert set(dataset["status"].values.ravel()) == {"ok"}
+    chosen = json.loads(str(dataset["settings"].sel(row="fixed basis").item()))
+    assert chosen["rank"] == 4
+    candidates = json.loads(str(dataset["validation"].sel(row="fixed basis").item()))
+    assert [c["settings"]["rank"] for c in candidates] == [1, 3, 4]
+    assert [c["chosen"] for c in candidates] == [False, False, True]
+
+
+def test_the_choice_does_not_read_the_test_set(done, tmp_path, protocol_text):
+    folder, _, dataset = done
+    head = protocol_text[: protocol_text.index("[[test]]")]
+    tail = protocol_text[protocol_text.index("[[contestants]]") :]
+    study = study_of(tmp_path, head + OTHER_TEST + OUTSIDE + tail)
+    other = run_studies(study, tmp_path)["predictive-small0"]
+    np.testing.assert_array_equal(other["settings"], dataset["settings"])
+    np.testing.assert_array_equal(other["validation"], dataset["validation"])
+    assert_same(files(folder, "validation"), files(tmp_path, "validation"))
+    assert not set(files(folder, "test")) & set(files(tmp_path, "test"))
+
+
+def test_nothing_of_the_test_set_is_simulated_before_the_choice(
+    tmp_path, protocol_text, monkeypatch
+):
+    study = study_of(tmp_path, protocol_text + OUTSIDE)
+    protocol = load_protocol(str(tmp_path / "small0.toml"))
+    hidden = [s for key in ("test", "outside") for s in protocol.sets[key]]
+    inputs = {training_run(protocol.model, s).maneuver.at(TIMES).tobytes() for s in hidden}
+    seen, trained = [], []
+    reference_outputs.cache_clear()
+
+    def recorded(function):
+        def run(self, maneuver, *arguments, **named):
+            seen.append(maneuver.at(TIMES).tobytes() in inputs)
+            return function(self, maneuver, *arguments, **named)
+
+        return run
+
+    def recorded_fit(model, training, settings, fit=fixed_basis.fit):
+        trained.extend(run.maneuver.at(TIMES).tobytes() for run in training)
+        return fit(model, training, settings)
+
+    def recorded_choice(results):
+        seen.append("choice")
+        return choose(results)
+
+    monkeypatch.setattr(AlgebraicModel, "simulate", recorded(AlgebraicModel.simulate))
+    monkeypatch.setattr(fixed_basis, "fit", recorded_fit)
+    monkeypatch.setattr("vehiclemor.study.predictive.choose", recorded_choice)
+    monkeypatch.setattr("vehiclemor.study.predictive.timing", no_timing)
+    run_studies(study, tmp_path)
+    last_choice = len(seen) - seen[::-1].index("choice")
+    assert seen[:last_choice].count(False) > 0
+    assert True not in seen[:last_choice]
+    assert True in seen[last_choice:]
+    assert trained
+    assert not inputs & set(trained)
+
+
+TIMES = np.linspace(0.0, 10.0, 101)
+
+
+def no_timing(protocol, rows, *_):
+    shape = len(rows), len(protocol.sets["test"])
+    return xr.Dataset(
+        {
+            "seconds": (("row", "scenario"), np.ones(shape)),
+            "offline_seconds": ("row", np.ones(shape[0])),
+        }
+    )
+
+
+def test_a_second_run_computes_nothing_and_processes_change_nothing(
+    done, tmp_path, protocol_text, monkeypatch
+):
+    folder, study, dataset = done
+    written = {path: path.stat().st_mtime_ns for path in (folder / "predictive").iterdir()}
+    again = run_studies(study, folder)["predictive-small0"]
+    assert {path: path.stat().st_mtime_ns for path in (folder / "predictive").iterdir()} == written
+    xr.testing.assert_identical(again, dataset)
+    monkeypatch.setattr("vehiclemor.study.predictive.timing", no_timing)
+    run_studies(study_of(tmp_path, protocol_text), tmp_path, jobs=2)
+    assert_same(files(folder), files(tmp_path))
+
+
+def test_the_best_candidate_that_is_stable_everywhere_is_chosen():
+    assert choose([Validation(0.9, np.inf, 1.0), Validation(1.0, 3.0, 9.0)]) == 1
+    assert choose([Validation(1.0, 2.0, 9.0), Validation(1.0, 3.0, 1.0)]) == 0
+    assert choose([Validation(1.0, 2.0, 9.0), Validation(1.0, 2.09, 1.0)]) == 1
+    assert choose([Validation(0.5, np.inf, 1.0), Validation(0.9, np.inf, 9.0)]) == 1
+
+
+def test_the_comparison_marks_the_winner_and_judges_it(done):
+    folder, study, _ = done
+    rows = predictive_comparison(folder, study=study)
+    methods = rows[rows["kind"] == "method"].set_index("method")
+    assert methods.index[methods["winner"].astype(bool)].tolist() == ["fixed basis"]
+    assert np.isnan(methods.loc["replay", "ratio_equal_accuracy"])
+    assert methods.loc["newton 1e-6", "equal_accuracy"] == "newton 1e-6"
+    assert methods.loc["newton 1e-6", "ratio_equal_accuracy"] == 1.0
+    full = methods[methods["role"] == "full order"]
+    won = methods.loc["fixed basis"]
+    assert won["ratio_within"] == full["seconds"].min() / won["seconds"]
+    targets = rows[rows["kind"] == "target"]
+    assert set(targets["verdict"]) <= {"met", "missed"}
+    assert "worst largest error of second_euler_angle" in set(targets["item"])
+    text = printed(rows)
+    assert "* fixed basis" in text
+    assert "newton 1e-6" in text
+    json.loads(rows.to_json(orient="records"))
+
+
+def test_a_failed_run_is_a_row_with_its_reason(done):
+    _, _, dataset = done
+    broken = dataset.assign(status=dataset["status"].astype(object).copy())
+    broken["status"].loc[{"row": "fixed basis", "scenario": dataset["scenario"][0]}] = "diverged"
+    rows = method_rows(broken, protocol_of(dataset))
+    row = next(r for r in rows if r["method"] == "fixed basis")
+    assert row["score"] == np.inf
+    assert row["stable_share"] == 0.5
+    assert row["failure"].startswith("diverged in (sine_travel, f 0.9, a 1, equilibrium)")
+
+
+def test_a_method_that_refuses_the_model_is_reported(tmp_path, protocol_text):
+    head = protocol_text[: protocol_text.index("[[contestants]]")]
+    refused = '[[contestants]]\nlabel = "mine"\nmethod = "slow_manifold"\n'
+    newton = protocol_text[protocol_text.index("[[contestants]]") :].split("\n\n", maxsplit=1)[0]
+    dataset = run_studies(study_of(tmp_path, f"{head}{newton}\n\n{refused}"), tmp_path)
+    statuses = dataset["predictive-small0"]["status"].sel(row="mine").values
+    assert set(statuses) == {"rejected"}
+
+
+def test_several_protocols_from_python(tmp_path, protocol_text):
+    end = protocol_text.index("[[contestants]]", protocol_text.index("[[contestants]]") + 1)
+    study = study_of(tmp_path, protocol_text[:end], protocol_text[:end])
+    dataset = vm.run_study(study, out=tmp_path)
+    assert set(dataset["study"].values) == {"predictive-small0", "predictive-small1"}

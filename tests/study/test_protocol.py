@@ -1,0 +1,93 @@
+"""Protocols: scenarios of the files, what they resolve to, and what the schema refuses."""
+
+import numpy as np
+import pytest
+
+from vehiclemor.errors import FileError
+from vehiclemor.reduction import replay
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.registry import component
+from vehiclemor.resources import data_names
+from vehiclemor.simulation.model import build
+from vehiclemor.study.definition import load_studies
+from vehiclemor.study.protocol import load_protocol
+from vehiclemor.study.scenarios import Scenario, same_run, start_of, training_run
+
+VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
+
+
+@pytest.fixture(scope="module")
+def protocols():
+    return {name: load_protocol(name) for name in data_names("protocols")}
+
+
+def test_the_study_names_every_protocol(protocols):
+    (study,) = load_studies("predictive").values()
+    assert sorted(study.protocols) == sorted(protocols)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_the_sets_of_a_vehicle(protocols, name):
+    sets = protocols[name].sets
+    sizes = {key: len(scenarios) for key, scenarios in sets.items()}
+    assert sizes == {"training": 24, "validation": 8, "test": 30, "outside": 3}
+    prefix = "rack_" if name == "high_fidelity_vehicle" else ""
+    nominal = Scenario(f"{prefix}lane_change", 1.0, 1.0, "equilibrium", 20.0)
+    assert nominal in sets["test"]
+    assert {s.start for s in sets["training"]} == {"equilibrium"}
+    assert {s.speed for s in sets["test"]} == {18.0, 20.0, 22.0}
+
+
+def test_no_run_stands_in_two_sets(protocols):
+    for protocol in protocols.values():
+        runs = [same_run(s) for scenarios in protocol.sets.values() for s in scenarios]
+        assert len(set(runs)) == len(runs)
+
+
+def test_another_speed_is_a_state_and_the_own_speed_a_name():
+    model = build(VEHICLES[0])
+    own = Scenario("lane_change", 1.0, 1.0, "dropped", 20.0)
+    assert start_of(model, own) == "dropped"
+    faster = start_of(model, Scenario("lane_change", 1.0, 1.0, "dropped", 26.0))
+    assert isinstance(faster, np.ndarray)
+    run = training_run(model, Scenario("lane_change", 1.0, 1.0, "equilibrium", 26.0))
+    speeds = run.at(np.array([0.0, 0.1])).outputs[:, model.outputs.index("longitudinal_speed")]
+    np.testing.assert_allclose(speeds, 26.0, rtol=1e-3)
+
+
+def test_full_order_rows_are_named_after_their_tolerances(protocols):
+    contestants = {c.label: c for c in protocols[VEHICLES[0]].contestants}
+    labels = contestants["ros34pw2"].row_labels
+    assert {"ros34pw2 2e-2", "ros34pw2 1.5e-3", "ros34pw2 1e-4"} <= set(labels)
+    assert contestants["replay"].row_labels == ["replay"]
+
+
+def test_a_contestant_may_learn_from_some_maneuvers_only(protocols):
+    for contestant in protocols[VEHICLES[1]].contestants:
+        if contestant.label == "fixed basis":
+            assert {s.maneuver for s in contestant.training} == {"rack_lane_change"}
+            assert len(contestant.training) == 14
+
+
+def test_one_run_under_two_names_is_found(tmp_path, protocol_text):
+    # Without amplitude a chirp is a sine.
+    text = protocol_text.replace("points = [[0.9, 1.0]]", "points = [[0.9, 1.0], [1.0, 0.0]]")
+    text += '\n[[outside]]\nmaneuver = "chirp_travel"\npoints = [[1.0, 0.0]]\n'
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(FileError, match=r"outside: the scenario .* is in test too"):
+        load_protocol(str(path))
+
+
+def test_replay_of_runs_of_other_lengths():
+    model = build(VEHICLES[0])
+    step, change = component("maneuver", "step_steer"), component("maneuver", "lane_change")
+    runs = [TrainingRun(model, step, "equilibrium"), TrainingRun(model, change, "equilibrium")]
+    recorded = replay.fit(model, runs, {})
+    again = recorded.simulate(change.perturbed(1.0, 1.1), "equilibrium")
+    np.testing.assert_array_equal(again.coordinates, recorded.recorded[1].coordinates)
+    sweep = component("maneuver", "sine_sweep").perturbed(1.0, 0.0)
+    held = replay.fit(model, runs[:1], {}).simulate(sweep, "equilibrium")
+    assert held.coordinates.shape == (sweep.samples, len(model.coordinates))
+    np.testing.assert_allclose(held.coordinates[:251], recorded.recorded[0].coordinates)
+    np.testing.assert_array_equal(held.coordinates[-1], held.coordinates[250])
