@@ -6,7 +6,14 @@ from types import ModuleType
 from vehiclemor.codegen.cache import load_module
 from vehiclemor.codegen.sources import source_digest
 
-LOOPS = ("system_loops", "explicit_loops", "rosenbrock_loops", "w_method_loops", "run_loops")
+LOOPS = (
+    "system_loops",
+    "explicit_loops",
+    "rosenbrock_loops",
+    "w_method_loops",
+    "stepped_loops",
+    "run_loops",
+)
 
 
 @cache

@@ -6,6 +6,7 @@ import numpy as np
 
 from vehiclemor.simulation.explicit_loops import explicit_span
 from vehiclemor.simulation.rosenbrock_loops import rosenbrock_span
+from vehiclemor.simulation.stepped_loops import stepped_span
 from vehiclemor.simulation.system_loops import (
     COORDINATES,
     derivative,
@@ -53,6 +54,8 @@ def run(
         Edges (spans + 1,) in s, and for each span its segment of the signal and its window.
     means, lifts, drops, ranks
         Windows' means (W, 2 n), bases (W, R, 2 n) by rows, projections (W, R, 2 n), dimensions (W).
+    frozen
+        0: fresh Jacobians; 1: stored inverses; 2: these, and whole steps as a kernel.
     restart
         Longest first step (s) of a span that begins at a break point of the inputs.
 
@@ -75,6 +78,12 @@ def run(
         np.empty((square, square)),
         np.empty((8, largest)),
         np.empty(largest, dtype=np.int64),
+    )
+    stepped = largest if frozen == 2 else 1
+    buffers = (
+        np.zeros(2 * stepped + 1 + inverses.shape[1] * (stepped + 3)),
+        np.empty(3 * signal[2].shape[1]),
+        np.empty(3 * stepped),
     )
     y = np.empty(largest)
     for i in range(states):
@@ -116,6 +125,30 @@ def run(
                 scratch,
                 typical,
                 vectors,
+                samples,
+                sample,
+                path,
+                counts,
+            )
+        elif frozen == 2:
+            status, t, step, sample = stepped_span(
+                form,
+                times,
+                segment,
+                y,
+                dim,
+                step,
+                limits,
+                signal,
+                space,
+                model,
+                scratch,
+                typical,
+                vectors,
+                buffers,
+                tableau,
+                ladder,
+                inverses,
                 samples,
                 sample,
                 path,

@@ -80,6 +80,8 @@ class System:
         Numbers of the states that the right-hand side depends on.
     turning
         Numbers of the heading and of the pairs of states that turn with it; may be empty.
+    stepped
+        Whether a kernel takes whole steps of the W-method, see `stepped_loops`.
     """
 
     machine: tuple[np.ndarray, np.ndarray]
@@ -88,6 +90,7 @@ class System:
     typical: np.ndarray
     active: np.ndarray
     turning: np.ndarray
+    stepped: bool = False
 
     @property
     def loops(self) -> ModuleType:
@@ -195,7 +198,7 @@ class System:
             (float(tolerance), float(longest_step or np.inf), MOST_CALLS),
             RESTART,
             tableau.arguments,
-            frozen,
+            (2 if self.stepped else 1) if frozen else 0,
             self.active if full else np.arange(spaces.ranks.max()),
             self.turning,
             LADDER,
