@@ -30,7 +30,7 @@ def regenerate_figures(
     out
         Folder of the figures.
     only
-        Names of figures; all if empty.
+        Names of figures; those of the paper if empty.
     jobs
         Number of processes for missing studies.
 
@@ -54,7 +54,9 @@ def regenerate_figures(
     for name in only:
         if name not in FIGURES:
             raise unknown("figure", name, FIGURES)
-    chosen = {name: entry for name, entry in FIGURES.items() if not only or name in only}
+    chosen = {
+        name: entry for name, entry in FIGURES.items() if (name in only if only else entry.default)
+    }
     _make_folder(out)
     needed = dict.fromkeys(study for entry in chosen.values() for study in entry.studies)
     data = {study: run_studies(study, results, jobs)[study] for study in needed}
@@ -62,7 +64,7 @@ def regenerate_figures(
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
         with plt.style.context(Path(__file__).with_name("style.mplstyle")):
-            figure = entry.draw(data)
+            figure = entry.draw({study: data[study] for study in entry.studies})
             for suffix in FORMATS:
                 path = out / f"figure-{name}.{suffix}"
                 _save(figure, path)

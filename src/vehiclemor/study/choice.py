@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Scores nearer to each other than this share are a tie, which the cheaper candidate wins.
 TIE = 0.05
+# Part of the bounds that a candidate may use up in validation.
+MARGIN = 0.5
 
 
 @dataclass(frozen=True)
@@ -80,12 +82,16 @@ def scores(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> np.ndarray:
 def choose(results: Sequence[Validation]) -> int:
     """Number of the chosen candidate.
 
-    Among those that are stable in all validation scenarios the one with the smallest score; within
-    5 % of it the one with the fewest evaluations.  If none is stable, the one that is stable most
-    often: it is reported with its failures.
+    Among those that are stable in all validation scenarios: the one with the fewest evaluations
+    whose score leaves room (`MARGIN`) to the bounds, since inputs that nobody has tried may be
+    worse; if there is none, the one with the smallest score.  If none is stable, of those that are
+    stable most often: it is reported with its failures.
     """
     most = max(result.stable for result in results)
     stable = [i for i, result in enumerate(results) if result.stable == most]
+    fitting = [i for i in stable if results[i].score <= MARGIN]
+    if fitting:
+        return min(fitting, key=lambda i: (results[i].evaluations, results[i].score, i))
     best = min(results[i].score for i in stable)
     tied = [i for i in stable if results[i].score <= (1.0 + TIE) * best]
     return min(tied, key=lambda i: (results[i].evaluations, results[i].score, i))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from vehiclemor.metrics import largest, rms
 from vehiclemor.reduction.interface import Method, Offline, ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model, build
+from vehiclemor.study.protocol import Settings
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.scenarios import Scenario, maneuver_of, start_of, training_run
 from vehiclemor.study.trials import Trial
@@ -39,16 +41,42 @@ class Fit:
         return self.reduced.offline if self.reduced else Offline(np.nan, 0)
 
 
+# How a fitted model is integrated: candidates that differ in these alone are fitted once.
+ONLINE = ("solver", "tolerance")
+
+
 def fit(model: Model, trial: Trial) -> Fit:
-    """Fit a candidate on its training scenarios, and on nothing else."""
+    """Fit a candidate on its training scenarios, and on nothing else; kept for its next trial."""
     method: Method = component("method", trial.method)
+    online = {name: value for name, value in trial.settings.items() if name in ONLINE}
+    declared = method.settings(model.kind)
+    common = trial.settings | {name: declared[name].default for name in online}
+    fitted = _kept(trial.model, trial.method, json.dumps(common, sort_keys=True), trial.training)
+    if fitted.reduced is None:
+        return fitted
+    if not all(hasattr(fitted.reduced, name) for name in online):
+        return fresh_fit(model, trial.method, trial.settings, trial.training)
+    changed: Any = fitted.reduced
+    return Fit(replace(changed, **online) if online else changed)
+
+
+@lru_cache(maxsize=64)
+def _kept(model: str, method: str, settings: str, training: tuple[Scenario, ...]) -> Fit:
+    return fresh_fit(model_of(model), method, json.loads(settings), training)
+
+
+def fresh_fit(
+    model: Model, method_name: str, settings: Settings, training: Sequence[Scenario]
+) -> Fit:
+    """Fit a method; a failure is recorded."""
+    method: Method = component("method", method_name)
     accepted, reason = method.accepts(model)
     if not accepted:
         return Fit(None, "rejected", reason)
     try:
-        method.check(model, trial.settings)
-        runs = [training_run(model, scenario) for scenario in trial.training]
-        return Fit(method.fit(model, runs, trial.settings))
+        method.check(model, settings)
+        runs = [training_run(model, scenario) for scenario in training]
+        return Fit(method.fit(model, runs, settings))
     except Exception as error:  # noqa: BLE001 - a failure is a result, not the end of the study
         return Fit(None, *_failure(error))
 
