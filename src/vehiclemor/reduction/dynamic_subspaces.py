@@ -201,7 +201,16 @@ def fit_windows(
         Window edges (windows + 1,) in s.
     settings
         Validated `DYNAMIC_SETTINGS`.
+
+    Raises
+    ------
+    InputError
+        If the training runs differ in duration.
     """
+    durations = sorted({run.maneuver.duration for run in training})
+    if len(durations) > 1:
+        lengths = ", ".join(f"{duration:g}" for duration in durations)
+        raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
     began = time.perf_counter()
     count, formulation = int(settings["snapshots"]), str(settings["formulation"])
     moments = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])

@@ -17,6 +17,9 @@ from vehiclemor.simulation.spaces import whole_space
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
+# Step of the reduced coordinates in differences.
+DIFFERENCE = 1e-6
+
 
 @dataclass(frozen=True)
 class Transient:
@@ -86,6 +89,16 @@ class ReducedVehicle:
     def effective_rank(self) -> int:
         """Number of integrated states, heading and place included."""
         return self.features.states + PLANAR
+
+    @cached_property
+    def growth_rate(self) -> float:
+        """Largest real part (1/s) of the eigenvalues at straight running; not of heading, place."""
+        k = self.features.states
+        steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
+        no_input = np.zeros((2 * k, self.features.inputs))
+        rates = self.features.at(steps, no_input, self.parameters) @ self.coefficients[:, :k]
+        jacobian = (rates[:k] - rates[k:]).T / (2.0 * DIFFERENCE)
+        return float(np.linalg.eigvals(jacobian).real.max())
 
     @cached_property
     def system(self) -> System:

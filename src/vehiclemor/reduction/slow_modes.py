@@ -114,6 +114,6 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
 
 
 def _apart(values: np.ndarray) -> np.ndarray:
-    """Eigenvalues that are no members of a cluster: those of stabilised constraints are no motion."""
+    """Eigenvalues outside of clusters: those of stabilised constraints are no motion."""
     distance = np.abs(values[:, None] - values[None, :]) + 1e9 * np.eye(len(values))
     return distance.min(axis=1) > 1e-2

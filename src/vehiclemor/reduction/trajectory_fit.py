@@ -1,10 +1,11 @@
 """Coefficients of a reduced vehicle improved on whole trajectories (Gauss-Newton).
 
 A fit of rates leaves small errors that add up along a run: a heading that is off by 1e-4 rad is a
-lateral position that is off by 1 cm after 5 s.  So the coefficients are changed to bring the reduced
-runs themselves nearer to the training runs.  The sensitivities of a run follow from its variational
-equations, solved at the output times (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential
-Equations I (2nd ed., Springer 1993), section I.14); steps are damped after Levenberg and Marquardt.
+lateral position that is off by 1 cm after 5 s.  So the coefficients are changed to bring the
+reduced runs themselves nearer to the training runs.  The sensitivities of a run follow from its
+variational equations, solved at the output times (E. Hairer, S. Norsett, G. Wanner, Solving
+Ordinary Differential Equations I (2nd ed., Springer 1993), section I.14); steps are damped after
+Levenberg and Marquardt.
 """
 
 from __future__ import annotations

@@ -27,8 +27,9 @@ SMALLEST_TOLERANCE = 1e-13
 MOST_CALLS = 100_000
 # First step (s) of a frozen-Jacobian run after a break point of the inputs.
 RESTART = 0.05
-# Step sizes (s) for which inverses are stored.
-LADDER = 2.0 ** (0.5 * np.arange(-32, 7))
+# Step sizes (s) for which inverses are stored.  Where a step and its rung differ more, its error
+# grows and steps are rejected.
+LADDER = 2.0 ** (0.125 * np.arange(-128, 25))
 REASONS = {
     1: f"more than {MOST_CALLS} evaluations of the right-hand side",
     2: "a state is not finite",

@@ -106,6 +106,7 @@ def w_method_span(
         if not size <= 1e-10:
             step = 0.01 / size
     rejected = False
+    rung = len(ladder) // 2
     while t < end - 1e-12 * (1.0 + abs(end)):
         if counts[0] > most_calls:
             return 1, t, step, sample
@@ -117,7 +118,9 @@ def w_method_span(
             h = 0.5 * (end - t)
         if not h > 1e-14 * (1.0 + abs(t)):
             return 4, t, step, sample
-        rung = 0
+        # The smallest that is not below the step, sought from the one before.
+        while rung > 0 and ladder[rung - 1] >= 0.999 * h:
+            rung -= 1
         while rung < len(ladder) - 1 and ladder[rung] < 0.999 * h:
             rung += 1
         inverse = inverses[rung]

@@ -1,0 +1,166 @@
+"""Linear methods for vehicles: right where the vehicle is linear, and no better than promised."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from tests.reducing import fitted
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import (
+    lane_change,
+    rack_lane_change,
+    rack_straight_ahead,
+    straight_ahead,
+)
+from vehiclemor.reduction.balanced_truncation import balanced, lateral_system
+from vehiclemor.reduction.linear_single_track import single_track
+from vehiclemor.reduction.modal_truncation import lateral_modes, truncated
+from vehiclemor.reduction.vehicle_shape import VehicleShape
+
+VEHICLES = {
+    "independent_suspension_vehicle": (lane_change, straight_ahead),
+    "high_fidelity_vehicle": (rack_lane_change, rack_straight_ahead),
+}
+EVERY_MODE = {"modal_truncation": {"fastest": 1e4}, "balanced_truncation": {"rank": 10}}
+FOUR = {"modal_truncation": {"fastest": 45.0}, "balanced_truncation": {"rank": 4}}
+EXACT = {"solver": "explicit", "tolerance": 1e-9}
+
+
+@pytest.fixture(scope="module", params=VEHICLES)
+def shape(request):
+    return VehicleShape(vm.model(request.param))
+
+
+@cache
+def small_lane_change(name, amplitude):
+    return VEHICLES[name][0].perturbed(1.0, amplitude)
+
+
+@cache
+def full_order_outputs(model, maneuver):
+    return model.simulate(maneuver, model.starts[0], tolerance=1e-9).outputs
+
+
+def relative_errors(shape, method, amplitude, **settings):
+    """Relative RMS errors of yaw rate and lateral position in a small lane change."""
+    model = shape.model
+    maneuver = small_lane_change(model.name, amplitude)
+    true = full_order_outputs(model, maneuver)
+    reduced = fitted(model, maneuver, method, **EXACT, **settings)
+    error = reduced.simulate(maneuver, model.starts[0]).outputs - true
+    columns = [model.outputs.index(name) for name in ("yaw_rate", "lateral_position")]
+    return np.linalg.norm(error[:, columns], axis=0) / np.linalg.norm(true[:, columns], axis=0)
+
+
+def transfer(a, b, c, frequency):
+    return c @ np.linalg.solve(1j * frequency * np.eye(len(a)) - a, b)
+
+
+def steady_turn(shape):
+    """Yaw rate per steering of the whole linearised model; the speed's zero eigenvalue is cut."""
+    linear = shape.linearised
+    return linear.motion_a[0] @ -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
+
+
+@pytest.mark.parametrize("method", EVERY_MODE)
+def test_all_lateral_modes_give_the_vehicle_at_small_amplitude(shape, method):
+    errors = relative_errors(shape, method, 0.01, **EVERY_MODE[method])
+    assert (errors < 1e-3).all()
+    # What is left is the vehicle's nonlinearity: the tires' least power beyond the linear term.
+    smaller = relative_errors(shape, method, 0.001, **EVERY_MODE[method])
+    assert (smaller < np.maximum(0.5 * errors, 1e-4)).all()
+
+
+@pytest.mark.parametrize("method", EVERY_MODE)
+def test_four_states_are_worse_than_all_and_still_near(shape, method):
+    few = relative_errors(shape, method, 0.001, **FOUR[method])
+    every = relative_errors(shape, method, 0.001, **EVERY_MODE[method])
+    assert few[0] > every[0]
+    assert (few < 0.02).all()
+
+
+def test_single_track_lacks_roll_but_not_the_lane_change(shape):
+    yaw_rate, lateral_position = relative_errors(shape, "linear_single_track", 0.01)
+    assert yaw_rate < 0.1
+    assert lateral_position < 0.01
+
+
+def test_single_track_corners_as_the_linearised_vehicle(shape):
+    car = single_track(shape)
+    turn = -np.linalg.solve(car.a, car.b)[1]
+    assert turn == pytest.approx(steady_turn(shape), rel=1e-7)
+
+
+def test_single_track_at_another_speed_is_that_vehicle_condensed(shape):
+    faster = VehicleShape(vm.model(shape.model.name, {"initial_speed": 30.0}))
+    car = single_track(shape)
+    predicted = car.tire * shape.speed / 30.0 + np.array([[0.0, -30.0], [0.0, 0.0]])
+    np.testing.assert_allclose(single_track(faster).a, predicted, rtol=1e-3, atol=1e-3)
+
+
+def test_steering_without_its_derivatives_drives_lateral_modes_alone(shape):
+    linear, lateral = shape.linearised, lateral_modes(shape)
+    drive = sum(np.linalg.matrix_power(linear.a, j) @ b for j, b in enumerate(linear.b.T))
+    gap = drive - lateral.right @ lateral.b
+    assert np.linalg.norm(gap) < 1e-6 * np.linalg.norm(drive)
+
+
+def test_static_correction_keeps_steady_cornering(shape):
+    kept = truncated(lateral_modes(shape), 20.0, static=True)
+    moved = kept.follow[:, 0] - kept.right @ np.linalg.solve(kept.a, kept.b)
+    assert shape.linearised.motion_a[0] @ moved == pytest.approx(steady_turn(shape), rel=1e-5)
+
+
+def test_modes_kept_bring_the_yaw_rate_nearer(shape):
+    every = lateral_modes(shape)
+
+    def yaw_rate(lateral, frequency):
+        response = transfer(lateral.a, lateral.b, lateral.right, frequency) + lateral.follow[:, 0]
+        return shape.linearised.motion_a[0] @ response
+
+    def error(fastest):
+        kept = truncated(every, fastest, static=True)
+        # As of the sine sweep, in rad/s.
+        return max(abs(yaw_rate(kept, w) - yaw_rate(every, w)) for w in np.linspace(0.5, 10, 20))
+
+    assert error(20.0) > error(45.0) > error(200.0)
+
+
+def test_balanced_truncation_keeps_its_bound(shape):
+    a, b, c = lateral_system(shape, lateral_modes(shape))
+    frequencies = np.concatenate([[0.0], np.geomspace(0.1, 1e4, 200)])
+    errors = []
+    for rank in range(1, len(a)):
+        kept = balanced(a, b, c, rank)
+        np.testing.assert_allclose(kept.left @ kept.right, np.eye(rank), atol=1e-6)
+        small = kept.left @ a @ kept.right, kept.left @ b, c @ kept.right
+        assert np.linalg.eigvals(small[0]).real.max() < 0.0
+        gaps = [transfer(a, b, c, w) - transfer(*small, w) for w in frequencies]
+        errors.append(max(np.linalg.norm(gap, 2) for gap in gaps))
+        # Twice the sum of what is dropped; the second term is rounding.
+        assert errors[-1] <= 2.0 * kept.hankel[rank:].sum() + 1e-9 * kept.hankel[0]
+    assert errors[5] < 0.01 * errors[1]
+
+
+@pytest.mark.parametrize("method", ["linear_single_track", *EVERY_MODE])
+def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method):
+    model = vm.model(shape.model.name)
+    maneuver = VEHICLES[model.name][1]
+    start = vm.model(model.name, {"initial_speed": 22.0}).start(model.starts[0])
+    reduced = fitted(model, maneuver, method, **EVERY_MODE.get(method, {}))
+    trajectory = reduced.simulate(maneuver, start)
+    outputs = dict(zip(model.outputs, trajectory.outputs.T, strict=True))
+    assert np.abs(outputs["lateral_position"]).max() < 1e-8
+    assert outputs["longitudinal_position"][-1] == pytest.approx(22.0 * trajectory.time[-1])
+    assert reduced.growth_rate == 0.0
+    assert reduced.offline.evaluations == 2 * (len(shape.kept) + len(model.inputs))
+
+
+def test_too_few_or_too_many_states_are_refused(shape):
+    maneuver = VEHICLES[shape.model.name][0]
+    with pytest.raises(InputError, match="no mode that steering moves"):
+        fitted(shape.model, maneuver, "modal_truncation", fastest=1.0)
+    with pytest.raises(InputError, match="rank is 11, but steering moves 10"):
+        fitted(shape.model, maneuver, "balanced_truncation", rank=11)
