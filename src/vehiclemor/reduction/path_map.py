@@ -21,6 +21,7 @@ from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
+from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.map_kernels import checked_inputs, map_module
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
@@ -93,10 +94,8 @@ class PathMapModel:
         fixed = (self.centre, self.scale, limits, self.coefficients, path)
         # Compile, or load machine code, outside of the time that is measured.
         run(inputs[:0], *fixed)
-        began = time.perf_counter()
-        status, sample = run(inputs, *fixed)
-        seconds = time.perf_counter() - began
         counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
+        (status, sample), seconds = timed(lambda: run(inputs, *fixed), counts)
         trajectory = model.trajectory(times, inputs, path, counts, seconds)
         if status == 0:
             return trajectory

@@ -25,6 +25,7 @@ from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
+from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.map_kernels import (
     checked_inputs,
     derivatives,
@@ -138,9 +139,7 @@ class PolynomialResidualModel:
         run = self._loops().reduced_path
         # Compile, or load machine code, outside of the time that is measured.
         run(inputs[:0], *arguments)
-        began = time.perf_counter()
-        status, sample = run(inputs, *arguments)
-        seconds = time.perf_counter() - began
+        (status, sample), seconds = timed(lambda: run(inputs, *arguments), counts)
         failure = None if status == 0 else (status, sample)
         return model.trajectory(times, inputs, path, counts, seconds, failure)
 

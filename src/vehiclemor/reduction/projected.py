@@ -17,6 +17,7 @@ from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.windows import first_samples
 from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
@@ -121,9 +122,8 @@ class ProjectedModel:
             path,
             counts,
         )
-        began = time.perf_counter()
-        status, sample = model.kernels.projected_path(*arguments)
-        seconds = time.perf_counter() - began
+        loop = model.kernels.projected_path
+        (status, sample), seconds = timed(lambda: loop(*arguments), counts)
         failure = None if status == 0 else (status, sample)
         return model.trajectory(times, inputs, path, counts, seconds, failure)
 

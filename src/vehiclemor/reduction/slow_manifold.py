@@ -51,8 +51,9 @@ _SETTINGS = {
     "nonlinearity": Setting(
         "text",
         "quintic",
-        "of the lateral terms: cubic; quintic in slip angles too; sliding: and |slip| slip terms",
-        choices=("cubic", "quintic", "sliding"),
+        "of the lateral terms: cubic; quintic in slip angles too; sliding: and |slip| slip terms; "
+        "rich: and cubic terms that change with the speed",
+        choices=("cubic", "quintic", "sliding", "rich"),
     ),
     "ridge": Setting("number", 1e-10, "weight of the coefficients' size in the fit", minimum=0.0),
     "refits": Setting("integer", 2, "how often the heading is fitted on reduced runs", minimum=0),
@@ -224,10 +225,12 @@ def _feature_table(
     odd += monomials(v, 3)
     if settings["nonlinearity"] != "cubic":
         odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
-    if settings["nonlinearity"] == "sliding":
+    if settings["nonlinearity"] in {"sliding", "rich"}:
         slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
         odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
         odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
+    if settings["nonlinearity"] == "rich":
+        odd += [f"m * {term}" for term in monomials(v, 3)]
     even = ["1.0", f"z{k}", *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]

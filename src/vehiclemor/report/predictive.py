@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.report.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive_targets import Row, error_columns, ratio, target_rows
 from vehiclemor.study.choice import scores
 from vehiclemor.study.protocol import FULL_ORDER
@@ -30,7 +31,8 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
         `kind` tells what a row is.  `method`: one contestant on the test set, with the columns of
         `method_rows`.  `outside`: its errors in one scenario outside of the training range.
         `target`: what the winner must reach, with `bound`, `measured`, `unit`, `verdict` (`met`
-        or `missed`) and `reason`.  Errors `worst_<measure>_<output>` are in SI units.
+        or `missed`) and `reason`.  `paper`: POD at the paper's rank and control period, see
+        `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
     """
     import pandas as pd
 
@@ -40,6 +42,8 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
         methods = method_rows(dataset, protocol)
         rows += methods + outside_rows(dataset, protocol)
         rows += target_rows(dataset, protocol, methods)
+    if study == STUDY:
+        rows += paper_terms_rows(folder)
     return pd.DataFrame(rows)
 
 

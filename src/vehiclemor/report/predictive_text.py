@@ -6,6 +6,8 @@ import math
 import textwrap
 from typing import TYPE_CHECKING, Any
 
+from vehiclemor.report.paper_terms import printed_terms
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -30,6 +32,8 @@ LEGEND = (
 def printed(rows: pd.DataFrame) -> str:
     """All models: methods on the test set, scenarios outside of the training range, targets."""
     records: list[Row] = [dict(row) for row in rows.to_dict(orient="records")]
+    paper = _of_kind(records, "paper")
+    records = [row for row in records if row["kind"] != "paper"]
     lines = ["Reduced models on inputs that they have not seen.", *LEGEND]
     for model in dict.fromkeys(row["model"] for row in records):
         part = [row for row in records if row["model"] == model]
@@ -37,6 +41,7 @@ def printed(rows: pd.DataFrame) -> str:
         lines += ["", str(model), *_methods(_of_kind(part, "method"), columns)]
         lines += _outside(_of_kind(part, "outside"), columns)
         lines += _targets(_of_kind(part, "target"))
+    lines += printed_terms(paper) if paper else []
     verdicts = [row["verdict"] for row in records]
     lines += ["", ", ".join(f"{verdicts.count(v)} {v}" for v in ("met", "missed"))]
     return "\n".join(lines)

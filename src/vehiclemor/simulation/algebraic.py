@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -28,6 +27,7 @@ from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation import newton_loops, projected_loops
 from vehiclemor.simulation.checks import check_inputs, checked_array
+from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.reach import reachable_range
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
@@ -246,20 +246,16 @@ class AlgebraicModel:
         settings = (tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
         if solver in ("newton", "newton_dense"):
             dense = solver == "newton_dense"
-            began = time.perf_counter()
-            status, sample = self.kernels.newton_path(
-                self.design, u_start, inputs, self.constants, dense, *settings
-            )
+            arguments = (self.design, u_start, inputs, self.constants, dense, *settings)
+            loop = self.kernels.newton_path
         elif solver != "chord":
             raise unknown("solver", solver, SOLVERS)
         else:
             inverse_t = np.linalg.inv(self.jacobian(self.design, u_start)).T.copy()
             counts[2] = 1
-            began = time.perf_counter()
-            status, sample = self.kernels.chord_path(
-                self.design, u_start, inputs, self.constants, inverse_t, *settings
-            )
-        seconds = time.perf_counter() - began
+            arguments = (self.design, u_start, inputs, self.constants, inverse_t, *settings)
+            loop = self.kernels.chord_path
+        (status, sample), seconds = timed(lambda: loop(*arguments), counts)
         if status != newton_loops.CONVERGED:
             low, high = self.reach(float(inputs[sample, 1]))
             raise ConvergenceError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
@@ -14,6 +13,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import system_loops
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
+from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.compiled_loops import loops_module
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
 from vehiclemor.simulation.signals import signal_of
@@ -130,9 +130,7 @@ class System:
             edges, one = np.array([0.0, 1e-9]), np.zeros(1, dtype=np.int64)
             copies = path.copy(), counts.copy()
             self.loops.run(*arguments[:3], edges, one, one, *arguments[6:-2], *copies)
-        began = time.perf_counter()
-        status, reached = self.loops.run(*arguments)
-        seconds = time.perf_counter() - began
+        (status, reached), seconds = timed(lambda: self.loops.run(*arguments), counts)
         failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
         return Run(sampled, path, counts, seconds, failure)
 

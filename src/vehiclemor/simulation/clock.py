@@ -1,0 +1,49 @@
+"""Time that a compiled loop takes; measured several times over where a study of times asks for it.
+
+Between two runs of a comparison Python does other work, which throws the loop's code and data out
+of the caches: a run of 50 microseconds then takes 200.  A user who runs a model again and again
+finds them warm.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+Result = TypeVar("Result")
+_repeats = ContextVar("repeats", default=1)
+
+
+@contextmanager
+def repeated(times: int) -> Iterator[None]:
+    """Within it every run is done so many times, and its seconds are the median of all but one.
+
+    The first of them warms the caches.
+    """
+    token = _repeats.set(times)
+    try:
+        yield
+    finally:
+        _repeats.reset(token)
+
+
+def timed(run: Callable[[], Result], counts: np.ndarray) -> tuple[Result, float]:
+    """Result of a run, and its seconds.
+
+    Parameters
+    ----------
+    run
+        Writes the same each time, but for what it adds to its counts.
+    counts
+        Set back before each time.
+    """
+    initial, seconds = counts.copy(), []
+    for _ in range(_repeats.get()):
+        counts[:] = initial
+        began = perf_counter()
+        result = run()
+        seconds.append(perf_counter() - began)
+    return result, float(np.median(seconds[1:] or seconds))
