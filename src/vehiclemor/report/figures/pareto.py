@@ -50,7 +50,7 @@ def figure_pareto(results: Mapping[str, xr.Dataset]) -> Figure:
         seconds = row["seconds"]
         if not np.isfinite(seconds):
             continue
-        label = f"{row['method']}, {row['rank']} states"
+        label = f"{row['method']}, r = {row['rank']}"
         label += " (fails)" if failed else ""
         axis.loglog(
             seconds * 1e6,
