@@ -11,7 +11,7 @@ from vehiclemor.reduction import fixed_basis
 from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
 from vehiclemor.report.predictive_text import printed
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.study import predictive_timing
+from vehiclemor.study import predictive_timing, trial_execution
 from vehiclemor.study.choice import Validation, choose
 from vehiclemor.study.protocol import load_protocol
 from vehiclemor.study.run import run_studies
@@ -101,6 +101,8 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     inputs = {training_run(protocol.model, s).maneuver.at(TIMES).tobytes() for s in hidden}
     seen, trained = [], []
     reference_outputs.cache_clear()
+    # What an earlier test has fitted would not be fitted again.
+    trial_execution._kept.cache_clear()
 
     def recorded(function):
         def run(self, maneuver, *arguments, **named):

@@ -65,7 +65,7 @@ def _strongest(tolerance: float) -> dict[str, dict[str, Value]]:
 PRESETS_BY_KIND: dict[str, dict[str, dict[str, Value]]] = {
     "ae": {"recommended": {}, "strongest": {"solver": "chord", "tolerance": 1e-6}},
     "ode": _strongest(3e-3),
-    "dae": _strongest(1.5e-3),
+    "dae": _strongest(7e-4),
 }
 
 

@@ -43,7 +43,7 @@ class Transient:
     def at(self, times: np.ndarray, deviation: np.ndarray) -> np.ndarray:
         """Shapes (samples, n) to be added, for the start's deviation (n,)."""
         amplitudes = self.left @ deviation
-        return (np.exp(np.outer(times, self.rates)) * amplitudes @ self.right).real
+        return np.real(np.exp(np.outer(times, self.rates)) * amplitudes @ self.right)
 
 
 NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))

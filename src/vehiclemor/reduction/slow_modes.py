@@ -76,7 +76,7 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     steers = controlled > CONTROLLED * controlled.max()
     still = int(np.argmin(np.abs(values)))
     rows, columns = [], []
-    chosen = np.flatnonzero(steers & (np.abs(values) <= fastest) & (values.imag >= 0.0))
+    chosen = np.flatnonzero(steers & (np.abs(values) <= fastest) & (np.imag(values) >= 0.0))
     for i in sorted(chosen, key=lambda i: abs(values[i])):
         if i == still or abs(values[i]) < STILL:
             continue
@@ -97,9 +97,9 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.motion_a[1] @ right[:, still].real
     quiet = np.flatnonzero(
-        ~steers & (values.imag >= 0.0) & (np.arange(len(values)) != still) & _apart(values)
+        ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & _apart(values)
     )
-    double = np.where(values[quiet].imag > 0.0, 2.0, 1.0)
+    double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
     return SlowModes(
         rates,
         w,

@@ -41,9 +41,11 @@ def timed(run: Callable[[], Result], counts: np.ndarray) -> tuple[Result, float]
         Set back before each time.
     """
     initial, seconds = counts.copy(), []
-    for _ in range(_repeats.get()):
-        counts[:] = initial
+    while True:
         began = perf_counter()
         result = run()
         seconds.append(perf_counter() - began)
+        if len(seconds) >= _repeats.get():
+            break
+        counts[:] = initial
     return result, float(np.median(seconds[1:] or seconds))
