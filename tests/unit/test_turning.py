@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
-from vehiclemor.simulation.rosenbrock_loops import turn
+from vehiclemor.simulation.w_method_loops import turn
 
 # Place of the heading, then pairs of places.
 TURNING = np.array([2, 0, 1, 6, 4])
