@@ -24,7 +24,7 @@ FULL = {
     "explicit 1e-6": ("explicit", 1e-6),
     "explicit 1e-3": ("explicit", 1e-3),
     "RODAS4 1e-4": ("rodas4", 1e-4),
-    "ROS34PW2 1.5e-3, one Jacobian": ("ros34pw2", 1.5e-3),
+    "ROS34PW2 7e-4, one Jacobian": ("ros34pw2", 7e-4),
 }
 METHODS = {
     "pod r=1": ("pod", "recommended", {"rank": 1}),

@@ -20,7 +20,7 @@ FULL = {
     "explicit 1e-6": ("explicit", 1e-6),
     "explicit 1e-3": ("explicit", 1e-3),
     "RODAS4 1e-4": ("rodas4", 1e-4),
-    "ROS34PW2 3e-3, one Jacobian": ("ros34pw2", 3e-3),
+    "ROS34PW2 2e-3, one Jacobian": ("ros34pw2", 2e-3),
 }
 METHODS = {
     "pod r=3": ("pod", "recommended", {"rank": 3}),

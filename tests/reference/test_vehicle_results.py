@@ -42,7 +42,7 @@ def test_errors_floors_and_counts(reference, now):
         for name in COUNTS:
             bound = COUNT_TOLERANCE * expected[name] + 2
             assert abs(found[name] - expected[name]) <= bound, (run, name)
-        # Tolerances of the integrators: 1e-6, and 3e-3 for the W-method.
+        # Tolerances of the integrators: 1e-6, and that of the preset for the W-method.
         np.testing.assert_allclose(found["last"], expected["last"], rtol=0, atol=2e-3, err_msg=run)
         for kind in ("rms_error", "floor_rms_error"):
             np.testing.assert_allclose(

@@ -64,7 +64,7 @@ def _strongest(tolerance: float) -> dict[str, dict[str, Value]]:
 # found stands beside it.
 PRESETS_BY_KIND: dict[str, dict[str, dict[str, Value]]] = {
     "ae": {"recommended": {}, "strongest": {"solver": "chord", "tolerance": 1e-6}},
-    "ode": _strongest(3e-3),
+    "ode": _strongest(2e-3),
     "dae": _strongest(7e-4),
 }
 
