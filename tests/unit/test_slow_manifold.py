@@ -186,7 +186,8 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(
     k = reduced.features.states - 1
     z = np.random.default_rng(2).normal(size=(50, k + 1)) * 1e3
     z[:, k] = 5.0
-    columns = reduced.features.at(z, np.zeros((50, 1)), reduced.parameters)
+    assert reduced.lifted_features is not None
+    columns = reduced.lifted_features.at(z, np.zeros((50, 1)), reduced.parameters)
     # Cubic, quintic and even terms of arguments in [-1, 1].
     cubic = columns[:, 3 * (k + 1) : 3 * (k + 1) + 35]
     assert np.abs(cubic).max() <= 1.0 + 1e-9

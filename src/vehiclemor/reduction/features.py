@@ -20,11 +20,8 @@ import numpy as np
 from vehiclemor.codegen.cache import load_module
 from vehiclemor.codegen.link import kernels_source
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.simulation.rosenbrock_methods import ROS34PW2
+from vehiclemor.reduction.feature_kernels import PLANAR, diagonal_blocks, kernel_text
 from vehiclemor.simulation.system import System
-
-# After the reduced coordinates z come heading and place.
-PLANAR = 3
 
 
 @dataclass(frozen=True)
@@ -42,6 +39,9 @@ class Features:
         Expression of each feature.
     groups
         (numbers of features, columns of C) of each block of C that is not zero; all if empty.
+    diagonal
+        Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
+        Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
     """
 
     states: int
@@ -49,6 +49,7 @@ class Features:
     lines: tuple[tuple[str, str], ...]
     terms: tuple[str, ...]
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
+    diagonal: tuple[int, ...] = ()
 
     @property
     def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
@@ -66,80 +67,6 @@ class Features:
             values[name] = eval(expression, {"__builtins__": {}}, values)  # noqa: S307
         columns = [eval(term, {"__builtins__": {}}, values) for term in self.terms]  # noqa: S307
         return np.column_stack([np.broadcast_to(column, len(z)) for column in columns])
-
-    def kernels(self, parameters: int) -> str:
-        """Source of the kernels of the reduced vehicle; constants are parameters, then C.
-
-        Parameters
-        ----------
-        parameters
-            Number of parameters.
-        """
-        k = self.states + PLANAR
-        lines = [f"y{i} = _x[{i}]" for i in range(k)] + self._inputs_at(0)
-        lines += self._rates("y", "", parameters)
-        lines += [f"_result[{i}] = rate_{i}" for i in range(k)]
-        return _function("derivative", lines) + "\n" + self._step(parameters)
-
-    def _inputs_at(self, first: int) -> list[str]:
-        return [f"u{i} = _u[{first + i}]" for i in range(self.inputs)]
-
-    def _rates(self, state: str, mark: str, parameters: int) -> list[str]:
-        """Assignments of `rate{mark}_i` for states named `{state}i` and inputs `u0, u1, ...`."""
-        k = self.states
-        body = [f"z{i} = {state}{i}" for i in range(k)]
-        body += [f"{name} = {_constants(text)}" for name, text in self.lines]
-        first = parameters
-        sums: dict[int, list[str]] = {}
-        for b, (terms, columns) in enumerate(self.blocks):
-            names = ", ".join(f"t{b}_{i}" for i in columns)
-            factors = ", ".join(_constants(self.terms[j]) for j in terms)
-            body.append(f"({names},) = weighted_sums(_constants, {first}, ({factors},))")
-            first += len(terms) * padded(len(columns))
-            for i in columns:
-                sums.setdefault(i, []).append(f"t{b}_{i}")
-        totals = [" + ".join(sums.get(i, ["0.0"])) for i in range(k + PLANAR)]
-        body += [f"rate{mark}_{i} = {totals[i]}" for i in range(k + 1)]
-        body += [f"forward = {totals[k + 1]}", f"sideward = {totals[k + 2]}"]
-        body += [f"sine, cosine = sincos_one({state}{k})"]
-        body += [f"rate{mark}_{k + 1} = forward * cosine - sideward * sine"]
-        body += [f"rate{mark}_{k + 2} = forward * sine + sideward * cosine"]
-        return body
-
-    def _step(self, parameters: int) -> str:
-        """A whole step of the W-method without a loop, see `stepped_loops`."""
-        dim, method = self.states + PLANAR, ROS34PW2
-        active = dim - 2
-        lines = [f"y{i} = _x[{i}]" for i in range(dim)]
-        lines += [f"rate0_{i} = _x[{dim + i}]" for i in range(dim)]
-        lines += [f"h = _x[{2 * dim}]", f"scale = {float(method.gamma)!r} * h"]
-        for stage in range(4):
-            if stage:
-                for i in range(dim):
-                    parts = [f"{float(method.a[stage, j])!r} * s{j}_{i}" for j in range(stage)]
-                    lines.append(f"m{i} = y{i} + {' + '.join(parts)}")
-                lines += self._inputs_at((stage - 1) * self.inputs)
-                lines += self._rates("m", str(stage), parameters)
-            for i in range(dim):
-                parts = [
-                    f"{float(method.gamma * method.c[stage, j])!r} * s{j}_{i}" for j in range(stage)
-                ]
-                lines.append(f"b{i} = " + " + ".join([f"scale * rate{stage}_{i}", *parts]))
-            names = ", ".join(f"v{i}" for i in range(dim))
-            factors = ", ".join(f"b{i}" for i in range(active))
-            lines.append(f"({names},) = weighted_sums(_x, {2 * dim + 1}, ({factors},))")
-            # Nothing depends on the place: its columns of the inverse are the identity's.
-            lines += [f"s{stage}_{i} = v{i}" for i in range(active)]
-            lines += [f"s{stage}_{i} = v{i} + b{i}" for i in range(active, dim)]
-        for i in range(dim):
-            new = " + ".join(f"{float(method.m[j])!r} * s{j}_{i}" for j in range(4))
-            error = " + ".join(f"{float(method.e[j])!r} * s{j}_{i}" for j in range(4))
-            lines += [f"n{i} = y{i} + {new}", f"_result[{i}] = n{i}"]
-            lines.append(f"_result[{dim + i}] = {error}")
-        # The third stage was at the end of the step: its inputs serve.
-        lines += self._rates("n", "", parameters)
-        lines += [f"_result[{2 * dim + i}] = rate_{i}" for i in range(dim)]
-        return _function("step", lines)
 
     def system(
         self,
@@ -166,19 +93,22 @@ class Features:
             block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
         constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
         sizes = {"WORK": 0, "CONSTANTS": len(constants)}
-        text = self.kernels(len(parameters))
+        text = kernel_text(self, len(parameters))
         kernels = load_module("features", kernels_source(text, sizes, "features"))
-        machines = kernels._derivative_machine, kernels._step_machine
-        addresses = np.array([machines[0].address, 0, machines[1].address, 0], dtype=np.int64)
+        machines = kernels._derivative_machine, kernels._w_step_machine
+        addresses = [machines[0].address, 0, machines[1].address, 0]
+        if self.diagonal:
+            addresses[3] = kernels._exponential_step_machine.address
         dim = self.states + PLANAR
         return System(
-            (constants, addresses),
+            (constants, np.array(addresses, dtype=np.int64)),
             self.inputs,
             np.concatenate([reference, np.zeros(PLANAR)]),
             typical,
             np.arange(dim - 2),
             np.zeros(0, dtype=np.int64),
             stepped=True,
+            diagonal=diagonal_blocks(self.diagonal),
         )
 
 
@@ -194,12 +124,3 @@ def polynomial_features(states: int, inputs: int, degree: int = 1) -> Features:
     for power in range(2, degree + 1):
         terms += monomials(z, power)
     return Features(states, inputs, (), tuple(terms))
-
-
-def _function(name: str, lines: Sequence[str]) -> str:
-    body = "\n    ".join(lines)
-    return f"def {name}(_x, _u, _constants, _work, _result):\n    {body}\n"
-
-
-def _constants(text: str) -> str:
-    return text.replace("p[", "_constants[")

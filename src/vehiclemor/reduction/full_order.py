@@ -23,7 +23,8 @@ _DYNAMIC = {
         "text",
         "explicit",
         "explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh Jacobians; "
-        "ros34pw2: W-method of order 3, one Jacobian for all runs",
+        "ros34pw2: W-method of order 3, one Jacobian for all runs; etdrk4: exponential method of "
+        "order 4, with the same",
         choices=SOLVERS,
     ),
     "tolerance": Setting(

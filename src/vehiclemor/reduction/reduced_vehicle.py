@@ -56,7 +56,7 @@ class ReducedVehicle:
     Attributes
     ----------
     features, parameters
-        Features and the parameters in their text.
+        Features of the equations and the parameters in their text.
     coefficients
         C (terms, states + 3) of the equations.
     lifting
@@ -69,6 +69,8 @@ class ReducedVehicle:
         Magnitude of each reduced state (states + 3,).
     transient
         What is added to the lifted shapes.
+    lifted_features
+        Features of the lifting, with the same parameters, if not those of the equations.
     """
 
     model: DynamicModel
@@ -84,6 +86,7 @@ class ReducedVehicle:
     solver: str
     tolerance: float
     transient: Transient = NO_TRANSIENT
+    lifted_features: Features | None = None
 
     @property
     def effective_rank(self) -> int:
@@ -135,7 +138,8 @@ class ReducedVehicle:
         run = self._run(maneuver, start)
         inputs = maneuver.at(run.times)
         k = self.features.states
-        columns = self.features.at(run.path[:, :k], inputs, self.parameters)
+        lifted = self.lifted_features or self.features
+        columns = lifted.at(run.path[:, :k], inputs, self.parameters)
         shapes = self.shape.reference + columns @ self.lifting
         if len(self.transient.rates):
             deviation = self.shape.of(self.model.start(start)[None])[0] - self.shape.reference

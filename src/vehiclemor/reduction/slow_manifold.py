@@ -10,40 +10,41 @@ which lie on it, and the lag of the fast modes is learnt with them:
 
 Lambda and b are exact at straight running.  N is odd in the lateral quantities (the vehicle is its
 own mirror image): cubic, and in the axles' slip angles also quintic, terms; the speed and what is
-symmetric have even terms.  The heading is fitted twice: as a rate, then as its integral along
-reduced runs, since a heading that is off is a lateral position that is off.
+symmetric have even terms.  What whole runs hardly need is eliminated again.  The heading is fitted
+twice: as a rate, then as its integral along reduced runs, since a heading that is off is a lateral
+position that is off.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.reduction.features import PLANAR, Features, monomials
+from vehiclemor.reduction.features import PLANAR
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
+from vehiclemor.reduction.pruning import pruned
 from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.regression import largest, ridge_fit
 from vehiclemor.reduction.settings import Setting, Value
-from vehiclemor.reduction.slow_modes import SlowModes, slow_modes
+from vehiclemor.reduction.slow_features import OUTPUTS, feature_table
+from vehiclemor.reduction.slow_modes import slow_modes
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.trajectory_fit import improved, targets
 from vehiclemor.reduction.vehicle_shape import VehicleShape, is_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "slow modes with a right-hand side fitted on training runs, fast motion slaved"
 REFERENCE = "10.1137/1.9781611971118"
-OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in ("FL", "FR", "RL", "RR")))
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
 REFIT_RIDGE = 1e-9
-VARIABLES = ("front", "rear", "roll", "rolling", "steer")
 _SETTINGS = {
     "fastest": Setting(
         "number", 45.0, "modes of up to this |lambda| in 1/s are kept", minimum=0.0, above=True
@@ -60,6 +61,13 @@ _SETTINGS = {
     "sweeps": Setting(
         "integer", 4, "Gauss-Newton steps of all coefficients on whole training runs", minimum=0
     ),
+    "terms": Setting(
+        "integer",
+        20,
+        "lateral terms that the equations keep, those that whole runs need most, and a quarter as "
+        "many symmetric ones; 0: all; only with sweeps",
+        minimum=0,
+    ),
     "hull": Setting(
         "number",
         1.1,
@@ -68,6 +76,12 @@ _SETTINGS = {
         above=True,
     ),
     **ONLINE_SETTINGS,
+    "solver": Setting(
+        "text", "etdrk4", "as of full_order; a step is one kernel with etdrk4", choices=SOLVERS
+    ),
+    "tolerance": Setting(
+        "number", 2e-3, "largest local error of a state relative to its range", minimum=1e-13
+    ),
 }
 
 
@@ -115,21 +129,20 @@ def fit(
     rates, motion = shape.motion(shapes, u)
     deviations = shapes - shape.reference
     z, speed = modes.coordinates(deviations, u)
-    table = _feature_table(shape, modes, z, speed, u, settings)
-    features, odd, even = table.features, table.odd, table.even
+    table = feature_table(shape, modes, z, speed, u, settings)
+    features, odd, even, curved = table.features, table.odd, table.even, table.curved
     k, inputs = len(modes.rates), u.shape[1]
     columns = features.at(np.column_stack([z, speed]), u, table.parameters)
     ridge = float(settings["ridge"])
     slow_rates = rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
     linear = z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
     c = np.zeros((len(features.terms), k + 1 + PLANAR))
-    curved = odd[k + inputs :]
     c[curved, :k] = ridge_fit(columns[:, curved], slow_rates - linear, ridge)
     # Linear terms are scaled by the ranges of the training runs.
     c[odd[:k], :k] = modes.rates.T * largest(z)[:, None]
     c[odd[k], :k] = modes.drive * largest(u)[0]
     # Straight running at any speed goes on for ever: the speed changes by what is even alone.
-    bent = even[2:]
+    bent = table.bent
     c[bent, k] = ridge_fit(columns[:, bent], rates @ modes.speed_left, ridge)
     c[odd, k + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
     c[even[0], k + 2], c[even[1], k + 2] = shape.speed, 1.0
@@ -152,10 +165,14 @@ def fit(
     )
     for _ in range(int(settings["refits"])):
         reduced = _with_heading(reduced, training, runs, odd, k + 1)
-    if int(settings["sweeps"]):
-        free = [(curved, column) for column in range(k)] + [(odd, k + 1), (odd, k + 3)]
+    sweeps, kept = int(settings["sweeps"]), int(settings["terms"])
+    if sweeps:
         goals = targets(reduced, training, runs)
-        reduced = improved(reduced, goals, free, int(settings["sweeps"]))
+        reduced = improved(reduced, goals, table.free, sweeps)
+        if kept:
+            slow = np.column_stack([z, speed])
+            reduced, table = pruned(reduced, table, goals, slow, u, kept)
+            reduced = improved(reduced, goals, table.free, sweeps)
     evaluations = sum(run.counts[model.evaluations] for run in runs) + len(u)
     offline = Offline(time.perf_counter() - began, evaluations)
     return replace(
@@ -164,98 +181,6 @@ def fit(
         solver=str(settings["solver"]),
         tolerance=float(settings["tolerance"]),
     )
-
-
-@dataclass(frozen=True)
-class _Table:
-    """Features with the numbers of those that are odd and even in the lateral quantities.
-
-    The first odd ones are the slow coordinates and the inputs, the first even ones 1 and the speed.
-    """
-
-    features: Features
-    parameters: np.ndarray
-    odd: list[int]
-    even: list[int]
-
-
-def _feature_table(
-    shape: VehicleShape,
-    modes: SlowModes,
-    z: np.ndarray,
-    speed: np.ndarray,
-    u: np.ndarray,
-    settings: Mapping[str, Value],
-) -> _Table:
-    k, inputs = z.shape[1], u.shape[1]
-    rows = _variables(shape, modes)
-    # The axles' slips go as one over the speed where they come from motion, not from steering.
-    at_speed = shape.speed / (shape.speed + speed)
-    values = np.column_stack([z, u[:, 0]]) @ rows[:, : k + 1].T
-    values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    hull = float(settings["hull"])
-    reach = hull * float(largest(speed[:, None])[0] or 1.0)
-    scales = 1.0 / (hull * largest(values))
-    rows[:2] *= scales[:2, None]
-    rows[2:] *= scales[2:, None]
-    parameters = np.concatenate(
-        [rows.ravel(), 1.0 / largest(z), 1.0 / largest(u), [shape.speed, 1.0 / reach]]
-    )
-    width = k + 2
-
-    def held(text: str) -> str:
-        # In [-1, 1]: nothing is known of what lies beyond the training runs.
-        return f"0.5 * (abs({text} + 1.0) - abs({text} - 1.0))"
-
-    last = len(VARIABLES) * width + k + inputs
-    lines = [("part", f"p[{last}] / (p[{last}] + z{k})"), ("raw", f"p[{last + 1}] * z{k}")]
-    lines.append(("m", held("raw")))
-    for i in range(len(VARIABLES)):
-        moved = " + ".join(f"p[{i * width + j}] * z{j}" for j in range(k))
-        moved = f"({moved} + p[{i * width + k}] * u0)"
-        direct = f"p[{i * width + k + 1}] * u0"
-        text = f"part * {moved} + {direct}" if i < 2 else moved
-        lines += [(f"raw{i}", text), (f"v{i}", held(f"raw{i}"))]
-    first = len(VARIABLES) * width
-    v = [f"v{i}" for i in range(len(VARIABLES))]
-    straight = [f"p[{first + i}] * z{i}" for i in range(k)]
-    straight += [f"p[{first + k + j}] * u{j}" for j in range(inputs)]
-    curved = [*straight[: k + 1]]
-    odd = [*straight, *(f"m * {t}" for t in curved), *(f"m * m * {t}" for t in curved)]
-    odd += monomials(v, 3)
-    if settings["nonlinearity"] != "cubic":
-        odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
-    if settings["nonlinearity"] in {"sliding", "rich"}:
-        slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
-        odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
-        odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
-    if settings["nonlinearity"] == "rich":
-        odd += [f"m * {term}" for term in monomials(v, 3)]
-    even = ["1.0", f"z{k}", *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
-    numbers = tuple(range(len(odd) + len(even)))
-    lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
-    groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
-    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups)
-    return _Table(features, parameters, list(lateral), list(symmetric))
-
-
-def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:
-    """Rows (5, k + 2) of the arguments of the nonlinear terms, per z, and per steering twice.
-
-    The steering moves the shape (last but one) and the wheels themselves (last).
-    """
-    linear, outputs = shape.linearised, shape.model.outputs
-
-    def row(name: str) -> np.ndarray:
-        a, b = linear.output_a[outputs.index(name)], linear.output_b[outputs.index(name), 0]
-        return np.concatenate([a @ modes.right, [a @ modes.follow, b]])
-
-    front = 0.5 * (row("slip_angle_FL") + row("slip_angle_FR"))
-    rear = 0.5 * (row("slip_angle_RL") + row("slip_angle_RR"))
-    roll = row("roll")
-    rolling = np.concatenate([roll[:-2] @ modes.rates, [0.0, 0.0]])
-    steer = np.concatenate([np.zeros(len(roll) - 2), [1.0, 0.0]])
-    return np.array([front, rear, roll, rolling, steer])
 
 
 def _with_heading(

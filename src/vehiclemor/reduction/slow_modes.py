@@ -52,6 +52,16 @@ class SlowModes:
     speed_right: np.ndarray
     symmetric: Transient
 
+    @property
+    def blocks(self) -> tuple[int, ...]:
+        """Sizes of the diagonal blocks of `rates`: 2 for a conjugate pair, else 1."""
+        sizes: list[int] = []
+        while sum(sizes) < len(self.rates):
+            i = sum(sizes)
+            paired = i + 1 < len(self.rates) and abs(self.rates[i, i + 1]) > STILL
+            sizes.append(2 if paired else 1)
+        return tuple(sizes)
+
     def coordinates(
         self, deviations: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:

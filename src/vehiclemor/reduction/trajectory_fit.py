@@ -103,6 +103,16 @@ def improved(
     return reduced
 
 
+def normal_matrix(
+    reduced: ReducedVehicle, goals: Sequence[Target], free: Sequence[tuple[Sequence[int], int]]
+) -> np.ndarray:
+    """Normal matrix of the free coefficients, column by column; empty if a run has failed."""
+    paths, error = _compared(reduced, goals)
+    if not np.isfinite(error):
+        return np.zeros((0, 0))
+    return _normal_equations(reduced, goals, paths, free)[0]
+
+
 def _changed(
     reduced: ReducedVehicle, free: Sequence[tuple[Sequence[int], int]], step: np.ndarray
 ) -> ReducedVehicle:

@@ -12,6 +12,8 @@ LOOPS = (
     "rosenbrock_loops",
     "w_method_loops",
     "stepped_loops",
+    "exponential_loops",
+    "modal_loops",
     "run_loops",
 )
 

@@ -243,7 +243,8 @@ class DynamicModel:
         solver
             `explicit`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
             Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
-            straight running, for all steps and runs.
+            straight running, for all steps and runs.  `etdrk4`: exponential Runge-Kutta method of
+            order 4, with the same.
         tolerance
             Largest local error of a state relative to its typical size plus its own.
         longest_step

@@ -5,6 +5,8 @@ import math
 import numpy as np
 
 from vehiclemor.simulation.explicit_loops import explicit_span
+from vehiclemor.simulation.exponential_loops import exponential_span
+from vehiclemor.simulation.modal_loops import modal_span
 from vehiclemor.simulation.rosenbrock_loops import rosenbrock_span
 from vehiclemor.simulation.stepped_loops import stepped_span
 from vehiclemor.simulation.system_loops import (
@@ -41,7 +43,7 @@ def run(
     active,
     turning,
     ladder,
-    inverses,
+    stored,
     samples,
     path,
     counts,
@@ -55,7 +57,10 @@ def run(
     means, lifts, drops, ranks
         Windows' means (W, 2 n), bases (W, R, 2 n) by rows, projections (W, R, 2 n), dimensions (W).
     frozen
-        0: fresh Jacobians; 1: stored inverses; 2: these, and whole steps as a kernel.
+        0: fresh Jacobians.  W-method with stored inverses 1, its steps as a kernel 2; exponential
+        method with stored matrix functions 3, its steps as a kernel 4.
+    stored
+        Of the W-method or of the exponential method, see there.
     restart
         Longest first step (s) of a span that begins at a break point of the inputs.
 
@@ -71,7 +76,7 @@ def run(
     for w in range(len(ranks)):
         if ranks[w] > largest:
             largest = ranks[w]
-    vectors = np.empty((9, largest))
+    vectors = np.empty((11, largest))
     square = 1 if explicit or frozen else largest
     matrices = (
         np.empty((square, square)),
@@ -79,11 +84,15 @@ def run(
         np.empty((8, largest)),
         np.empty(largest, dtype=np.int64),
     )
-    stepped = largest if frozen == 2 else 1
+    entries = 0
+    if frozen == 2:
+        entries = stored.shape[1] * (largest + 3)
+    elif frozen == 4:
+        entries = stored.shape[2]
     buffers = (
-        np.zeros(2 * stepped + 1 + inverses.shape[1] * (stepped + 3)),
+        np.zeros(5 * largest + 4 + entries),
         np.empty(3 * signal[2].shape[1]),
-        np.empty(3 * stepped),
+        np.empty(5 * largest + 1),
     )
     y = np.empty(largest)
     for i in range(states):
@@ -148,13 +157,60 @@ def run(
                 buffers,
                 tableau,
                 ladder,
-                inverses,
+                stored,
                 samples,
                 sample,
                 path,
                 counts,
             )
-        elif frozen:
+        elif frozen == 3:
+            status, t, step, sample = exponential_span(
+                form,
+                times,
+                segment,
+                y,
+                dim,
+                step,
+                limits,
+                signal,
+                space,
+                model,
+                scratch,
+                typical,
+                vectors,
+                matrices[2],
+                turning,
+                ladder,
+                stored,
+                samples,
+                sample,
+                path,
+                counts,
+            )
+        elif frozen == 4:
+            status, t, step, sample = modal_span(
+                form,
+                times,
+                segment,
+                y,
+                dim,
+                step,
+                limits,
+                signal,
+                space,
+                model,
+                scratch,
+                typical,
+                vectors,
+                buffers,
+                ladder,
+                stored,
+                samples,
+                sample,
+                path,
+                counts,
+            )
+        elif frozen == 1:
             status, t, step, sample = w_method_span(
                 form,
                 times,
@@ -174,7 +230,7 @@ def run(
                 active,
                 turning,
                 ladder,
-                inverses,
+                stored,
                 samples,
                 sample,
                 path,

@@ -15,20 +15,23 @@ from vehiclemor.simulation import system_loops
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
 from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.compiled_loops import loops_module
+from vehiclemor.simulation.exponential_functions import TABLES, exponential_tables
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
 from vehiclemor.simulation.signals import signal_of
 from vehiclemor.simulation.spaces import Spaces
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
-SOLVERS = ("explicit", "rodas4", "ros34pw2")
+SOLVERS = ("explicit", "rodas4", "ros34pw2", "etdrk4")
+# Those with one Jacobian for all runs.
+FROZEN = ("ros34pw2", "etdrk4")
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
 # A run that needs more evaluations of its right-hand side than this is going nowhere.
 MOST_CALLS = 100_000
 # First step (s) of a frozen-Jacobian run after a break point of the inputs.
 RESTART = 0.05
-# Step sizes (s) for which inverses are stored.  Where a step and its rung differ more, its error
-# grows and steps are rejected.
+# Step sizes (s) for which inverses and matrix functions are stored.  Where a step and its rung
+# differ more, its error grows and steps are rejected.
 LADDER = 2.0 ** (0.125 * np.arange(-128, 25))
 REASONS = {
     1: f"more than {MOST_CALLS} evaluations of the right-hand side",
@@ -74,7 +77,7 @@ class System:
     inputs
         Number of inputs.
     reference
-        State (dim,) at which the W-method freezes its Jacobian, all inputs zero.
+        State (dim,) at which the Jacobian is frozen, all inputs zero.
     typical
         Magnitude of each state (dim,) below which errors are measured absolutely.
     active
@@ -83,6 +86,9 @@ class System:
         Numbers of the heading and of the pairs of states that turn with it; may be empty.
     stepped
         Whether a kernel takes whole steps of the W-method, see `stepped_loops`.
+    diagonal
+        Numbers of states by diagonal block of the Jacobian, if a kernel takes whole steps of the
+        exponential method, see `modal_loops`; may be empty.
     """
 
     machine: tuple[np.ndarray, np.ndarray]
@@ -92,6 +98,7 @@ class System:
     active: np.ndarray
     turning: np.ndarray
     stepped: bool = False
+    diagonal: tuple[tuple[int, ...], ...] = ()
 
     @property
     def loops(self) -> ModuleType:
@@ -105,12 +112,30 @@ class System:
         return result
 
     @cached_property
+    def frozen_jacobian(self) -> np.ndarray:
+        """Jacobian (dim, dim) at the reference state, no inputs."""
+        return self.jacobian(self.reference, np.zeros(self.inputs))
+
+    @cached_property
     def frozen_inverses(self) -> np.ndarray:
         """Transposed active columns of (I - gamma h J)^-1 on the ladder of step sizes."""
-        frozen = self.jacobian(self.reference, np.zeros(self.inputs))
+        frozen = self.frozen_jacobian
         identity = np.eye(len(frozen))
         inverses = [np.linalg.inv(identity - ROS34PW2.gamma * h * frozen) for h in LADDER]
         return loop_array(np.stack([inverse[:, self.active].T for inverse in inverses]))
+
+    @cached_property
+    def frozen_exponentials(self) -> np.ndarray:
+        """Matrix functions of the exponential method on the ladder, see `exponential_loops`."""
+        if not self.diagonal:
+            tables = exponential_tables(self.frozen_jacobian, LADDER)
+            return loop_array(tables.reshape(len(LADDER), -1, tables.shape[-1]))
+        parts = []
+        for numbers in self.diagonal:
+            block = exponential_tables(self.frozen_jacobian[np.ix_(numbers, numbers)], LADDER)
+            parts.append(block.swapaxes(2, 3).reshape(len(LADDER), TABLES, -1))
+        entries = np.concatenate(parts, axis=2)
+        return loop_array(entries.reshape(len(LADDER), 1, -1))
 
     def run(
         self,
@@ -172,11 +197,11 @@ class System:
             check_positive("longest_step", longest_step)
         if solver not in SOLVERS:
             raise unknown("solver", solver, SOLVERS)
-        frozen = solver == "ros34pw2"
         full = spaces.form == system_loops.FULL
-        if frozen and not full:
-            raise InputError("ros34pw2 freezes the full model's Jacobian: not for a reduced model")
-        tableau = ROS34PW2 if frozen else RODAS4
+        if solver in FROZEN and not full:
+            raise InputError(f"{solver} freezes the full model's Jacobian: not for a reduced model")
+        tableau = ROS34PW2 if solver == "ros34pw2" else RODAS4
+        frozen, stored = self._frozen(solver)
         check_times(times, maneuver)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
@@ -197,12 +222,20 @@ class System:
             (float(tolerance), float(longest_step or np.inf), MOST_CALLS),
             RESTART,
             tableau.arguments,
-            (2 if self.stepped else 1) if frozen else 0,
+            frozen,
             self.active if full else np.arange(spaces.ranks.max()),
             self.turning,
             LADDER,
-            self.frozen_inverses if frozen else np.zeros((1, 1, 1)),
+            stored,
             times,
             path,
             counts,
         )
+
+    def _frozen(self, solver: str) -> tuple[int, np.ndarray]:
+        """Number by which the compiled `run` knows a solver, and what is stored for it."""
+        if solver == "ros34pw2":
+            return 2 if self.stepped else 1, self.frozen_inverses
+        if solver == "etdrk4":
+            return 4 if self.diagonal else 3, self.frozen_exponentials
+        return 0, np.zeros((1, 1, 1))

@@ -1,0 +1,97 @@
+"""The exponential method: its matrix functions, and whole steps as one kernel.
+
+N. Higham, Functions of Matrices (SIAM 2008), chapter 10; S. Krogstad, J. Comput. Phys. 203 (2005).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vehiclemor.maneuvers import lane_change
+from vehiclemor.reduction.feature_kernels import diagonal_blocks
+from vehiclemor.reduction.features import Features
+from vehiclemor.simulation.exponential_functions import exponential_tables, phi_functions
+from vehiclemor.simulation.spaces import whole_space
+
+
+def augmented(matrix: np.ndarray) -> list[np.ndarray]:
+    """phi_0 to phi_3 as blocks of one matrix exponential (Higham, theorem 10.15)."""
+    from scipy.linalg import expm
+
+    n = len(matrix)
+    large = np.zeros((4 * n, 4 * n))
+    large[:n, :n] = matrix
+    for k in range(3):
+        large[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
+    blocks = expm(large)[:n]
+    return [blocks[:, k * n : (k + 1) * n] for k in range(4)]
+
+
+@pytest.mark.parametrize("norm", [0.0, 1e-3, 1.0, 30.0, 500.0])
+@given(seed=st.integers(0, 10**6))
+def test_phi_functions_agree_with_one_exponential(norm, seed):
+    random = np.random.default_rng(seed)
+    # Stable, with a defective pair, as those of stabilised constraints.
+    z = -np.diag([0.0, 0.1, 0.5, 1.0, 1.0]) + np.diag([0.3, 0.2, 0.0, 1.0], 1)
+    q, _ = np.linalg.qr(random.normal(size=(5, 5)))
+    z = norm * (q @ z @ q.T)
+    for found, expected in zip(phi_functions(z), augmented(z), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+def test_the_tables_hold_what_a_step_needs():
+    rates, h = np.array([[-3.0, 2.0], [-2.0, -3.0]]), 0.25
+    (table,) = exponential_tables(rates, [h])
+    _, half1, half2, _ = augmented(0.5 * h * rates)
+    _, phi1, phi2, phi3 = augmented(h * rates)
+    expected = [rates, half1 / 2, half2, phi1, 2 * phi2, 2 * phi2 - 4 * phi3, 4 * phi3 - phi2]
+    np.testing.assert_allclose(table, [matrix.T for matrix in expected], rtol=1e-12, atol=1e-14)
+
+
+# A damped oscillator and a decay, pushed by the inputs and by cubic terms, and a place.
+FEATURES = Features(
+    3,
+    1,
+    (("bend", "z0 * z0 - z2"),),
+    ("z0", "z1", "z2", "u0", "bend * z1", "z0 * z1 * z2", "1.0"),
+    diagonal=(2, 1),
+)
+
+
+def system(diagonal: tuple[int, ...]):
+    c = np.zeros((7, 6))
+    c[:2, :2] = [[-1.0, -4.0], [4.0, -1.0]]
+    c[2, 2] = -9.0
+    # Heading and place have nonlinear rates alone: at rest all of the Jacobian is in the blocks.
+    c[4:6, 3:] = [[1.0, 0.5, -0.4], [1.0, 0.3, 0.7]]
+    c[3, 0], c[4, 0], c[5, 1], c[5, 2] = 0.6, 0.9, -0.8, 0.7
+    features = replace(FEATURES, diagonal=diagonal)
+    return features.system(np.zeros(0), c, np.ones(6), np.zeros(3))
+
+
+def path(built, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    run = built.run(
+        lane_change, np.array([0.1, -0.2, 0.05, 0, 0, 0]), whole_space(6), "etdrk4", tolerance
+    )
+    assert not run.failure
+    return run.path, run.counts
+
+
+def test_a_step_as_one_kernel_is_the_step_of_the_loops():
+    blocks = system((2, 1))
+    dense = replace(blocks, diagonal=())
+    frozen = dense.frozen_jacobian
+    assert np.abs(frozen[3:]).max() < 1e-9
+    for tolerance in (1e-2, 1e-4):
+        (found, counts), (loops, others) = path(blocks, tolerance), path(dense, tolerance)
+        np.testing.assert_array_equal(counts, others)
+        assert counts[1] > 20
+        np.testing.assert_allclose(found, loops, rtol=1e-7, atol=1e-9)
+        assert np.abs(found[-1] - path(dense, 1e-9)[0][-1]).max() < 10.0 * tolerance
+
+
+def test_blocks_are_numbered_from_the_first_coordinate():
+    assert diagonal_blocks((2, 1, 1)) == ((0, 1), (2,), (3,))
