@@ -157,12 +157,13 @@ def test_the_run_does_not_depend_on_the_heading(vehicle, solver):
     assert np.abs(plain.states - exact).max() > 1e-5
 
 
-def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle):
+@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
+def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle, solver):
     """Its steps are at the limit of stability, where rounding changes their number, too."""
     x = vehicle.start()
 
     def calls(model: DynamicModel, start: np.ndarray, tolerance: float) -> int:
-        path = integrate(model, LANE_CHANGE, start, TIMES, "ros34pw2", tolerance)
+        path = integrate(model, LANE_CHANGE, start, TIMES, solver, tolerance)
         return path.counts["rhs_calls"]
 
     for tolerance in (1e-3, 1e-4, 1e-5):
@@ -323,7 +324,8 @@ def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("solver", "tolerance"), [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 5e-9)]
+    ("solver", "tolerance"),
+    [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 5e-9), ("etdrk4", 1e-6)],
 )
 def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
     start, expected = reference

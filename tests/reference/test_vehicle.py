@@ -379,7 +379,8 @@ def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("solver", "tolerance"), [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 1e-9)]
+    ("solver", "tolerance"),
+    [("explicit", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 1e-9), ("etdrk4", 1e-7)],
 )
 def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
     start, expected = reference
@@ -410,7 +411,9 @@ def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
     assert errors[2] < 0.2 * errors[1] < 0.04 * errors[0]
 
 
-@pytest.mark.parametrize(("solver", "order"), [("explicit", 5), ("rodas4", 4), ("ros34pw2", 3)])
+@pytest.mark.parametrize(
+    ("solver", "order"), [("explicit", 5), ("rodas4", 4), ("ros34pw2", 3), ("etdrk4", 4)]
+)
 def test_the_path_in_the_plane_converges_with_the_order_of_the_method(vehicle, solver, order):
     """Though the Jacobian leaves out how the path turns with the heading."""
     exact = integrate(vehicle, LANE_CHANGE, vehicle.start(), "explicit", 1e-13, TIMES).states

@@ -114,6 +114,18 @@ def test_a_stiff_transient_is_damped_at_once(standard, solver):
     assert found.counts["steps"] < 300
 
 
+@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_fast_linear_motion_is_right_between_the_steps_too(standard, solver, tolerance):
+    # Towards 1 at 45 1/s, which the exponential method could do in one step.
+    model = standard(rate=45.0, angle=0.0, tracked=0.0)
+    still = maneuver(lambda t, *_: np.array([0.0, 1.0, 0.0]) + 0.0 * t[:, None], 8.0)
+    times = np.linspace(0.0, 1.0, 101)
+    found = integrate(model, still, solver, tolerance, times)
+    exact = 1.0 - np.exp(-45.0 * times)
+    assert np.abs(found.states[:, TRACKED] - exact).max() < 4.0 * tolerance
+
+
 # Counts
 
 

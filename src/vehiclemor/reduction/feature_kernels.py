@@ -144,7 +144,7 @@ def _exponential_step(features: Features, parameters: int) -> str:
             lines.append(f"d{number}_{i} = {change}{linear}")
         return lines
 
-    names = ("y", "f", "before", "slope", "typical")
+    names = ("y", "f", "y_before", "f_before", "typical")
     every = range(dim)
     lines = [f"{name}{i} = _x[{n * dim + i}]" for n, name in enumerate(names) for i in every]
     scalars = ("h", "at_past", "at_half", "at_end")
@@ -174,14 +174,18 @@ def _exponential_step(features: Features, parameters: int) -> str:
             f"_result[{3 * dim + i}] = 3.0 * moved{i} - 2.0 * start - finish",
             f"_result[{4 * dim + i}] = start + finish - 2.0 * moved{i}",
         ]
-    lines += [f"moved{i} = y{i} - before{i}" for i in every]
+    lines += [f"moved{i} = y{i} - y_before{i}" for i in every]
     for i in every:
         linear = f" - {product(JACOBIAN, 'moved', i)}" if (i, i) in place else ""
-        past = f"at_past * (f{i} - slope{i}{linear})"
+        past = f"at_past * (f{i} - f_before{i}{linear})"
         pair = f"{ERROR_SHARE!r} * (d5_{i} - d4_{i})"
         lines.append(f"q{i} = h * ({pair} + at_half * 0.5 * s{i} + at_end * d5_{i} + {past})")
     for i in every:
-        lines.append(f"e{i} = abs({product(LAST, 'q', i)}) / (typical{i} + abs(n{i}))")
+        # What the cubic between the ends of a step misses of linear motion.
+        defect = f"half{i} - 0.5 * whole{i} + 0.125 * h * {product(JACOBIAN, 'whole', i)}"
+        missed = f" + abs({defect})" if (i, i) in place else ""
+        size = f"(abs({product(LAST, 'q', i)}){missed})"
+        lines.append(f"e{i} = {size} / (typical{i} + abs(n{i}))")
     # The larger of two, by arithmetic that keeps what is not a number.
     left = [f"e{i}" for i in every]
     while len(left) > 1:

@@ -6,7 +6,7 @@ kernel it makes the right-hand side of the reduced vehicle
     z' = C_z phi(z, u),  psi' = C_r phi
     X' = U cos(psi) - V sin(psi),  Y' = U sin(psi) + V cos(psi),  (U, V) = C_UV phi
 
- Coefficients are constants of the kernel: a fit compiles nothing new.
+Coefficients are constants of the kernel: fits with the same features compile nothing new.
 """
 
 from __future__ import annotations

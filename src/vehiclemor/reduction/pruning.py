@@ -61,10 +61,11 @@ def pruned(
     # The symmetric equations are fitted to rates; each counts by its nonlinear part.
     values = reduced.features.at(slow, inputs, reduced.parameters)[:, bent]
     symmetric = c[np.ix_(bent, [k, k + 2])]
-    weights = 1.0 / np.mean((values @ symmetric) ** 2, axis=0)
+    sizes = np.mean((values @ symmetric) ** 2, axis=0)
+    weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     normal = np.kron(np.diag(weights), values.T @ values)
     groups = [[i, len(bent) + i] for i in range(len(bent))]
-    most = min(len(bent), round(SYMMETRIC * kept) + 1)
+    most = min(len(bent), max(1, round(SYMMETRIC * kept)))
     left_even, changed = surviving(normal, symmetric.T.ravel(), groups, most)
     c[np.ix_(bent, [k, k + 2])] = changed.reshape(2, -1).T
     linear = [*table.odd[: table.heads], *table.even[:2]]
@@ -102,7 +103,9 @@ def surviving(
     tuple
         Numbers of the groups left, in order, and the coefficients (n,), zero where eliminated.
     """
-    scale = np.sqrt(np.diag(normal)) + 1e-300
+    # A feature that is zero in all of the training has no scale.
+    scale = np.sqrt(np.diag(normal))
+    scale[scale == 0.0] = 1.0
     inverse = np.linalg.inv(normal / np.outer(scale, scale) + REGULARISATION * np.eye(len(normal)))
     c = coefficients * scale
     left = list(range(len(groups)))

@@ -33,7 +33,7 @@ from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.slow_features import OUTPUTS, feature_table
 from vehiclemor.reduction.slow_modes import slow_modes
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.trajectory_fit import improved, targets
+from vehiclemor.reduction.trajectory_fit import improved, normal_matrix, targets
 from vehiclemor.reduction.vehicle_shape import VehicleShape, is_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -64,8 +64,8 @@ _SETTINGS = {
     "terms": Setting(
         "integer",
         20,
-        "lateral terms that the equations keep, those that whole runs need most, and a quarter as "
-        "many symmetric ones; 0: all; only with sweeps",
+        "lateral nonlinear terms that the equations keep, those that whole runs need most, and a "
+        "quarter as many symmetric ones; 0: all; only with sweeps, which are done again after it",
         minimum=0,
     ),
     "hull": Setting(
@@ -77,10 +77,13 @@ _SETTINGS = {
     ),
     **ONLINE_SETTINGS,
     "solver": Setting(
-        "text", "etdrk4", "as of full_order; a step is one kernel with etdrk4", choices=SOLVERS
+        "text",
+        "etdrk4",
+        "as of full_order; etdrk4 and ros34pw2 take a step in one kernel",
+        choices=SOLVERS,
     ),
     "tolerance": Setting(
-        "number", 2e-3, "largest local error of a state relative to its range", minimum=1e-13
+        "number", 2e-3, "largest local error of a state relative to its typical size", minimum=1e-13
     ),
 }
 
@@ -171,8 +174,11 @@ def fit(
         reduced = improved(reduced, goals, table.free, sweeps)
         if kept:
             slow = np.column_stack([z, speed])
-            reduced, table = pruned(reduced, table, goals, slow, u, kept)
-            reduced = improved(reduced, goals, table.free, sweeps)
+            fewer, kept_table = pruned(reduced, table, goals, slow, u, kept)
+            fewer = improved(fewer, goals, kept_table.free, sweeps)
+            # With too few terms a training run may fail.
+            if len(normal_matrix(fewer, goals, kept_table.free[:1])):
+                reduced = fewer
     evaluations = sum(run.counts[model.evaluations] for run in runs) + len(u)
     offline = Offline(time.perf_counter() - began, evaluations)
     return replace(

@@ -89,7 +89,8 @@ def improved(
         if not np.isfinite(error):
             break
         normal, gradient = _normal_equations(reduced, goals, paths, free)
-        scale = np.sqrt(np.diag(normal)) + 1e-300
+        scale = np.sqrt(np.diag(normal))
+        scale[scale == 0.0] = 1.0
         scaled = normal / np.outer(scale, scale)
         while damping < MOST_DAMPING:
             step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale

@@ -64,7 +64,7 @@ def modal_span(
         size = error_norm(form, f, y, dim, space, typical, 1.0)
         step = longest
         if not size <= 1e-10:
-            # Fast linear motion has no error, so no step need be shorter than the ladder's.
+            # Linear motion has no error, so no step need be shorter than the ladder's.
             step = max(ladder[0], 0.01 / size)
     for i in range(dim):
         given[i], given[dim + i] = y[i], f[i]

@@ -76,7 +76,7 @@ def run(
     for w in range(len(ranks)):
         if ranks[w] > largest:
             largest = ranks[w]
-    vectors = np.empty((11, largest))
+    vectors = np.empty((12, largest))
     square = 1 if explicit or frozen else largest
     matrices = (
         np.empty((square, square)),

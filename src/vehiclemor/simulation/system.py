@@ -28,7 +28,7 @@ FROZEN = ("ros34pw2", "etdrk4")
 SMALLEST_TOLERANCE = 1e-13
 # A run that needs more evaluations of its right-hand side than this is going nowhere.
 MOST_CALLS = 100_000
-# First step (s) of a frozen-Jacobian run after a break point of the inputs.
+# Longest first step (s) after a break point of the inputs.
 RESTART = 0.05
 # Step sizes (s) for which inverses and matrix functions are stored.  Where a step and its rung
 # differ more, its error grows and steps are rejected.

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 # Colour-blind safe (M. Okabe, K. Ito).
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "*", "X")
-GREYS = ("#000000", "#777777", "#AAAAAA")
+GREYS = ("#000000", "#777777", "#AAAAAA", "#444444")
+LINES = ("-", "-", "-", "--")
 
 
 def figure_pareto(results: Mapping[str, xr.Dataset]) -> Figure:
@@ -33,10 +34,12 @@ def figure_pareto(results: Mapping[str, xr.Dataset]) -> Figure:
     for row in rows:
         if row["role"] == "full order":
             families.setdefault(str(row["method"]).rsplit(" ", 1)[0], []).append(row)
-    for (family, members), color in zip(families.items(), cycle(GREYS), strict=False):
+    lines = zip(cycle(GREYS), cycle(LINES), strict=False)
+    for (family, members), (color, line) in zip(families.items(), lines, strict=False):
         points = [(m["seconds"] * 1e6, m["score"]) for m in members if np.isfinite(m["score"])]
         points = [point for point in points if point[1] > 0.0]
         style = {"color": color, "marker": "o", "markersize": 4, "linewidth": 0.8}
+        style["linestyle"] = line
         axis.loglog(*zip(*sorted(points), strict=True), label=f"full order, {family}", **style)
     styles = zip(cycle(COLORS), cycle(MARKERS), strict=False)
     for row in rows:
