@@ -16,7 +16,8 @@ from vehiclemor.maneuvers import (
 )
 from vehiclemor.reduction.balanced_truncation import balanced, lateral_system
 from vehiclemor.reduction.linear_single_track import single_track
-from vehiclemor.reduction.modal_truncation import lateral_modes, truncated
+from vehiclemor.reduction.linear_vehicle import lateral_modes
+from vehiclemor.reduction.modal_truncation import truncated
 from vehiclemor.reduction.vehicle_shape import VehicleShape
 
 VEHICLES = {

@@ -24,12 +24,13 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.balanced_truncation import balancing, gramian_factor
 from vehiclemor.reduction.dynamic_subspaces import MOST_SNAPSHOTS
+from vehiclemor.reduction.heading_frame import heading_frame
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.quasi_steady_wheels import (
+from vehiclemor.reduction.projected_vehicle import (
     PROJECTED_SETTINGS,
     ProjectedVehicle,
-    heading_frame,
     one_window,
 )
 from vehiclemor.reduction.settings import Setting, Value
@@ -184,12 +185,7 @@ def balanced(
     stable = a @ apart - np.outer(right, left)
     seen = c @ apart
     observability = solve_continuous_lyapunov(stable.T, -seen.T @ seen)
-    values, vectors = np.linalg.eigh(0.5 * (observability + observability.T))
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    reached = apart @ snapshots
-    u, hankel, vt = np.linalg.svd(root.T @ reached, full_matrices=False)
-    kept = min(rank, int(np.count_nonzero(hankel > SMALLEST * hankel[0])))
-    scale = 1.0 / np.sqrt(hankel[:kept])
-    lift = scale[:, None] * (reached @ vt[:kept].T).T
-    drop = scale[:, None] * (apart.T @ root @ u[:, :kept]).T
-    return lift, drop, hankel
+    left, right, hankel = balancing(
+        apart @ snapshots, gramian_factor(observability), rank, SMALLEST
+    )
+    return right.T, left @ apart, hankel

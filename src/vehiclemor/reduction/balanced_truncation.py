@@ -5,7 +5,7 @@ Approximation of Large-Scale Dynamical Systems, SIAM 2005, section 7.3): states 
 reaches, or that lateral speed, yaw rate and roll hardly show, are dropped.  The error of the
 transfer function is at most twice the sum of the Hankel singular values dropped.
 
-What is balanced are all modes that steering moves (see `modal_truncation`): the system with only
+What is balanced are all modes that steering moves (see `linear_vehicle`): the system with only
 the steering as its input, since derivatives of a prescribed rack are taken out as feedthrough
 first; stabilised constraints, never excited, stay out.  The speed is kept beside; nothing is
 trained.
@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.modal_truncation import Lateral, lateral_modes, linear_vehicle
+from vehiclemor.reduction.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
 from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.settings import Setting, Value
@@ -69,15 +69,38 @@ def balanced(a: np.ndarray, b: np.ndarray, c: np.ndarray, rank: int) -> Balanced
     rank
         Number of states to keep.
     """
-    reached = _factor(solve_continuous_lyapunov(a, -b @ b.T))
-    seen = _factor(solve_continuous_lyapunov(a.T, -c.T @ c))
-    u, hankel, vt = np.linalg.svd(seen.T @ reached)
-    scale = 1.0 / np.sqrt(hankel[:rank])
-    left = scale[:, None] * (u[:, :rank].T @ seen.T)
-    return Balanced(left, reached @ vt[:rank].T * scale, hankel)
+    reached = gramian_factor(solve_continuous_lyapunov(a, -b @ b.T))
+    seen = gramian_factor(solve_continuous_lyapunov(a.T, -c.T @ c))
+    return Balanced(*balancing(reached, seen, rank))
 
 
-def _factor(gramian: np.ndarray) -> np.ndarray:
+def balancing(
+    reached: np.ndarray, seen: np.ndarray, rank: int, smallest: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Square-root balancing.
+
+    Parameters
+    ----------
+    reached, seen
+        F (n, m) with F F^T the gramian of controllability, of observability.
+    rank
+        Number of states to keep.
+    smallest
+        Part of the largest singular value below which a state is left out all the same.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Reduced states per state (r, n), back (n, r), and all Hankel singular values.
+    """
+    u, hankel, vt = np.linalg.svd(seen.T @ reached, full_matrices=False)
+    kept = min(rank, int(np.count_nonzero(hankel > smallest * hankel[0])))
+    scale = 1.0 / np.sqrt(hankel[:kept])
+    left = scale[:, None] * (u[:, :kept].T @ seen.T)
+    return left, reached @ vt[:kept].T * scale, hankel
+
+
+def gramian_factor(gramian: np.ndarray) -> np.ndarray:
     """F (n, n) with F F^T the gramian, without the negative eigenvalues of rounding."""
     values, vectors = np.linalg.eigh(0.5 * (gramian + gramian.T))
     return vectors * np.sqrt(np.maximum(values, 0.0))

@@ -24,6 +24,11 @@ from vehiclemor.reduction.inner_products import (
     state_weight,
 )
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.online_settings import (
+    PROJECTED_SOLVERS,
+    PROJECTED_TEXT,
+    online_settings,
+)
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.windows import first_samples
@@ -57,18 +62,7 @@ DYNAMIC_SETTINGS = {
         "of the snapshots: euclidean, energy (mass matrix), range (each state by its range)",
         choices=INNER_PRODUCTS,
     ),
-    "solver": Setting(
-        "text",
-        "explicit",
-        "explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4",
-        choices=("explicit", "rodas4"),
-    ),
-    "tolerance": Setting(
-        "number",
-        1e-6,
-        "largest local error of a state relative to its typical size",
-        minimum=1e-13,
-    ),
+    **online_settings("explicit", 1e-6, PROJECTED_TEXT, PROJECTED_SOLVERS),
 }
 # `literal` is the paper's words.  `recommended` is the default by measurement: it alone keeps the
 # published errors from both starts, and its projected equations keep the model's energy.

@@ -9,31 +9,22 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.online_settings import online_settings
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation import algebraic
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 SUMMARY = "no reduction: the full-order model, the baseline"
 REFERENCE = ""
-_DYNAMIC = {
-    "solver": Setting(
-        "text",
-        "explicit",
-        "explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh Jacobians; "
-        "ros34pw2: W-method of order 3, one Jacobian for all runs; etdrk4: exponential method of "
-        "order 4, with the same",
-        choices=SOLVERS,
-    ),
-    "tolerance": Setting(
-        "number",
-        1e-6,
-        "largest local error of a state relative to its typical size",
-        minimum=1e-13,
-    ),
-}
+_DYNAMIC = online_settings(
+    "explicit",
+    1e-6,
+    "explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh Jacobians; "
+    "ros34pw2: W-method of order 3, one Jacobian for all runs; etdrk4: exponential method of "
+    "order 4, with the same",
+)
 # Kind of model -> settings; a model of another kind is solved as it comes.
 SETTINGS_BY_KIND: dict[str, dict[str, Setting]] = {
     "ae": {

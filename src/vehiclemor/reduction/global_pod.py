@@ -24,10 +24,10 @@ from vehiclemor.reduction.bases import Basis, pod_basis
 from vehiclemor.reduction.dynamic_subspaces import MOST_SNAPSHOTS, ReducedDynamicModel
 from vehiclemor.reduction.inner_products import coordinate_weight
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.quasi_steady_wheels import PROJECTED_SETTINGS, spin_angles
+from vehiclemor.reduction.projected_vehicle import PROJECTED_SETTINGS
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle_shape import is_vehicle
+from vehiclemor.reduction.vehicle_shape import is_vehicle, spin_angles
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.spaces import Spaces

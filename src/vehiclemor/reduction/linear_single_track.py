@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.reduction.features import PLANAR, Features
-from vehiclemor.reduction.modal_truncation import (
+from vehiclemor.reduction.linear_vehicle import (
     CORNERING,
     HEADING,
     MARGIN,

@@ -28,7 +28,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.features import PLANAR, polynomial_features
-from vehiclemor.reduction.modal_truncation import (
+from vehiclemor.reduction.linear_vehicle import (
     HEADING,
     MARGIN,
     PLACE,

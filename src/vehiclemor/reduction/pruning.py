@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.regression import unit_diagonal
 from vehiclemor.reduction.slow_features import FeatureTable
 from vehiclemor.reduction.trajectory_fit import Target, normal_matrix
 
@@ -40,7 +41,7 @@ def pruned(
     Parameters
     ----------
     goals
-        Training runs in reduced states, near which the coefficients are best.
+        Training runs in reduced states, near which the coefficients are best; all must finish.
     slow, inputs
         Slow coordinates and speed (samples, states) and inputs of the training runs.
     kept
@@ -48,8 +49,6 @@ def pruned(
     """
     k = reduced.features.states - 1
     normal = normal_matrix(reduced, goals, table.free)
-    if not len(normal):
-        return reduced, table
     c = reduced.coefficients.copy()
     curved, bent = table.curved, table.bent
     places = [(i, column) for terms, column in table.free for i in terms]
@@ -103,10 +102,8 @@ def surviving(
     tuple
         Numbers of the groups left, in order, and the coefficients (n,), zero where eliminated.
     """
-    # A feature that is zero in all of the training has no scale.
-    scale = np.sqrt(np.diag(normal))
-    scale[scale == 0.0] = 1.0
-    inverse = np.linalg.inv(normal / np.outer(scale, scale) + REGULARISATION * np.eye(len(normal)))
+    scaled, scale = unit_diagonal(normal)
+    inverse = np.linalg.inv(scaled + REGULARISATION * np.eye(len(normal)))
     c = coefficients * scale
     left = list(range(len(groups)))
     while len(left) > kept:

@@ -11,7 +11,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.features import PLANAR, Features
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.vehicle_shape import VehicleShape
-from vehiclemor.simulation.checks import check_inputs, cut_short
+from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.spaces import whole_space
 from vehiclemor.simulation.system import System
@@ -145,11 +145,7 @@ class ReducedVehicle:
             deviation = self.shape.of(self.model.start(start)[None])[0] - self.shape.reference
             shapes += self.transient.at(run.times, deviation)
         states = self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
-        trajectory = self.model.trajectory(
-            run.times, inputs, states, run.counts, run.seconds, run.failure
-        )
-        remarks = (trajectory.remark, cut_short(maneuver))
-        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
+        return self.model.recorded(maneuver, run, inputs, states)
 
     def best_approximation(self, states: np.ndarray) -> None:
         """Lifted shapes lie on no subspace."""

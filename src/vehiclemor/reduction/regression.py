@@ -26,3 +26,13 @@ def largest(values: np.ndarray) -> np.ndarray:
     """Largest magnitude in each column (samples, n) -> (n,); 1 where a column is zero."""
     found = np.abs(values).max(axis=0)
     return np.where(found > 0.0, found, 1.0)
+
+
+def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix (n, n) scaled to a diagonal of ones, and the scales (n,) of coefficients.
+
+    A feature that is zero in all samples has the scale 1.
+    """
+    scale = np.sqrt(np.diag(normal))
+    scale[scale == 0.0] = 1.0
+    return normal / np.outer(scale, scale), scale

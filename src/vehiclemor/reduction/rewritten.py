@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.simulation.checks import check_inputs, cut_short, loop_array
+from vehiclemor.simulation.checks import check_inputs, loop_array
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.spaces import whole_space
 from vehiclemor.simulation.system import System
@@ -54,11 +54,7 @@ class RewrittenVehicle:
         inputs = maneuver.at(run.times)
         states = np.empty((len(run.times), 2 * len(self.model.coordinates)))
         self.system.loops.output_path(run.path, loop_array(inputs), self.system.machine, states)
-        trajectory = self.model.trajectory(
-            run.times, inputs, states, run.counts, run.seconds, run.failure
-        )
-        remarks = (trajectory.remark, cut_short(maneuver))
-        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
+        return self.model.recorded(maneuver, run, inputs, states)
 
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""

@@ -25,7 +25,7 @@ import numpy as np
 
 from vehiclemor.reduction.features import PLANAR
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
+from vehiclemor.reduction.online_settings import online_settings
 from vehiclemor.reduction.pruning import pruned
 from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.regression import largest, ridge_fit
@@ -33,11 +33,10 @@ from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.slow_features import OUTPUTS, feature_table
 from vehiclemor.reduction.slow_modes import slow_modes
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.trajectory_fit import improved, normal_matrix, targets
+from vehiclemor.reduction.trajectory_fit import finishes, improved, targets
 from vehiclemor.reduction.vehicle_shape import VehicleShape, is_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
 SUMMARY = "slow modes with a right-hand side fitted on training runs, fast motion slaved"
@@ -75,16 +74,7 @@ _SETTINGS = {
         minimum=0.0,
         above=True,
     ),
-    **ONLINE_SETTINGS,
-    "solver": Setting(
-        "text",
-        "etdrk4",
-        "as of full_order; etdrk4 and ros34pw2 take a step in one kernel",
-        choices=SOLVERS,
-    ),
-    "tolerance": Setting(
-        "number", 2e-3, "largest local error of a state relative to its typical size", minimum=1e-13
-    ),
+    **online_settings("etdrk4", 2e-3),
 }
 
 
@@ -172,12 +162,12 @@ def fit(
     if sweeps:
         goals = targets(reduced, training, runs)
         reduced = improved(reduced, goals, table.free, sweeps)
-        if kept:
+        if kept and finishes(reduced, goals):
             slow = np.column_stack([z, speed])
             fewer, kept_table = pruned(reduced, table, goals, slow, u, kept)
             fewer = improved(fewer, goals, kept_table.free, sweeps)
             # With too few terms a training run may fail.
-            if len(normal_matrix(fewer, goals, kept_table.free[:1])):
+            if finishes(fewer, goals):
                 reduced = fewer
     evaluations = sum(run.counts[model.evaluations] for run in runs) + len(u)
     offline = Offline(time.perf_counter() - began, evaluations)

@@ -16,6 +16,8 @@ from vehiclemor.reduction.vehicle_shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.
 CONTROLLED = 1e-6
+# Eigenvalues (1/s) nearer to each other belong to the cluster of stabilised constraints.
+APART = 1e-2
 # Below it (1/s) an eigenvalue is zero.
 STILL = 1e-6
 
@@ -85,18 +87,9 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     controlled = np.abs(left @ linear.b[:, 0]) * np.linalg.norm(right, axis=0)
     steers = controlled > CONTROLLED * controlled.max()
     still = int(np.argmin(np.abs(values)))
-    rows, columns = [], []
-    chosen = np.flatnonzero(steers & (np.abs(values) <= fastest) & (np.imag(values) >= 0.0))
-    for i in sorted(chosen, key=lambda i: abs(values[i])):
-        if i == still or abs(values[i]) < STILL:
-            continue
-        if values[i].imag > 0.0:
-            rows += [left[i].real, left[i].imag]
-            columns += [2.0 * right[:, i].real, -2.0 * right[:, i].imag]
-        else:
-            rows.append(left[i].real)
-            columns.append(right[:, i].real)
-    w, v = np.array(rows), np.array(columns).T
+    moving = np.abs(values) >= STILL
+    moving[still] = False
+    w, v = real_modes(values, left, right, steers & moving & (np.abs(values) <= fastest))
     rates = w @ linear.a @ v
     # z' = rates z + sum_j b_j u^(j): with z - h u for z the derivatives of the steering go.
     b = w @ linear.b
@@ -107,7 +100,7 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.motion_a[1] @ right[:, still].real
     quiet = np.flatnonzero(
-        ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & _apart(values)
+        ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & apart(values)
     )
     double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
     return SlowModes(
@@ -123,7 +116,36 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     )
 
 
-def _apart(values: np.ndarray) -> np.ndarray:
+def real_modes(
+    values: np.ndarray, left: np.ndarray, right: np.ndarray, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Modes in real form, slow ones first; blocks of two for conjugate pairs.
+
+    Parameters
+    ----------
+    values, left, right
+        Eigenvalues (n,) in 1/s, left eigenvectors by rows, and the inverse of that matrix.
+    chosen
+        Which modes (n,) are wanted, of a conjugate pair both or the upper one.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Coordinates per state (k, n) and back (n, k).
+    """
+    rows, columns = [], []
+    upper = np.flatnonzero(chosen & (np.imag(values) >= 0.0))
+    for i in sorted(upper, key=lambda i: abs(values[i])):
+        rows.append(left[i].real)
+        if values[i].imag > 0.0:
+            rows.append(left[i].imag)
+            columns += [2.0 * np.real(right[:, i]), -2.0 * np.imag(right[:, i])]
+        else:
+            columns.append(np.real(right[:, i]))
+    return np.array(rows), np.array(columns).T
+
+
+def apart(values: np.ndarray) -> np.ndarray:
     """Eigenvalues outside of clusters: those of stabilised constraints are no motion."""
     distance = np.abs(values[:, None] - values[None, :]) + 1e9 * np.eye(len(values))
-    return distance.min(axis=1) > 1e-2
+    return distance.min(axis=1) > APART

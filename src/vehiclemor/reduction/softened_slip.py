@@ -12,20 +12,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.online_settings import online_settings
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.vehicle_shape import is_vehicle
-from vehiclemor.simulation.checks import check_inputs, cut_short
+from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.simulation.spaces import full_space
-from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 SUMMARY = "the full model with softer longitudinal slip of its tires, for longer explicit steps"
@@ -35,10 +35,7 @@ REFERENCE = ""
 SLIP_STIFFNESS = ("PKX1", "PKX2", "longitudinal_slip_stiffness")
 _SETTINGS = {
     "factor": Setting("number", 5.0, "slip stiffness is divided by it", minimum=1.0),
-    "solver": Setting("text", "explicit", "as of full_order", choices=SOLVERS),
-    "tolerance": Setting(
-        "number", 1e-4, "largest local error of a state relative to its typical size", minimum=1e-13
-    ),
+    **online_settings("explicit", 1e-4, "as of full_order"),
 }
 
 
@@ -71,12 +68,7 @@ class SoftenedVehicle:
         run = self.softened.system.run(
             maneuver, model.start(start), space, self.solver, self.tolerance
         )
-        inputs = maneuver.at(run.times)
-        trajectory = model.trajectory(
-            run.times, inputs, run.path, run.counts, run.seconds, run.failure
-        )
-        remarks = (trajectory.remark, cut_short(maneuver))
-        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
+        return model.recorded(maneuver, run, maneuver.at(run.times), run.path)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from vehiclemor.reduction.features import PLANAR
 from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.regression import unit_diagonal
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -89,9 +90,7 @@ def improved(
         if not np.isfinite(error):
             break
         normal, gradient = _normal_equations(reduced, goals, paths, free)
-        scale = np.sqrt(np.diag(normal))
-        scale[scale == 0.0] = 1.0
-        scaled = normal / np.outer(scale, scale)
+        scaled, scale = unit_diagonal(normal)
         while damping < MOST_DAMPING:
             step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
             candidate = _changed(reduced, free, -step)
@@ -104,13 +103,16 @@ def improved(
     return reduced
 
 
+def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
+    """Whether all reduced training runs come to their end."""
+    return bool(np.isfinite(_compared(reduced, goals)[1]))
+
+
 def normal_matrix(
     reduced: ReducedVehicle, goals: Sequence[Target], free: Sequence[tuple[Sequence[int], int]]
 ) -> np.ndarray:
-    """Normal matrix of the free coefficients, column by column; empty if a run has failed."""
-    paths, error = _compared(reduced, goals)
-    if not np.isfinite(error):
-        return np.zeros((0, 0))
+    """Normal matrix of the free coefficients, column by column; all runs must finish."""
+    paths, _ = _compared(reduced, goals)
     return _normal_equations(reduced, goals, paths, free)[0]
 
 

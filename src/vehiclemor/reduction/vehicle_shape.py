@@ -151,3 +151,9 @@ def _turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray
         turned[:, a] = cosine * states[:, a] - sine * states[:, b]
         turned[:, b] = sine * states[:, a] + cosine * states[:, b]
     return turned
+
+
+def spin_angles(model: DynamicModel) -> np.ndarray:
+    """Numbers of the coordinates that are spin angles: cyclic, and not of the place."""
+    free = np.setdiff1d(np.arange(len(model.coordinates)), model.active)
+    return np.setdiff1d(free, model.planar)

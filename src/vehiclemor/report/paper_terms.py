@@ -23,7 +23,7 @@ from vehiclemor.report.published import load_published
 from vehiclemor.report.timing import measure
 from vehiclemor.simulation.model import build
 from vehiclemor.study.provenance import code_digest, machine
-from vehiclemor.study.store import prepare_folder, read_dataset, write_dataset
+from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,10 +150,8 @@ def _measured(name: str, folder: Path) -> xr.Dataset:
     content = [repr(c) for c in contestants] + [code_digest(name, "pod"), model.kernel_hash]
     key = hashlib.sha256(json.dumps([content, machine()]).encode()).hexdigest()[:16]
     path = folder / "studies" / f"paper-terms-{name}.nc"
-    if path.exists():
-        dataset = read_dataset(path, "source", "vehiclemor")
-        if dataset.attrs.get("timing") == key:
-            return dataset
+    if (known := up_to_date(path, "timing", key)) is not None:
+        return known
     prepare_folder(folder)
     parts = [measure(model, contestants, start) for start in model.starts]
     dataset = xr.concat(parts, dim="start", join="exact", combine_attrs="override")

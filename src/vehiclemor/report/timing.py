@@ -22,7 +22,7 @@ from vehiclemor.registry import component
 from vehiclemor.report.contestants import RACES, Contestant
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.study.provenance import code_digest, machine, versions
-from vehiclemor.study.store import prepare_folder, read_dataset, write_dataset
+from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,10 +45,8 @@ def timing(model_name: str, folder: Path) -> xr.Dataset:
     model = build(model_name)
     path = folder / "studies" / f"timing-{model_name}.nc"
     key = _identity(model)
-    if path.exists():
-        dataset = read_dataset(path, "source", "vehiclemor")
-        if dataset.attrs.get("timing") == key:
-            return dataset
+    if (known := up_to_date(path, "timing", key)) is not None:
+        return known
     prepare_folder(folder)
     contestants = RACES[model_name].contestants
     parts = [measure(model, contestants, start) for start in model.starts]

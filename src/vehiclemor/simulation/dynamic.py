@@ -24,7 +24,7 @@ from vehiclemor.simulation.checks import (
     loop_array,
 )
 from vehiclemor.simulation.spaces import Spaces, full_space
-from vehiclemor.simulation.system import System
+from vehiclemor.simulation.system import Run, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 
 # Tolerance of the full-order runs that others are measured against.
@@ -293,9 +293,14 @@ class DynamicModel:
         if spaces.form == system_loops.COORDINATES:
             self.require("second_order", "speeds")
         run = self.system.run(maneuver, state, spaces, solver, tolerance, times, longest_step)
-        inputs = maneuver.at(run.times)
+        return self.recorded(maneuver, run, maneuver.at(run.times), run.path)
+
+    def recorded(
+        self, maneuver: Maneuver, run: Run, inputs: np.ndarray, states: np.ndarray
+    ) -> Trajectory:
+        """Trajectory of a run whose path has been brought to states (samples, 2 n) of the model."""
         trajectory = self.trajectory(
-            run.times, inputs, run.path, run.counts, run.seconds, run.failure
+            run.times, inputs, states, run.counts, run.seconds, run.failure
         )
         remarks = (trajectory.remark, cut_short(maneuver))
         return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))

@@ -17,7 +17,7 @@ from vehiclemor.study.executor import results_folder
 from vehiclemor.study.protocol import Protocol
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.scenarios import maneuver_of, start_of
-from vehiclemor.study.store import read_dataset, write_dataset
+from vehiclemor.study.store import up_to_date, write_dataset
 from vehiclemor.study.trial_execution import Fit, fit, fresh_fit
 from vehiclemor.study.trials import Trial, make_trial
 
@@ -57,10 +57,8 @@ def timing(
     labels = [row.label for row in rows]
     content = json.dumps([labels, [trial.key for trial in trials], machine(), ROUNDS, REPEATS])
     key = hashlib.sha256(content.encode()).hexdigest()[:16]
-    if path.exists():
-        dataset = read_dataset(path, "source", "vehiclemor")
-        if dataset.attrs.get("timing") == key:
-            return dataset
+    if (known := up_to_date(path, "timing", key)) is not None:
+        return known
     finished = np.array([found["status"].values == "ok" for found in tested["test"]])
     dataset = measure(model, trials, finished)
     dataset = dataset.assign_coords(row=labels)

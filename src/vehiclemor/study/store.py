@@ -100,6 +100,14 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     return dataset
 
 
+def up_to_date(path: Path, attribute: str, key: str) -> xr.Dataset | None:
+    """A result file of this package that was made for this key, if there is one."""
+    if not path.exists():
+        return None
+    dataset = read_dataset(path, "source", "vehiclemor")
+    return dataset if dataset.attrs.get(attribute) == key else None
+
+
 def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarray]:
     """Arrays of a result file by name; as `read_dataset`, but three times faster."""
     import netCDF4
