@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
 from vehiclemor.maneuvers import rack_lane_change
-from vehiclemor.models import high_fidelity_vehicle
+from vehiclemor.models.high_fidelity import definition as high_fidelity_vehicle
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import lane_change
-from vehiclemor.models import independent_suspension_vehicle
+from vehiclemor.models.independent_suspension import definition as independent_suspension_vehicle
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component

@@ -72,7 +72,7 @@ def test_a_method_that_a_setting_does_not_concern_is_computed_once():
 
 
 def test_a_plug_in_error_spoils_only_its_cell(cell, monkeypatch):
-    from vehiclemor.reduction import pod
+    from vehiclemor.reduction.methods import pod
 
     def broken(*_):
         raise ZeroDivisionError("in a plug-in")
@@ -158,7 +158,7 @@ def test_rows_of_different_models_keep_their_units_and_counts():
 
 
 def test_settings_of_a_method_that_refuses_the_model_are_not_judged(monkeypatch):
-    from vehiclemor.reduction import pod
+    from vehiclemor.reduction.methods import pod
 
     monkeypatch.setattr(pod, "accepts", lambda model: (False, f"pod can't reduce {model.name}"))
     cell = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rnk": 3}, "x")

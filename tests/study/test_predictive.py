@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.reduction import fixed_basis
+from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
 from vehiclemor.report.predictive_text import printed
 from vehiclemor.simulation.algebraic import AlgebraicModel

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import FileError
-from vehiclemor.reduction import replay
+from vehiclemor.reduction.methods import replay
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.resources import data_names

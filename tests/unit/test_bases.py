@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.bases import Basis, pod_basis, project
+from vehiclemor.reduction.projection.bases import Basis, pod_basis, project
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 

@@ -8,8 +8,8 @@ import pytest
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import lane_change
-from vehiclemor.reduction import pod
-from vehiclemor.reduction.inner_products import coordinate_weight, state_weight
+from vehiclemor.reduction.methods import pod
+from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.simulation import linearisation

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vehiclemor.maneuvers import lane_change
-from vehiclemor.reduction.feature_kernels import diagonal_blocks
-from vehiclemor.reduction.features import Features
+from vehiclemor.reduction.vehicle.feature_kernels import diagonal_blocks
+from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.simulation.exponential_functions import exponential_tables, phi_functions
 from vehiclemor.simulation.spaces import whole_space
 

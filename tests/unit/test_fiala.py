@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.unit.programs import function_of
-from vehiclemor.models import tilted_wheel, tires
+from vehiclemor.models.components import tilted_wheel, tires
 from vehiclemor.symbolic.tape import Tape
 
 ALONG, ACROSS, MOST, LEAST, WIDTH = COEFFICIENTS = (115e3, 117e3, 0.75, 0.2, 0.32)

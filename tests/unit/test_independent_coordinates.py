@@ -7,11 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vehiclemor.maneuvers import rack_lane_change
-from vehiclemor.models.high_fidelity_independent import PLACES
+from vehiclemor.models.high_fidelity.independent import PLACES
+from vehiclemor.reduction.vehicle.frozen_constants import frozen_encoder, frozen_kernels
+from vehiclemor.reduction.vehicle.independent import independent_kernels
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
-from vehiclemor.simulation.frozen_inertia import frozen_encoder, frozen_kernels
-from vehiclemor.simulation.independent import independent_kernels
 
 INDEPENDENT = np.concatenate([np.array(PLACES), 26 + np.array(PLACES)])
 DERIVATIVE, FULL = 28, 52

@@ -14,7 +14,7 @@ from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import cache, straight_line
 from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.dynamic_subspaces import check_subspace
+from vehiclemor.reduction.projection.dynamic import check_subspace
 from vehiclemor.registry import component
 from vehiclemor.simulation import dynamic_build, newton_loops, system_loops
 from vehiclemor.simulation.spaces import Spaces, full_space

@@ -14,11 +14,11 @@ from vehiclemor.maneuvers import (
     rack_straight_ahead,
     straight_ahead,
 )
-from vehiclemor.reduction.balanced_truncation import balanced, lateral_system
-from vehiclemor.reduction.linear_single_track import single_track
-from vehiclemor.reduction.linear_vehicle import lateral_modes
-from vehiclemor.reduction.modal_truncation import truncated
-from vehiclemor.reduction.vehicle_shape import VehicleShape
+from vehiclemor.reduction.methods.balanced_truncation import balanced, lateral_system
+from vehiclemor.reduction.methods.linear_single_track import single_track
+from vehiclemor.reduction.methods.modal_truncation import truncated
+from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 VEHICLES = {
     "independent_suspension_vehicle": (lane_change, straight_ahead),

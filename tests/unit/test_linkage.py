@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.unit.programs import function_of, pivot_shares
-from vehiclemor.models import double_wishbone_linkage, vehicle_corners
-from vehiclemor.models.double_wishbone_points import POINTS, tie_rod_angles
-from vehiclemor.models.high_fidelity_equations import CORNER, LOWER_ARMS, PIVOTS
+from vehiclemor.models.double_wishbone import linkage as double_wishbone_linkage
+from vehiclemor.models.double_wishbone.points import POINTS, tie_rod_angles
+from vehiclemor.models.high_fidelity import corners as vehicle_corners
+from vehiclemor.models.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.symbolic.joints import free_rate

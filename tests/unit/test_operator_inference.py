@@ -8,15 +8,15 @@ import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import lane_change, straight_ahead
-from vehiclemor.reduction.features import polynomial_features
-from vehiclemor.reduction.operator_inference import (
+from vehiclemor.reduction.methods.operator_inference import (
     mirror,
     mirror_basis,
     operators,
     reflected,
     term_parity,
 )
-from vehiclemor.reduction.vehicle_shape import VehicleShape
+from vehiclemor.reduction.vehicle.features import polynomial_features
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 

@@ -8,8 +8,8 @@ import pytest
 from tests.reducing import figure_errors, fitted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction import path_map
-from vehiclemor.reduction.path_map import PathMapModel
+from vehiclemor.reduction.methods import path_map
+from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 

@@ -46,4 +46,4 @@ def test_no_plug_in_takes_a_built_in_name(monkeypatch):
     real = registry.entry_points(group=registry.GROUPS["method"])
     monkeypatch.setattr(registry, "entry_points", lambda **_: [*real, thief])
     found = registry._entries.__wrapped__("method")
-    assert found["pod"].value == "vehiclemor.reduction.pod"
+    assert found["pod"].value == "vehiclemor.reduction.methods.pod"

@@ -9,12 +9,12 @@ from tests.reducing import figure_errors, fitted, floor_errors
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import rms
-from vehiclemor.reduction import polynomial_residual
-from vehiclemor.reduction.polynomial_residual import PolynomialResidualModel
+from vehiclemor.reduction.methods import polynomial_residual
+from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
+from vehiclemor.reduction.polynomials.kernels import derivatives, monomials
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.map_kernels import derivatives, monomials
 
 START = "equilibrium"
 

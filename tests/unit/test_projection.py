@@ -8,8 +8,8 @@ import pytest
 from tests.oracles.projection import reduced_path
 from tests.reducing import figure_errors, fitted
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.bases import Basis, pod_basis
-from vehiclemor.reduction.projected import ProjectedModel
+from vehiclemor.reduction.projection.algebraic import ProjectedModel
+from vehiclemor.reduction.projection.bases import Basis, pod_basis
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
 

@@ -13,7 +13,7 @@ from vehiclemor.maneuvers import (
     rack_lane_change,
     straight_ahead,
 )
-from vehiclemor.reduction import (
+from vehiclemor.reduction.methods import (
     balanced_pod,
     fixed_basis,
     global_pod,
@@ -22,7 +22,7 @@ from vehiclemor.reduction import (
 )
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle_shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.linearisation import reduced_jacobian
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.steering_maneuvers import rack_step_steer, step_steer

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.pruning import surviving
+from vehiclemor.reduction.vehicle.pruning import surviving
 
 
 def problem(seed: int, features: int = 6, targets: int = 2, samples: int = 40):

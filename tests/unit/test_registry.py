@@ -47,7 +47,7 @@ def test_nearest_names_come_best_first() -> None:
 @pytest.fixture
 def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     found = {
-        ("vehiclemor.methods", "mine"): "vehiclemor.reduction.replay",
+        ("vehiclemor.methods", "mine"): "vehiclemor.reduction.methods.replay",
         ("vehiclemor.methods", "empty"): "json",
         ("vehiclemor.methods", "gone"): "no_such_package.method",
         ("vehiclemor.maneuvers", "nothing"): "json:no_such_object",
@@ -63,7 +63,7 @@ def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("plugins")
 def test_plugins_register_as_built_ins_do() -> None:
-    from vehiclemor.reduction import replay
+    from vehiclemor.reduction.methods import replay
 
     assert names("method") == ["empty", "gone", "mine"]
     assert component("method", "mine") is replay

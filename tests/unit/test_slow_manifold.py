@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import lane_change, rack_lane_change, straight_ahead
-from vehiclemor.reduction import slow_manifold
-from vehiclemor.reduction.features import polynomial_features
-from vehiclemor.reduction.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.settings import validated
-from vehiclemor.reduction.slow_modes import slow_modes
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.trajectory_fit import _sensitivities, improved, targets
-from vehiclemor.reduction.vehicle_shape import VehicleShape
+from vehiclemor.reduction.vehicle.features import polynomial_features
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.slow_modes import slow_modes
+from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import build
 from vehiclemor.simulation.spaces import whole_space

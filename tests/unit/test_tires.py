@@ -14,7 +14,7 @@ from tests.oracles.vehicle_data import (
     magic_formula,
     trail_at_rest,
 )
-from vehiclemor.models import tires
+from vehiclemor.models.components import tires
 from vehiclemor.symbolic.tape import Tape
 
 REFERENCE_LOAD = PARAMETERS["FNOMIN"] * PARAMETERS["LFZO"]

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.errors import GeometryError
+from vehiclemor.models.high_fidelity.equilibrium import check_vehicle
 from vehiclemor.models.quantities import WHEELS
-from vehiclemor.models.vehicle_equilibrium import check_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import build
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.windows import first_samples, window_edges
+from vehiclemor.reduction.projection.windows import first_samples, window_edges
 
 durations = st.floats(0.01, 1000.0)
 shares = st.floats(0.002, 3.0)

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import subspace_angles
 
-from vehiclemor.reduction import pod
-from vehiclemor.reduction.projected import fit_windows
+from vehiclemor.reduction.methods import pod
+from vehiclemor.reduction.projection.algebraic import fit_windows
+from vehiclemor.reduction.projection.windows import window_edges
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
-from vehiclemor.reduction.windows import window_edges
 from vehiclemor.registry import component
 from vehiclemor.report.criteria.finding import (
     INDISTINGUISHABLE,

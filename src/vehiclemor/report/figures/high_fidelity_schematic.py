@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from vehiclemor.models import high_fidelity_vehicle as vehicle
-from vehiclemor.models.vehicle_equilibrium import wheel_places
+from vehiclemor.models.high_fidelity import definition as vehicle
+from vehiclemor.models.high_fidelity.equilibrium import wheel_places
 from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures import mechanism
 from vehiclemor.report.figures.lines import Results

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vehiclemor.models import independent_suspension_vehicle as vehicle
+from vehiclemor.models.independent_suspension import definition as vehicle
 from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures.lines import Results
 from vehiclemor.report.figures.mechanism import draw_graph

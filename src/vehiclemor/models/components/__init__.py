@@ -1,0 +1,1 @@
+"""What vehicles share: chassis, wheels, tires."""

@@ -1,0 +1,1 @@
+"""The high-fidelity vehicle and its other forms."""

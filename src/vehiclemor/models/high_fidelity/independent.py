@@ -1,0 +1,170 @@
+"""The high-fidelity vehicle in 14 independent coordinates: an ODE without constraints.
+
+Its front corners close in closed form (`closed_corner.py`), so that these equations are the exact
+ones of `high_fidelity_equations.py` on the manifold where all constraints hold.
+"""
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from vehiclemor.models.components import body
+from vehiclemor.models.equations import DynamicEquations
+from vehiclemor.models.high_fidelity import closed_corner, parts
+from vehiclemor.models.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
+from vehiclemor.models.high_fidelity.definition import COORDINATES as ALL_COORDINATES
+from vehiclemor.models.high_fidelity.definition import INPUTS, OUTPUTS
+from vehiclemor.models.high_fidelity.definition import SPEEDS as ALL_SPEEDS
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic import mechanics
+from vehiclemor.symbolic.joints import free_rate
+from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.tape import Tape
+
+# Places of the independent coordinates among the 26: chassis, lower arms, rear arms, spins.
+PLACES = (*range(6), 10, 17, 20, 21, 22, 23, 24, 25)
+COORDINATES = tuple(ALL_COORDINATES[k] for k in PLACES)
+SPEEDS = tuple(ALL_SPEEDS[k] for k in PLACES)
+NUMBERS = parts.Numbers(len(PLACES), (6, 7), (8, 9), (10, 11, 12, 13))
+
+
+def derive() -> DynamicEquations:
+    """Derive accelerations, outputs and the state of all 26 coordinates; parameters are symbols."""
+    tape = Tape()
+    q, rates = body.symbols(COORDINATES), body.symbols(SPEEDS)
+    s, s_dot, s_ddot = body.symbols(INPUTS)
+    p, flat = parts.parameters()
+    vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
+    corners, motions = [], []
+    for k, number in enumerate(NUMBERS.lower_arms):
+        points = vehicle.points[k]
+        corner = closed_corner.closed(tape, q[number], s, points, parts.SIDES[k])
+        rack = (s_dot, s_ddot)
+        corners.append(corner)
+        motions.append(closed_corner.motions(tape, corner, number, rates[number], rack, points))
+    front = [
+        parts.front_corner(tape, vehicle, corners[k].linkage, motions[k].bodies, k)
+        for k in range(2)
+    ]
+    free = [free_rate(k, rate) for k, rate in enumerate(rates)]
+    whole = [*front, *(parts.rear_corner(tape, vehicle, free, k) for k in (2, 3))]
+    mass, _ = parts.kane(tape, vehicle, whole)
+    solved = parts.solved(tape, vehicle, whole)
+    accelerations = [
+        *parts.chassis_accelerations(tape, attitude, solved, speeds),
+        *(solved[k] for k in range(6, NUMBERS.total)),
+    ]
+    carriers = [corner.linkage.carrier for corner in corners]
+    zero = sp.Integer(0)
+    outputs = [*parts.outputs(tape, vehicle, whole, speeds, carriers), zero, zero]
+    n = NUMBERS.total
+    program = assemble(
+        tape,
+        {"x": [*q, *rates], "u": [s, s_dot, s_ddot]},
+        flat,
+        {
+            "derivative": ([*rates, *accelerations], (2 * n,)),
+            "outputs": (outputs, (len(OUTPUTS),)),
+            "full_state": (
+                full_state(tape, q, rates, corners, motions),
+                (2 * len(ALL_COORDINATES),),
+            ),
+            "mass": ([entry for row in mass for entry in row], (n, n)),
+            "quasi_speeds": (_quasi_speeds(tape, vehicle, speeds, carriers, motions), (n,)),
+            "suspension": (_suspension(tape, vehicle, corners[0]), (3, 4)),
+        },
+    )
+    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program)
+
+
+def full_state(
+    tape: Tape,
+    q: Sequence[sp.Expr],
+    rates: Sequence[sp.Expr],
+    corners: Sequence[ClosedCorner],
+    motions: Sequence[ClosedMotions],
+) -> list[sp.Expr]:
+    """All 26 coordinates and their rates, from the 14 independent ones and theirs."""
+    lifted, lifted_rates = [*q[:6]], [*rates[:6]]
+    for corner, motion, number in zip(corners, motions, NUMBERS.lower_arms, strict=True):
+        angles, turning = _joints(tape, corner, motion)
+        # The lower arm's angle comes after that of the upper one.
+        lifted += [*angles[:4], q[number], *angles[4:]]
+        lifted_rates += [*turning[:4], rates[number], *turning[4:]]
+    return [*lifted, *q[8:], *lifted_rates, *rates[8:]]
+
+
+def _joints(
+    tape: Tape, corner: ClosedCorner, motions: ClosedMotions
+) -> tuple[list[sp.Expr], list[sp.Expr]]:
+    """zeta, eta, xi, theta_u, alpha, beta of a corner, and their rates."""
+    let, linkage = tape.let, corner.linkage
+    rows, (x, y, z) = linkage.carrier, linkage.rod_direction
+    first = (rows[0][0], rows[1][0], rows[2][0])
+    flat = let(first[0] ** 2 + first[1] ** 2)
+    level = let(sp.sqrt(flat))
+    turn = linkage.upper.angle
+    assert isinstance(turn, tuple)
+    wide = let(x**2 + y**2)
+    angles = [
+        sp.atan2(first[1], first[0]),
+        sp.atan2(-first[2], level),
+        sp.atan2(rows[2][1], rows[2][2]),
+        sp.atan2(turn[1], turn[0]),
+        sp.atan2(-x, y),
+        sp.atan2(z, let(sp.sqrt(wide))),
+    ]
+    # Angular velocity of the carrier along z, the turned y axis and the carrier's x axis.
+    a, b, c = motions.bodies.carrier.value
+    roll = let((a * first[0] + b * first[1]) / flat)
+    pitch = let((b * first[0] - a * first[1]) / level)
+    yaw = let(c - roll * first[2])
+    rod = motions.bodies.rod.value
+    # The rod turns about z with alpha and about the turned x axis, (y, -x) / root, with beta.
+    beta = let((rod[0] * y - rod[1] * x) / let(sp.sqrt(wide)))
+    rates = [yaw, pitch, roll, motions.upper.value, rod[2], beta]
+    return [let(angle) for angle in angles], rates
+
+
+def _quasi_speeds(
+    tape: Tape,
+    vehicle: parts.Vehicle,
+    speeds: Sequence[sp.Expr],
+    carriers: Sequence[g.Rotation],
+    motions: Sequence[ClosedMotions],
+) -> list[sp.Expr]:
+    """Chassis speeds, rates of the arms, and spins of the wheels in space."""
+    rates = vehicle.rates
+    turning = g.vector(speeds[3:6])
+    spins = []
+    for carrier, motion in zip(carriers, motions, strict=True):
+        axle = (carrier[0][1], carrier[1][1], carrier[2][1])
+        spins.append(g.dot(axle, g.add(turning, motion.bodies.carrier.value)))
+    spins += [turning[1] + rates[number] for number in NUMBERS.rear_arms]
+    own = [rates[number] for number in NUMBERS.spins]
+    total = [tape.let(spin + rate) for spin, rate in zip(spins, own, strict=True)]
+    return [*speeds, *rates[6:10], *total]
+
+
+def _suspension(tape: Tape, vehicle: parts.Vehicle, corner: ClosedCorner) -> list[sp.Expr]:
+    """Rows: left front and rear wheel centre with the length of the spring; front axle and zero."""
+    linkage, front, rear = corner.linkage, vehicle.points[0], vehicle.points[2]
+    angle = vehicle.q[NUMBERS.rear_arms[0]]
+
+    def behind(name: str) -> g.Vector:
+        lever = g.named(tape, g.subtract(rear[name], rear["rear_arm_pivot"]))
+        turned = g.rotate_about_axis(tape, lever, mechanics.UNIT[1], angle)
+        return g.named(tape, g.add(rear["rear_arm_pivot"], turned))
+
+    def spring(end: g.Vector, fixed: g.Vector) -> sp.Expr:
+        return g.length(tape, g.named(tape, g.subtract(end, fixed)))
+
+    lever = linkage.lower.lever(tape, front["front_spring_arm_point"])
+    return [
+        *linkage.on_carrier(tape, front["wheel_centre"]),
+        spring(g.add(linkage.lower.rear, lever), front["front_spring_chassis_point"]),
+        *behind("rear_wheel_centre"),
+        spring(behind("rear_spring_arm_point"), rear["rear_spring_chassis_point"]),
+        *(row[1] for row in linkage.carrier),
+        sp.Integer(0),
+    ]

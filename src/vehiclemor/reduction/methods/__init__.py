@@ -1,0 +1,1 @@
+"""Registered reduction methods, one in each file; none knows another."""

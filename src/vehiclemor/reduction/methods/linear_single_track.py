@@ -1,0 +1,148 @@
+"""The linear single-track car (bicycle model): lateral speed V and yaw rate r at constant speed U.
+
+P. Riekert, T. E. Schunck, Ing.-Arch. 11 (1940), 210-224; M. Mitschke, H. Wallentowitz, Dynamik der
+Kraftfahrzeuge (Springer).  With C_i, l_i effective cornering stiffness and place of the axles:
+
+    m V' = -m U r + sum_i F_i,   J r' = sum_i l_i F_i,   F_i = C_i (steer_i - (V + l_i r) / U)
+
+The numbers come from the model itself: it is linearised at straight running (speed U0), and all
+other lateral states are eliminated as if they were at rest (A_kk - A_kf A_ff^-1 A_fk, static
+condensation).  So the stiffnesses are effective ones: pneumatic trail, roll steer, camber and, for
+a prescribed rack, the wheels' angle per rack are in them; steady cornering is that of the
+linearised model.  Masses and stiffnesses need not be told apart: the 2x2 matrix of the car above is
+
+    A(U) = U [[0, -1], [0, 0]] + U0 / U A1
+
+so A1 follows from the matrix at U0, and the car holds at the speed of its start, which stays
+constant.  Velocity and acceleration of the rack are left out.  Heave and pitch have no place in a
+single-track car.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vehiclemor.reduction.methods.slow_manifold import accepts
+from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
+from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.linear_vehicle import (
+    CORNERING,
+    HEADING,
+    MARGIN,
+    PLACE,
+    SPEED,
+    linearisation_cost,
+)
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.slow_modes import slow_modes
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
+
+__all__ = ["REFERENCE", "SUMMARY", "accepts", "check", "fit", "presets", "settings"]
+SUMMARY = "linear single-track car with the model's own effective stiffnesses"
+REFERENCE = "10.1007/BF02086921"
+# Lateral speed (m/s) of a typical maneuver.
+SIDEWARD = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class SingleTrack:
+    """Condensed linear dynamics of (V, r).
+
+    Attributes
+    ----------
+    a, b
+        Matrix (2, 2) and column (2,) of the steering, at the model's own speed.
+    tire
+        Part of `a` (2, 2) that comes from the tires and goes as one over the speed.
+    rows
+        V and r per deviation of the shape (2, n).
+    follow, steered
+        Deviation of the shape per (V, r), (n, 2), and per steering, (n,).
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    tire: np.ndarray
+    rows: np.ndarray
+    follow: np.ndarray
+    steered: np.ndarray
+
+
+def single_track(shape: VehicleShape) -> SingleTrack:
+    """Condense the linearised vehicle on lateral speed and yaw rate."""
+    linear = shape.linearised
+    kept = np.argmax(np.abs(linear.motion_a[[2, 0]]), axis=1)
+    rows = np.eye(len(linear.a))[kept]
+    rest = np.setdiff1d(np.arange(len(linear.a)), kept)
+    drive = np.column_stack([linear.a[np.ix_(rest, kept)], linear.b[rest, 0]])
+    # The speed is no lateral state: its zero eigenvalue makes the matrix singular, and is cut.
+    condensed = -np.linalg.lstsq(linear.a[np.ix_(rest, rest)], drive, rcond=1e-10)[0]
+    whole = np.zeros((len(linear.a), 3))
+    whole[rest] = condensed
+    whole[kept, [0, 1]] = 1.0
+    matrix = linear.a[kept] @ whole
+    matrix[:, 2] += linear.b[kept, 0]
+    a, b = matrix[:, :2], matrix[:, 2]
+    turning = np.array([[0.0, -shape.speed], [0.0, 0.0]])
+    return SingleTrack(a, b, a - turning, rows, whole[:, :2], whole[:, 2])
+
+
+def settings(kind: str) -> Mapping[str, Setting]:
+    """Settings for models of that kind."""
+    return ONLINE_SETTINGS if kind in ("ode", "dae") else {}
+
+
+def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
+    """Presets; the same for every model."""
+    del model
+    return {"recommended": {}}
+
+
+def check(model: Model, settings: Mapping[str, Value]) -> None:
+    """All validated settings fit every vehicle."""
+    del model, settings
+
+
+def fit(
+    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+) -> ReducedVehicle:
+    """Linearise and condense; no training run is looked at."""
+    del training
+    assert isinstance(model, DynamicModel)
+    began = time.perf_counter()
+    shape = VehicleShape(model)
+    car, modes = single_track(shape), slow_modes(shape, np.inf)
+    inputs = len(model.inputs)
+    # States V, r and the deviation of the speed.
+    lines = (("part", "p[0] / (p[0] + z2)"),)
+    terms = ("z0", "z1", "u0", "part * z0", "part * z1", "(p[0] + z2) * z1", "p[0] + z2", "z2")
+    groups = (((0, 1, 2, 3, 4, 5), (0, 1, 3, 5)), ((6, 7), (4,)))
+    features = Features(3, inputs, lines, terms, groups)
+    c = np.zeros((len(terms), 3 + PLANAR))
+    c[[3, 4], :2], c[2, :2], c[5, 0] = car.tire.T, car.b, -1.0
+    c[1, 3], c[6, 4], c[0, 5] = 1.0, 1.0, 1.0
+    lifting = np.zeros((len(terms), len(shape.reference)))
+    lifting[[0, 1]], lifting[2], lifting[7] = car.follow.T, car.steered, modes.speed_right
+    turn = CORNERING / shape.speed
+    return ReducedVehicle(
+        model,
+        shape,
+        features,
+        np.array([shape.speed]),
+        c,
+        lifting,
+        np.vstack([car.rows, modes.speed_left]),
+        np.zeros((3, inputs)),
+        np.array([MARGIN * SIDEWARD, MARGIN * turn, SPEED, HEADING, PLACE, PLACE]),
+        linearisation_cost(shape, began),
+        str(settings["solver"]),
+        float(settings["tolerance"]),
+    )

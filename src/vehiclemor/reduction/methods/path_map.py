@@ -1,0 +1,186 @@
+"""Path map: the coordinates of a mechanism with one degree of freedom as polynomials in its travel.
+
+At a constant rack displacement the configurations of a suspension form a curve.  It is smooth, so
+that least squares on Chebyshev polynomials converge geometrically with the degree (L. N. Trefethen,
+Approximation Theory and Approximation Practice, 2013, chapter 8).  No equation is solved online.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_module
+from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.checks import loop_array
+from vehiclemor.simulation.clock import timed
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
+
+SUMMARY = "the coordinates as polynomials in the wheel travel: no equation is solved"
+REFERENCE = "10.1137/1.9781611975949"
+# Beyond it powers of the travel lose digits to rounding.
+HIGHEST_DEGREE = 20
+# What counts as inside of the range of training, relative to the range of the travel.
+SLACK = 1e-9
+SETTINGS = {
+    "degree": Setting("integer", 10, "degree of the polynomials in the travel", minimum=1),
+    "outside": Setting(
+        "text",
+        "stop",
+        "stop: a run that leaves the inputs of training has diverged; extrapolate: it goes on",
+        choices=("stop", "extrapolate"),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class PathMapModel:
+    """Coordinates as polynomials of the travel.
+
+    Attributes
+    ----------
+    centre, scale
+        The polynomials' argument is (travel - centre) * scale; m and 1/m.
+    coefficients
+        Those of the highest power first (degree + 1, n), rad or m.
+    travel, rack
+        Lowest and highest travel, and the rack displacement, of training, in m.
+    stops
+        Whether a run stops that leaves them.
+    """
+
+    model: AlgebraicModel
+    centre: float
+    scale: float
+    coefficients: np.ndarray
+    travel: tuple[float, float]
+    rack: float
+    stops: bool
+    offline: Offline
+
+    @property
+    def effective_rank(self) -> int:
+        """The travel is the only coordinate."""
+        return 1
+
+    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+        """Polynomials at the maneuver's output times.
+
+        Raises
+        ------
+        InputError
+            If the start or the maneuver's inputs are not the model's, or an input isn't finite.
+        """
+        model, times = self.model, maneuver.times
+        model.start(start)
+        inputs = checked_inputs(model, maneuver)
+        degree, n = len(self.coefficients) - 1, len(model.coordinates)
+        path = np.full((len(times), n), np.nan)
+        (low, high), slack = self.travel, SLACK * (self.travel[1] - self.travel[0])
+        limits = np.array([low - slack, high + slack, self.rack - slack, self.rack + slack])
+        if not self.stops:
+            limits = np.array([-np.inf, np.inf, -np.inf, np.inf])
+        run = map_module(n, degree).map_path
+        fixed = (self.centre, self.scale, limits, self.coefficients, path)
+        # Compile, or load machine code, outside of the time that is measured.
+        run(inputs[:0], *fixed)
+        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
+        (status, sample), seconds = timed(lambda: run(inputs, *fixed), counts)
+        trajectory = model.trajectory(times, inputs, path, counts, seconds)
+        if status == 0:
+            return trajectory
+        message = self._outside(float(times[sample]), *inputs[sample].tolist())
+        return replace(trajectory, status="diverged", message=message)
+
+    def _outside(self, moment: float, travel: float, rack: float) -> str:
+        low, high = self.travel
+        return (
+            f"height {travel:.5g} m with the rack at {rack:.5g} m at t = {moment:.6g} s is outside "
+            f"of the training: {low:.5g} to {high:.5g} m with the rack at {self.rack:.5g} m"
+        )
+
+    def best_approximation(self, states: np.ndarray) -> None:
+        """There is no subspace to project onto."""
+        del states
+
+
+def settings(kind: str) -> Mapping[str, Setting]:
+    """Settings for models of that kind."""
+    return SETTINGS if kind == "ae" else {}
+
+
+def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
+    """Presets; none for a model that isn't accepted."""
+    return {"recommended": {}} if model.kind == "ae" else {}
+
+
+def accepts(model: Model) -> tuple[bool, str]:
+    """Whether the model is one of a mechanism whose inputs move all of its coordinates."""
+    if isinstance(model, AlgebraicModel):
+        return True, ""
+    return False, f"path_map is for kinematic models: {model.name} is of kind {model.kind}"
+
+
+def check(model: Model, settings: Mapping[str, Value]) -> None:
+    """Raise `InputError` if the degree is too high for powers of the travel."""
+    del model
+    if int(settings["degree"]) > HIGHEST_DEGREE:
+        raise InputError(f"degree {settings['degree']} is above {HIGHEST_DEGREE}")
+
+
+def fit(
+    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+) -> PathMapModel:
+    """Least squares over all output times of the training runs.
+
+    Raises
+    ------
+    InputError
+        If the rack moves in training, or the travel takes too few values for the degree.
+    """
+    assert isinstance(model, AlgebraicModel)
+    began = time.perf_counter()
+    degree = int(settings["degree"])
+    runs = [run.at(run.maneuver.times) for run in training]
+    inputs = np.concatenate([run.inputs for run in runs])
+    travel, racks = inputs[:, 0], inputs[:, 1]
+    low, high = float(travel.min()), float(travel.max())
+    if np.ptp(racks) > SLACK * (high - low):
+        raise InputError(
+            f"path_map needs a constant rack: in training it moves from {racks.min():.4g} to "
+            f"{racks.max():.4g} m"
+        )
+    centre, scale = 0.5 * (low + high), 2.0 / (high - low) if high > low else 0.0
+    x = (travel - centre) * scale
+    # Nearer to each other than the slack, two heights are one.
+    heights = len(np.unique(np.round(x / SLACK)))
+    if heights <= degree:
+        raise InputError(f"degree {degree} needs {degree + 1} heights; training has {heights}")
+    samples = np.concatenate([run.coordinates for run in runs])
+    # Powers would lose half of the digits in the fit, not in the evaluation.
+    series = np.linalg.lstsq(chebyshev.chebvander(x, degree), samples, rcond=None)[0]
+    powers = np.zeros((degree + 1, samples.shape[1]))
+    for i, column in enumerate(series.T):
+        power = chebyshev.cheb2poly(column)
+        powers[: len(power), i] = power
+    evaluations = sum(run.counts[model.evaluations] for run in runs)
+    return PathMapModel(
+        model,
+        centre,
+        scale,
+        loop_array(powers[::-1]),
+        (low, high),
+        float(racks[0]),
+        settings["outside"] == "stop",
+        Offline(time.perf_counter() - began, evaluations),
+    )

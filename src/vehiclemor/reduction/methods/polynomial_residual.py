@@ -1,0 +1,275 @@
+"""Reduced equations with a fixed test space, fitted by polynomials in the reduced coordinates.
+
+With q = q_mean + U S x (U: POD basis, S: scales) and the fixed test space W = Phi_q(q_mean) U, the
+reduced equations W^T Phi = 0 are as many functions of as few variables.  Where the inputs enter
+linearly, their part is exact; the rest is fitted, so that no trigonometric function and no equation
+of the full model is evaluated online.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.polynomials.kernels import (
+    checked_inputs,
+    derivatives,
+    monomials,
+    residual_module,
+)
+from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT, MOST_SNAPSHOTS
+from vehiclemor.reduction.projection.bases import Basis, pod_basis, project
+from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.checks import loop_array
+from vehiclemor.simulation.clock import timed
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
+
+SUMMARY = "POD with a fixed test space; the reduced equations are fitted polynomials"
+REFERENCE = ""
+# Every monomial is a line of machine code in each equation.
+MOST_MONOMIALS = 150
+HIGHEST_DEGREE = 8
+# Points beside each snapshot, and how far from it they lie at most (scaled reduced coordinates).
+NEIGHBOURS = 10
+SPREAD = 0.05
+# Modes with a singular value below it times the first are rounding.
+RANK_TOLERANCE = 1e-10
+# Random points at which the part of the inputs is checked, and its largest difference (rad or m).
+LINEARITY_CHECKS = 3
+LINEARITY_TOLERANCE = 1e-12
+SETTINGS = {
+    "rank": Setting("integer", 3, "number of reduced coordinates", minimum=1),
+    "degree": Setting("integer", 3, "total degree of the polynomials", minimum=1),
+    "snapshots": Setting("integer", 101, "snapshots in each training run", minimum=2),
+    "solver": Setting(
+        "text",
+        "chord",
+        "chord: constant reduced Jacobian; newton: a fresh one in each iteration",
+        choices=("chord", "newton"),
+    ),
+    "tolerance": Setting(
+        "number",
+        1e-6,
+        "largest step of the last iteration (reduced coordinates)",
+        minimum=0.0,
+        above=True,
+    ),
+    "seed": Setting("integer", 0, "seed of the points beside the training path", minimum=0),
+}
+
+
+@dataclass(frozen=True)
+class PolynomialResidualModel:
+    """Polynomial reduced equations g(x) = response^T (u - u_mean).
+
+    Attributes
+    ----------
+    basis
+        Affine subspace of the coordinates.
+    scales
+        Largest reduced coordinates (r,) of training: x = U^T (q - q_mean) / scales.
+    degree
+        Total degree of the polynomials.
+    test
+        Fixed test space (n, r), such that g has the unit matrix as its Jacobian at x = 0.
+    mean_inputs
+        Mean inputs (inputs,) of training.
+    response
+        Change of g for each unit of an input (inputs, r).
+    coefficients
+        Of each monomial in each equation (monomials, r).
+    newton, tolerance
+        Whether Jacobians are fresh, and the largest step of the last iteration.
+    """
+
+    model: AlgebraicModel
+    basis: Basis
+    scales: np.ndarray
+    degree: int
+    test: np.ndarray
+    mean_inputs: np.ndarray
+    response: np.ndarray
+    coefficients: np.ndarray
+    newton: bool
+    tolerance: float
+    offline: Offline
+
+    @property
+    def effective_rank(self) -> int:
+        """Number of reduced coordinates."""
+        return self.basis.rank
+
+    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+        """Solve the polynomial equations at the maneuver's output times.
+
+        Raises
+        ------
+        InputError
+            If the start or the maneuver's inputs are not the model's, or an input isn't finite.
+        """
+        model, times = self.model, maneuver.times
+        began_at = self.reduced(model.start(start)[None, :])[0]
+        inputs = checked_inputs(model, maneuver)
+        path = np.full((len(times), len(model.coordinates)), np.nan)
+        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
+        arguments = (
+            loop_array(began_at),
+            np.concatenate([self.mean_inputs, self.basis.mean]),
+            loop_array((self.basis.vectors * self.scales).T),
+            loop_array(self.response),
+            loop_array(self.coefficients),
+            derivatives(self.coefficients, self.basis.rank, self.degree),
+            self.newton,
+            self.tolerance / self.scales,
+            ITERATION_LIMIT,
+            path,
+            counts,
+        )
+        run = self._loops().reduced_path
+        # Compile, or load machine code, outside of the time that is measured.
+        run(inputs[:0], *arguments)
+        (status, sample), seconds = timed(lambda: run(inputs, *arguments), counts)
+        failure = None if status == 0 else (status, sample)
+        return model.trajectory(times, inputs, path, counts, seconds, failure)
+
+    def reduced(self, states: np.ndarray) -> np.ndarray:
+        """Scaled reduced coordinates (samples, r) of states (samples, n)."""
+        return (states - self.basis.mean) @ self.basis.vectors / self.scales
+
+    def fitted_residual(self, points: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Fitted W^T Phi (samples, r) at scaled reduced coordinates (samples, r) and inputs."""
+        loads = loop_array((inputs - self.mean_inputs) @ self.response)
+        result = np.empty(loads.shape)
+        self._loops().terms_path(loop_array(points), loads, loop_array(self.coefficients), result)
+        return result
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+        """Projection of states (samples, n) onto the subspace."""
+        return project(states, self.basis)
+
+    def _loops(self) -> ModuleType:
+        return residual_module(len(self.model.inputs), self.basis.rank, self.degree)
+
+
+def settings(kind: str) -> Mapping[str, Setting]:
+    """Settings for models of that kind."""
+    return SETTINGS if kind == "ae" else {}
+
+
+def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
+    """Presets; none for a model that isn't accepted."""
+    return {"recommended": {}} if model.kind == "ae" else {}
+
+
+def accepts(model: Model) -> tuple[bool, str]:
+    """Whether the model is kinematic, and its inputs enter the equations linearly."""
+    name = "polynomial_residual"
+    if not isinstance(model, AlgebraicModel):
+        return False, f"{name} is for kinematic models: {model.name} is of kind {model.kind}"
+    response = _response(model, model.design)
+    generator = np.random.default_rng(0)
+    for _ in range(LINEARITY_CHECKS):
+        q = model.design + generator.uniform(-0.1, 0.1, len(model.design))
+        u = generator.uniform(-0.1, 0.1, len(model.inputs))
+        change = model.residual(q, u) - model.residual(q, np.zeros(len(u)))
+        if np.abs(change - response @ u).max() > LINEARITY_TOLERANCE:
+            return False, f"{name} needs inputs that enter the equations of {model.name} linearly"
+    return True, ""
+
+
+def check(model: Model, settings: Mapping[str, Value]) -> None:
+    """Raise `InputError` if rank, degree or snapshots don't fit the model or each other."""
+    rank, degree = int(settings["rank"]), int(settings["degree"])
+    snapshots, states = int(settings["snapshots"]), len(model.coordinates)
+    if rank > states:
+        raise InputError(f"rank {rank} is above the {states} coordinates of {model.name}")
+    if snapshots > MOST_SNAPSHOTS:
+        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
+    if rank > snapshots:
+        raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+    if degree > HIGHEST_DEGREE:
+        raise InputError(f"degree {degree} is above {HIGHEST_DEGREE}")
+    count = math.comb(rank + degree, rank)
+    if count > MOST_MONOMIALS:
+        raise InputError(
+            f"degree {degree} with rank {rank} has {count} monomials; at most {MOST_MONOMIALS}"
+        )
+
+
+def fit(
+    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+) -> PolynomialResidualModel:
+    """POD of equidistant snapshots, and polynomials through residuals along and beside their path.
+
+    Raises
+    ------
+    InputError
+        If the mechanism doesn't move in training.
+    """
+    assert isinstance(model, AlgebraicModel)
+    began = time.perf_counter()
+    count, degree = int(settings["snapshots"]), int(settings["degree"])
+    runs = [run.at(np.linspace(0.0, run.maneuver.duration, count)) for run in training]
+    states = np.concatenate([run.coordinates for run in runs])
+    mean_inputs = np.concatenate([run.inputs for run in runs]).mean(axis=0)
+    if np.ptp(states, axis=0).max() == 0.0:
+        raise InputError("polynomial_residual: the mechanism doesn't move in training")
+    basis = pod_basis(states.T, int(settings["rank"]), RANK_TOLERANCE)
+    scaled = (states - basis.mean) @ basis.vectors
+    scales = np.abs(scaled).max(axis=0)
+    points = _points(scaled / scales, int(settings["seed"]))
+    test = model.jacobian(basis.mean, mean_inputs) @ basis.vectors
+    lifted = basis.mean + (points * scales) @ basis.vectors.T
+    values = model.residual_at(lifted, np.tile(mean_inputs, (len(points), 1))) @ test
+    matrix = np.column_stack(
+        [np.prod(points[:, list(term)], axis=1) for term in monomials(basis.rank, degree)]
+    )
+    coefficients = np.linalg.lstsq(matrix, values, rcond=None)[0]
+    # Multiplied by the inverse of the Jacobian at x = 0, whose rows are the linear terms.
+    inverse = np.linalg.inv(coefficients[1 : basis.rank + 1])
+    test, coefficients = test @ inverse, coefficients @ inverse
+    evaluations = sum(run.counts[model.evaluations] for run in runs) + len(points)
+    return PolynomialResidualModel(
+        model,
+        basis,
+        scales,
+        degree,
+        test,
+        mean_inputs,
+        -(test.T @ _response(model, basis.mean)).T,
+        coefficients,
+        settings["solver"] == "newton",
+        float(settings["tolerance"]),
+        Offline(time.perf_counter() - began, evaluations),
+    )
+
+
+def _response(model: AlgebraicModel, q: np.ndarray) -> np.ndarray:
+    """Changes (n, inputs) of the residual for each unit of an input, at coordinates q (n,)."""
+    step, inputs = 0.125, len(model.inputs)
+    rest = model.residual(q, np.zeros(inputs))
+    changes = [model.residual(q, step * unit) - rest for unit in np.eye(inputs)]
+    return np.column_stack(changes) / step
+
+
+def _points(path: np.ndarray, seed: int) -> np.ndarray:
+    """Points (samples, r) of a path (snapshots, r) and others beside it.
+
+    On the path alone the reduced coordinates are functions of one another, and the polynomials not
+    determined; what they are beside it steers the iteration.
+    """
+    generator = np.random.default_rng(seed)
+    shape = (NEIGHBOURS, *path.shape)
+    beside = path + generator.uniform(-SPREAD, SPREAD, shape)
+    return np.concatenate([path, beside.reshape(-1, path.shape[1])])

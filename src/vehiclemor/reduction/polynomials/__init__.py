@@ -1,0 +1,1 @@
+"""Compiled polynomials for reduced mechanisms."""

@@ -1,0 +1,60 @@
+"""Coordinates of a mechanism as polynomials in its travel: a compiled loop.
+
+Samples are taken in blocks.  The number of powers is known to the compiler: they are unrolled, and
+what is left is a loop over a block, which becomes vector code.
+"""
+
+import numpy as np
+
+from vehiclemor.codegen.stubs import N
+from vehiclemor.reduction.polynomials.kernels import DEGREE
+
+BLOCK = 64
+
+
+def map_path(inputs, centre, scale, limits, coefficients, path):
+    """Polynomials at every sample, by Horner's scheme; stops where an input is outside the limits.
+
+    Parameters
+    ----------
+    inputs
+        Travel (m) and rack displacement (m) at the samples (samples, 2).
+    centre, scale
+        The polynomials' argument is (travel - centre) * scale; m and 1/m.
+    limits
+        Lowest and highest travel, lowest and highest rack displacement (4,) in m.
+    coefficients
+        Those of the highest power first (DEGREE + 1, N).
+    path
+        Takes the coordinates (samples, N).
+
+    Returns
+    -------
+    tuple
+        0 and the number of samples, or 1 and the sample that is outside.
+    """
+    low, high, left, right = limits[0], limits[1], limits[2], limits[3]
+    arguments, results = np.zeros(BLOCK), np.zeros((N, BLOCK))
+    samples, first = inputs.shape[0], 0
+    while first < samples:
+        count = 0
+        for sample in range(first, min(first + BLOCK, samples)):
+            travel, rack = inputs[sample, 0], inputs[sample, 1]
+            if not (low <= travel <= high and left <= rack <= right):
+                break
+            arguments[count] = (travel - centre) * scale
+            count += 1
+        # Places beyond the count are computed, and not used: so every sample meets the same code.
+        for i in range(N):
+            for place in range(BLOCK):
+                x, total = arguments[place], coefficients[0, i]
+                for power in range(1, DEGREE + 1):
+                    total = total * x + coefficients[power, i]
+                results[i, place] = total
+        for place in range(count):
+            for i in range(N):
+                path[first + place, i] = results[i, place]
+        first += count
+        if count < BLOCK and first < samples:
+            return 1, first
+    return 0, samples

@@ -1,0 +1,1 @@
+"""Subspaces by time window and in them the equations of a model."""

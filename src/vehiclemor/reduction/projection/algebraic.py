@@ -1,0 +1,222 @@
+"""Reduced algebraic equations on one affine subspace in each time window."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.projection.bases import Basis, pod_basis, project
+from vehiclemor.reduction.projection.windows import first_samples
+from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.clock import timed
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+
+ITERATION_LIMIT = 50
+
+MOST_SNAPSHOTS = 100_000
+# Settings that every method on POD subspaces of algebraic equations shares.
+SUBSPACE_SETTINGS = {
+    "rank": Setting("integer", 3, "number of reduced coordinates", minimum=1),
+    "snapshots": Setting("integer", 10, "snapshots in each window and training run", minimum=2),
+    "rank_tolerance": Setting(
+        "number",
+        1e-10,
+        "modes with a singular value below it times the first are dropped; 0 keeps all",
+        minimum=0.0,
+    ),
+    "test_space": Setting(
+        "text",
+        "least_squares",
+        "least_squares: Gauss-Newton on the residual; galerkin: U^T Phi = 0 (paper, step 6)",
+        choices=("least_squares", "galerkin"),
+    ),
+    "equation_seed": Setting(
+        "integer",
+        0,
+        "galerkin: seed of a random order and signs of the equations; 0: natural",
+        minimum=0,
+    ),
+    "reversed_coordinates": Setting(
+        "text", "", "galerkin: coordinates counted the other way round, separated by commas"
+    ),
+    "tolerance": Setting(
+        "number", 1e-12, "largest step of the last iteration", minimum=0.0, above=True
+    ),
+    "rounding_seed": Setting(
+        "integer", 0, "seed of a relative noise of 2^-52 on the snapshots; 0: none", minimum=0
+    ),
+}
+# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on
+# the order and signs in which the equations are written (galerkin does, by orders of magnitude),
+# and the rank cut keeps directions out that rounding chooses.
+SUBSPACE_PRESETS: dict[str, dict[str, Value]] = {
+    "recommended": {},
+    "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},
+}
+
+
+@dataclass(frozen=True)
+class ProjectedModel:
+    """Reduced model on affine subspaces, one in each window.
+
+    Attributes
+    ----------
+    edges
+        Window edges (windows + 1,) in s.
+    bases
+        One subspace for each window.
+    tests
+        Test bases (n, r) of the windows; None for least squares.
+    tolerance
+        Largest step of the last iteration (reduced coordinates).
+    """
+
+    model: AlgebraicModel
+    edges: np.ndarray
+    bases: tuple[Basis, ...]
+    tests: tuple[np.ndarray, ...] | None
+    offline: Offline
+    tolerance: float
+
+    @property
+    def effective_rank(self) -> int:
+        """Largest number of reduced coordinates in any window."""
+        return max(basis.rank for basis in self.bases)
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Solve the reduced equations at the maneuver's output times."""
+        model, times = self.model, maneuver.times
+        inputs = maneuver.at(times)
+        n, windows = len(model.coordinates), len(self.bases)
+        bases, tests = np.zeros((windows, n, n)), np.zeros((windows, n, n))
+        for k, basis in enumerate(self.bases):
+            bases[k, :, : basis.rank] = basis.vectors
+            if self.tests is not None:
+                tests[k, :, : basis.rank] = self.tests[k]
+        means = np.array([basis.mean for basis in self.bases])
+        ranks = np.array([basis.rank for basis in self.bases])
+        path = np.full((len(times), n), np.nan)
+        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
+        arguments = (
+            model.start(start),
+            first_samples(times, self.edges),
+            means,
+            bases,
+            tests,
+            ranks,
+            self.tests is None,
+            inputs,
+            model.constants,
+            self.tolerance,
+            ITERATION_LIMIT,
+            path,
+            counts,
+        )
+        loop = model.kernels.projected_path
+        (status, sample), seconds = timed(lambda: loop(*arguments), counts)
+        failure = None if status == 0 else (status, sample)
+        return model.trajectory(times, inputs, path, counts, seconds, failure)
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+        """Projection of states (samples of equidistant times, n) onto the subspaces."""
+        times = np.linspace(self.edges[0], self.edges[-1], len(states))
+        first = first_samples(times, self.edges)
+        parts = [
+            project(states[first[k] : first[k + 1]], basis) for k, basis in enumerate(self.bases)
+        ]
+        return np.concatenate(parts)
+
+
+def fit_windows(
+    model: AlgebraicModel,
+    training: Sequence[TrainingRun],
+    edges: np.ndarray,
+    settings: dict[str, Value],
+) -> ProjectedModel:
+    """POD subspaces of equidistant snapshots (both ends included) in each window.
+
+    Parameters
+    ----------
+    training
+        Runs whose snapshots are put side by side.
+    edges
+        Window edges (windows + 1,) in s.
+    settings
+        Validated `SUBSPACE_SETTINGS`.
+    """
+    began = time.perf_counter()
+    count, rank = int(settings["snapshots"]), int(settings["rank"])
+    moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]
+    histories = [run.at(np.concatenate(moments)) for run in training]
+    bases = []
+    for k in range(len(moments)):
+        part = slice(k * count, (k + 1) * count)
+        snapshots = np.concatenate([history.coordinates[part] for history in histories]).T
+        snapshots = _rounded(snapshots, int(settings["rounding_seed"]))
+        bases.append(pod_basis(snapshots, rank, float(settings["rank_tolerance"])))
+    tests = None
+    if settings["test_space"] == "galerkin":
+        pairing = _pairing(model, settings)
+        tests = tuple(pairing @ basis.vectors for basis in bases)
+    evaluations = sum(history.counts[model.evaluations] for history in histories)
+    offline = Offline(time.perf_counter() - began, evaluations)
+    return ProjectedModel(model, edges, tuple(bases), tests, offline, float(settings["tolerance"]))
+
+
+def check_subspace(model: Model, settings: dict[str, Value]) -> None:
+    """Raise `InputError` if rank, snapshots or coordinate names don't fit the model."""
+    rank, snapshots = int(settings["rank"]), int(settings["snapshots"])
+    states = len(model.coordinates)
+    if rank > states:
+        raise InputError(f"rank {rank} is above the {states} coordinates of {model.name}")
+    if snapshots > MOST_SNAPSHOTS:
+        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
+    if rank > snapshots:
+        raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+    _reversed(model, settings)
+
+
+def _reversed(model: Model, settings: dict[str, Value]) -> list[int]:
+    names = [name for name in str(settings["reversed_coordinates"]).split(",") if name]
+    for name in names:
+        if name not in model.coordinates:
+            known = ", ".join(model.coordinates)
+            raise InputError(f"reversed_coordinates: {name!r} is not a coordinate; known: {known}")
+    return [model.coordinates.index(name) for name in names]
+
+
+def _pairing(model: AlgebraicModel, settings: dict[str, Value]) -> np.ndarray:
+    """Matrix P such that the Galerkin test basis is P U.
+
+    Equations reordered and with other signs are D Phi with a signed permutation D, so that
+    U^T D Phi = 0 tests with D^T U.  Coordinates with signs S have the basis S U: the same as
+    changed signs of the equations with the same numbers.
+    """
+    n = len(model.coordinates)
+    pairing = np.eye(n)
+    seed = int(settings["equation_seed"])
+    if seed:
+        generator = np.random.default_rng(seed)
+        order = generator.permutation(n)
+        signs = generator.choice([-1.0, 1.0], size=n)
+        pairing = (signs[:, None] * np.eye(n)[order]).T
+    for index in _reversed(model, settings):
+        pairing[:, index] *= -1.0
+    return pairing
+
+
+def _rounded(snapshots: np.ndarray, seed: int) -> np.ndarray:
+    if seed == 0:
+        return snapshots
+    noise = np.random.default_rng(seed).standard_normal(snapshots.shape)
+    return snapshots * (1.0 + np.finfo(float).eps * noise)

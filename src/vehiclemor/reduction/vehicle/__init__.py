@@ -1,0 +1,1 @@
+"""What reduced vehicles are made of."""

@@ -1,0 +1,33 @@
+"""Compiled kernels of the high-fidelity vehicle in other coordinates than its own."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.models.high_fidelity import independent as high_fidelity_independent
+from vehiclemor.registry import component
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.dynamic_build import compiled, hoisted_constants, solved_parameters
+
+
+def independent_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
+    """Kernels over the 14 coordinates of `high_fidelity_independent`, and their constants.
+
+    Parameters
+    ----------
+    model
+        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
+    """
+    _, kernels, _ = compiled("high_fidelity_independent", high_fidelity_independent)
+    return kernels, hoisted_constants(kernels, model.parameters, free_lengths(model))
+
+
+def free_lengths(model: DynamicModel) -> list[float]:
+    """Free lengths of the springs in m, with which the design position is the equilibrium."""
+    definition: Any = component("model", model.name)
+    values = model.parameters.values()
+    solved = solved_parameters(definition, values, model.parameters, model.kernels)
+    return [solved[name] for name in definition.SOLVED]

@@ -1,0 +1,152 @@
+"""Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.simulation.checks import check_inputs
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.spaces import whole_space
+from vehiclemor.simulation.system import System
+from vehiclemor.simulation.trajectory import Start, Trajectory
+
+# Step of the reduced coordinates in differences.
+DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Transient:
+    """Decaying motion that the reduced coordinates leave out, from a start that is no equilibrium.
+
+    Linear, in closed form: the sum over modes of right w^T d exp(rate t), with d the deviation of
+    the start's shape.
+
+    Attributes
+    ----------
+    rates
+        Eigenvalues (m,) in 1/s, one of each conjugate pair.
+    left, right
+        Eigenvectors (m, n), scaled so that real parts of the sum are the motion.
+    """
+
+    rates: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+
+    def at(self, times: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+        """Shapes (samples, n) to be added, for the start's deviation (n,)."""
+        amplitudes = self.left @ deviation
+        return np.real(np.exp(np.outer(times, self.rates)) * amplitudes @ self.right)
+
+
+NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedVehicle:
+    """A vehicle whose reduced equations are linear in features, see `features`.
+
+    Attributes
+    ----------
+    features, parameters
+        Features of the equations and the parameters in their text.
+    coefficients
+        C (terms, states + 3) of the equations.
+    lifting
+        Coefficients (terms, n) of the deviation of the shape from straight running.
+    encoding
+        Reduced coordinates per deviation of the shape (states, n).
+    feedthrough
+        Reduced coordinates per input (states, inputs), to be subtracted at the start.
+    typical
+        Magnitude of each reduced state (states + 3,).
+    transient
+        What is added to the lifted shapes.
+    lifted_features
+        Features of the lifting, with the same parameters, if not those of the equations.
+    """
+
+    model: DynamicModel
+    shape: VehicleShape
+    features: Features
+    parameters: np.ndarray
+    coefficients: np.ndarray
+    lifting: np.ndarray
+    encoding: np.ndarray
+    feedthrough: np.ndarray
+    typical: np.ndarray
+    offline: Offline
+    solver: str
+    tolerance: float
+    transient: Transient = NO_TRANSIENT
+    lifted_features: Features | None = None
+
+    @property
+    def effective_rank(self) -> int:
+        """Number of integrated states, heading and place included."""
+        return self.features.states + PLANAR
+
+    @cached_property
+    def growth_rate(self) -> float:
+        """Largest real part (1/s) of the eigenvalues at straight running; not of heading, place."""
+        k = self.features.states
+        steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
+        no_input = np.zeros((2 * k, self.features.inputs))
+        rates = self.features.at(steps, no_input, self.parameters) @ self.coefficients[:, :k]
+        jacobian = (rates[:k] - rates[k:]).T / (2.0 * DIFFERENCE)
+        return float(np.linalg.eigvals(jacobian).real.max())
+
+    @cached_property
+    def system(self) -> System:
+        """Compiled equations."""
+        reference = np.zeros(self.features.states)
+        return self.features.system(self.parameters, self.coefficients, self.typical, reference)
+
+    def with_coefficients(self, coefficients: np.ndarray) -> ReducedVehicle:
+        """The same with other coefficients of the equations."""
+        return replace(self, coefficients=coefficients)
+
+    def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
+        deviation = self.shape.of(state[None])[0] - self.shape.reference
+        z = self.encoding @ deviation - self.feedthrough @ inputs
+        x, y, heading = self.model.planar
+        return np.concatenate([z, state[[heading, x, y]]])
+
+    def path(
+        self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
+    ) -> tuple[np.ndarray, str]:
+        """Reduced states (samples, states + 3), and why the run has failed, if it has."""
+        run = self._run(maneuver, start, times)
+        return run.path, run.failure
+
+    def _run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None):  # noqa: ANN202
+        check_inputs(maneuver, self.model.name, self.model.inputs)
+        y = self.encoded(self.model.start(start), maneuver.at(np.zeros(1))[0])
+        space = whole_space(len(y))
+        return self.system.run(maneuver, y, space, self.solver, self.tolerance, times)
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Integrate the reduced equations, then lift to states at the maneuver's output times."""
+        run = self._run(maneuver, start)
+        inputs = maneuver.at(run.times)
+        k = self.features.states
+        lifted = self.lifted_features or self.features
+        columns = lifted.at(run.path[:, :k], inputs, self.parameters)
+        shapes = self.shape.reference + columns @ self.lifting
+        if len(self.transient.rates):
+            deviation = self.shape.of(self.model.start(start)[None])[0] - self.shape.reference
+            shapes += self.transient.at(run.times, deviation)
+        states = self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+        return self.model.recorded(maneuver, run, inputs, states)
+
+    def best_approximation(self, states: np.ndarray) -> None:
+        """Lifted shapes lie on no subspace."""
+        del states

@@ -1,0 +1,152 @@
+"""Features of the slow manifold: what is odd and what is even in the lateral quantities.
+
+The nonlinear terms are products of the axles' slip angles (held within their training range), the
+roll angle, its rate and the steering; a vehicle that is its own mirror image has odd ones in the
+lateral equations and even ones in the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from vehiclemor.reduction.settings import Value
+from vehiclemor.reduction.vehicle.features import Features, monomials
+from vehiclemor.reduction.vehicle.regression import largest
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes
+
+OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in ("FL", "FR", "RL", "RR")))
+VARIABLES = ("front", "rear", "roll", "rolling", "steer")
+
+
+@dataclass(frozen=True)
+class FeatureTable:
+    """Features with the numbers of those that are odd and even in the lateral quantities.
+
+    The first odd ones, `heads`, are the slow coordinates and the inputs, the first even ones 1 and
+    the speed.
+    """
+
+    features: Features
+    parameters: np.ndarray
+    odd: list[int]
+    even: list[int]
+    heads: int
+
+    @property
+    def curved(self) -> list[int]:
+        """Odd features that are not linear."""
+        return self.odd[self.heads :]
+
+    @property
+    def bent(self) -> list[int]:
+        """Even features that are not linear."""
+        return self.even[2:]
+
+    @property
+    def free(self) -> list[tuple[list[int], int]]:
+        """(features, column of C) of the coefficients that whole runs may change."""
+        k = self.features.states - 1
+        lateral = [(self.curved, column) for column in range(k)]
+        return [*lateral, (self.odd, k + 1), (self.odd, k + 3)]
+
+    def with_only(self, kept: Sequence[int]) -> FeatureTable:
+        """Some of the features, by their numbers in order."""
+        odd = [i for i in kept if i in self.odd]
+        even = [i for i in kept if i in self.even]
+        terms = tuple(self.features.terms[i] for i in (*odd, *even))
+        numbers = tuple(range(len(terms)))
+        (_, lateral), (_, symmetric) = self.features.groups
+        groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
+        features = replace(self.features, terms=terms, groups=groups)
+        return FeatureTable(
+            features,
+            self.parameters,
+            list(numbers[: len(odd)]),
+            list(numbers[len(odd) :]),
+            self.heads,
+        )
+
+
+def feature_table(
+    shape: VehicleShape,
+    modes: SlowModes,
+    z: np.ndarray,
+    speed: np.ndarray,
+    u: np.ndarray,
+    settings: Mapping[str, Value],
+) -> FeatureTable:
+    """Features, scaled by the ranges of training runs: z (samples, k), speed (samples,), u."""
+    k, inputs = z.shape[1], u.shape[1]
+    rows = _variables(shape, modes)
+    # The axles' slips go as one over the speed where they come from motion, not from steering.
+    at_speed = shape.speed / (shape.speed + speed)
+    values = np.column_stack([z, u[:, 0]]) @ rows[:, : k + 1].T
+    values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
+    hull = float(settings["hull"])
+    reach = hull * float(largest(speed[:, None])[0] or 1.0)
+    scales = 1.0 / (hull * largest(values))
+    rows[:2] *= scales[:2, None]
+    rows[2:] *= scales[2:, None]
+    parameters = np.concatenate(
+        [rows.ravel(), 1.0 / largest(z), 1.0 / largest(u), [shape.speed, 1.0 / reach]]
+    )
+    width = k + 2
+
+    def held(text: str) -> str:
+        # In [-1, 1]: nothing is known of what lies beyond the training runs.
+        return f"0.5 * (abs({text} + 1.0) - abs({text} - 1.0))"
+
+    last = len(VARIABLES) * width + k + inputs
+    lines = [("part", f"p[{last}] / (p[{last}] + z{k})"), ("raw", f"p[{last + 1}] * z{k}")]
+    lines.append(("m", held("raw")))
+    for i in range(len(VARIABLES)):
+        moved = " + ".join(f"p[{i * width + j}] * z{j}" for j in range(k))
+        moved = f"({moved} + p[{i * width + k}] * u0)"
+        direct = f"p[{i * width + k + 1}] * u0"
+        text = f"part * {moved} + {direct}" if i < 2 else moved
+        lines += [(f"raw{i}", text), (f"v{i}", held(f"raw{i}"))]
+    first = len(VARIABLES) * width
+    v = [f"v{i}" for i in range(len(VARIABLES))]
+    straight = [f"p[{first + i}] * z{i}" for i in range(k)]
+    straight += [f"p[{first + k + j}] * u{j}" for j in range(inputs)]
+    curved = [*straight[: k + 1]]
+    odd = [*straight, *(f"m * {t}" for t in curved), *(f"m * m * {t}" for t in curved)]
+    odd += monomials(v, 3)
+    if settings["nonlinearity"] != "cubic":
+        odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
+    if settings["nonlinearity"] in {"sliding", "rich"}:
+        slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
+        odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
+        odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
+    if settings["nonlinearity"] == "rich":
+        odd += [f"m * {term}" for term in monomials(v, 3)]
+    even = ["1.0", f"z{k}", *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
+    numbers = tuple(range(len(odd) + len(even)))
+    lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
+    groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
+    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks)
+    return FeatureTable(features, parameters, list(lateral), list(symmetric), k + inputs)
+
+
+def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:
+    """Rows (5, k + 2) of the arguments of the nonlinear terms, per z, and per steering twice.
+
+    The steering moves the shape (last but one) and the wheels themselves (last).
+    """
+    linear, outputs = shape.linearised, shape.model.outputs
+
+    def row(name: str) -> np.ndarray:
+        a, b = linear.output_a[outputs.index(name)], linear.output_b[outputs.index(name), 0]
+        return np.concatenate([a @ modes.right, [a @ modes.follow, b]])
+
+    front = 0.5 * (row("slip_angle_FL") + row("slip_angle_FR"))
+    rear = 0.5 * (row("slip_angle_RL") + row("slip_angle_RR"))
+    roll = row("roll")
+    rolling = np.concatenate([roll[:-2] @ modes.rates, [0.0, 0.0]])
+    steer = np.concatenate([np.zeros(len(roll) - 2), [1.0, 0.0]])
+    return np.array([front, rear, roll, rolling, steer])

@@ -1,0 +1,151 @@
+"""Slow modes of a vehicle at straight running: coordinates in which fast motion is slaved.
+
+Left eigenvectors w of the linearised shape give z = w^T d with z' = lambda z + w^T B u exactly, so
+that hop of the wheels, spins and stabilised constraints leave no trace in z.  The speed is the mode
+of eigenvalue zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vehiclemor.reduction.vehicle.reduced_vehicle import Transient
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+
+# Modes that steering moves by less than this (relative) are symmetric: they don't steer.
+CONTROLLED = 1e-6
+# Eigenvalues (1/s) nearer to each other belong to the cluster of stabilised constraints.
+APART = 1e-2
+# Below it (1/s) an eigenvalue is zero.
+STILL = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SlowModes:
+    """Slow modes that steering moves, in real form.
+
+    Attributes
+    ----------
+    rates
+        Matrix (k, k), blocks of two for conjugate pairs.
+    left, right
+        z = left d (k, n), and d = right z for slow motion (n, k).
+    drive
+        Coefficient (k,) of the steering in z'.
+    feedthrough
+        What of the inputs (k, inputs) is subtracted, so that z' has no derivative of the steering.
+    follow
+        Deviation (n,) of the shape that follows the steering without delay.
+    speed_left, speed_right
+        Mode of the speed (n,), scaled so that U grows by one.
+    symmetric
+        Modes that steering does not move, as the transient of a start.
+    """
+
+    rates: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    drive: np.ndarray
+    feedthrough: np.ndarray
+    follow: np.ndarray
+    speed_left: np.ndarray
+    speed_right: np.ndarray
+    symmetric: Transient
+
+    @property
+    def blocks(self) -> tuple[int, ...]:
+        """Sizes of the diagonal blocks of `rates`: 2 for a conjugate pair, else 1."""
+        sizes: list[int] = []
+        while sum(sizes) < len(self.rates):
+            i = sum(sizes)
+            paired = i + 1 < len(self.rates) and abs(self.rates[i, i + 1]) > STILL
+            sizes.append(2 if paired else 1)
+        return tuple(sizes)
+
+    def coordinates(
+        self, deviations: np.ndarray, inputs: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Slow coordinates (samples, k) and speed (samples,) of deviations and inputs."""
+        return (
+            deviations @ self.left.T - inputs @ self.feedthrough.T,
+            deviations @ self.speed_left,
+        )
+
+
+def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
+    """Slow modes with |lambda| up to `fastest` (1/s).
+
+    The inputs are the steering and its derivatives, as many as the model has.
+    """
+    linear = shape.linearised
+    values, vectors = np.linalg.eig(linear.a.T)
+    left = vectors.T
+    right = np.linalg.inv(left)
+    # Stabilised constraints have many equal eigenvalues, but nothing of them is used.
+    controlled = np.abs(left @ linear.b[:, 0]) * np.linalg.norm(right, axis=0)
+    steers = controlled > CONTROLLED * controlled.max()
+    still = int(np.argmin(np.abs(values)))
+    moving = np.abs(values) >= STILL
+    moving[still] = False
+    w, v = real_modes(values, left, right, steers & moving & (np.abs(values) <= fastest))
+    rates = w @ linear.a @ v
+    # z' = rates z + sum_j b_j u^(j): with z - h u for z the derivatives of the steering go.
+    b = w @ linear.b
+    feedthrough = np.zeros_like(b)
+    for j in range(b.shape[1] - 1, 0, -1):
+        feedthrough[:, j - 1] = b[:, j] + rates @ feedthrough[:, j]
+    drive = b[:, 0] + rates @ feedthrough[:, 0]
+    static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
+    scale = linear.motion_a[1] @ right[:, still].real
+    quiet = np.flatnonzero(
+        ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & apart(values)
+    )
+    double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
+    return SlowModes(
+        rates,
+        w,
+        v,
+        drive,
+        feedthrough,
+        static + v @ np.linalg.solve(rates, drive),
+        left[still].real * scale,
+        right[:, still].real / scale,
+        Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
+    )
+
+
+def real_modes(
+    values: np.ndarray, left: np.ndarray, right: np.ndarray, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Modes in real form, slow ones first; blocks of two for conjugate pairs.
+
+    Parameters
+    ----------
+    values, left, right
+        Eigenvalues (n,) in 1/s, left eigenvectors by rows, and the inverse of that matrix.
+    chosen
+        Which modes (n,) are wanted, of a conjugate pair both or the upper one.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        Coordinates per state (k, n) and back (n, k).
+    """
+    rows, columns = [], []
+    upper = np.flatnonzero(chosen & (np.imag(values) >= 0.0))
+    for i in sorted(upper, key=lambda i: abs(values[i])):
+        rows.append(left[i].real)
+        if values[i].imag > 0.0:
+            rows.append(left[i].imag)
+            columns += [2.0 * np.real(right[:, i]), -2.0 * np.imag(right[:, i])]
+        else:
+            columns.append(np.real(right[:, i]))
+    return np.array(rows), np.array(columns).T
+
+
+def apart(values: np.ndarray) -> np.ndarray:
+    """Eigenvalues outside of clusters: those of stabilised constraints are no motion."""
+    distance = np.abs(values[:, None] - values[None, :]) + 1e9 * np.eye(len(values))
+    return distance.min(axis=1) > APART
