@@ -337,7 +337,7 @@ def test_a_digest_ignores_what_is_not_of_its_layers(package: Path) -> None:
 def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
     """Changing the vehicle, the tape or the emitter changes the digest."""
     files = {path.name for layer in kept.LAYERS for path in (sources.PACKAGE / layer).rglob("*.py")}
-    assert {"high_fidelity_equations.py", "tape.py", "emit.py", "link.py"} <= files
+    assert {"equations.py", "tape.py", "emit.py", "link.py"} <= files
 
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
