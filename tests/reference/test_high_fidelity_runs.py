@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
+from vehiclemor.simulation.spaces import full_space
 
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS, lane_change
@@ -23,7 +24,6 @@ from vehiclemor.simulation.projection import (
     simulate_projected,
     without_stabilisation,
 )
-from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
@@ -14,8 +16,6 @@ from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic_build import build
-from vehiclemor.simulation.spaces import Spaces, full_space
-from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 N = 14
 TIMES = np.linspace(0.0, 4.0, 41)

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 import sympy as sp
+from vehiclemor.codegen.emit import operation_counts, reference_source
 
 from tests.unit.programs import function_of, pivot_shares, run
-from vehiclemor.codegen.emit import operation_counts, reference_source
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.elimination import (

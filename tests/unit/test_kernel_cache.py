@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.system_loops import COORDINATES
 
 from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import cache, straight_line
@@ -17,9 +19,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.projection.dynamic import check_subspace
 from vehiclemor.registry import component
 from vehiclemor.simulation import dynamic_build, newton_loops, system_loops
-from vehiclemor.simulation.spaces import Spaces, full_space
 from vehiclemor.simulation.system import SOLVERS
-from vehiclemor.simulation.system_loops import COORDINATES
 
 # Prints hits and misses of every compiled function, the machine code's hits, and a result.
 REPORT = """

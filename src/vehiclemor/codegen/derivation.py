@@ -9,38 +9,39 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.cache import cache_folder, write_whole
-from vehiclemor.codegen.link import kernels_source
+from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
+from vehiclemor.codegen.object_cache import fetched
 from vehiclemor.codegen.sources import source_digest
 from vehiclemor.models.quantities import Quantity
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import DynamicEquations
+    from vehiclemor.models.equations import AlgebraicEquations, DynamicEquations
 
 LAYERS = ("models", "symbolic", "codegen")
-QUANTITIES = ("coordinates", "speeds", "inputs", "outputs", "constraints")
+QUANTITIES = ("coordinates", "speeds", "inputs", "outputs", "constraints", "equations")
 
 
 @dataclass(frozen=True)
 class Derivation:
-    """Named quantities of a dynamic model, and the source of its kernels.
+    """Named quantities of a model, and the sources of its kernels.
 
     Attributes
     ----------
-    coordinates, speeds, inputs, outputs, constraints
-        As in `DynamicEquations`.
+    coordinates, speeds, inputs, outputs, constraints, equations, joints
+        As in `AlgebraicEquations` and `DynamicEquations`; empty where a kind has none.
     shapes
         Function -> shape of its result.
-    source
-        Module of kernels, see `link.kernels_source`.
+    constants
+        Number of hoisted constants.
+    sources
+        Kernel -> its source; `constants` makes the hoisted ones from the parameters.
     operations
-        Function -> exact counts of its operations, see `emit.operation_counts`.
+        Function -> exact counts of its operations, see `operation_counts`.
     """
 
     coordinates: tuple[Quantity, ...]
@@ -48,67 +49,64 @@ class Derivation:
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
     constraints: tuple[Quantity, ...]
+    equations: tuple[Quantity, ...]
+    joints: tuple[str, ...]
     shapes: dict[str, tuple[int, ...]]
-    source: str
+    constants: int
+    sources: dict[str, KernelSource]
     operations: dict[str, dict[str, int]]
+
+    @property
+    def source(self) -> str:
+        """Text of all kernels."""
+        return "\n".join(kernel.text for kernel in self.sources.values())
+
+    @property
+    def kernels(self) -> Kernels:
+        """The kernels, compiled when they are first used."""
+        return Kernels(self.sources)
 
 
 def derivation(name: str, definition: Any) -> Derivation:
     """The derivation of a registered model: from disk, or made and written there."""
     parts = [source_digest(LAYERS, (), (definition,)), name, f"sympy {version('sympy')}"]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
-    path = cache_folder() / "derivations" / f"{name}_{digest}.json"
-    try:
-        return _read(path)
-    except (OSError, ValueError):
-        made = derived(name, definition.derive())
-    write_whole(path, _text(made))
-    return _read(path)
+
+    def make() -> bytes:
+        return json.dumps(asdict(derived(definition.derive()))).encode()
+
+    return _read(fetched(f"derivations/{name}_{digest}.json", make))
 
 
-def derived(name: str, equations: DynamicEquations) -> Derivation:
-    """Source and description of the kernels of a model's equations."""
+def derived(equations: AlgebraicEquations | DynamicEquations) -> Derivation:
+    """Sources and description of the kernels of a model's equations."""
     # Only here is anything symbolic: a model that was derived before starts without it.
-    from vehiclemor.codegen.emit import (
-        kernel_source,
-        operation_counts,
-        reference_source,
-        work_size,
-    )
+    from vehiclemor.codegen.kernel_text import kernel_source, operation_counts
 
     program = equations.program
-    sizes = {"WORK": work_size(program), "CONSTANTS": len(program.constant_symbols)}
+    text = kernel_source(program)
+    named = {name: getattr(equations, name, ()) for name in (*QUANTITIES, "joints")}
     return Derivation(
-        equations.coordinates,
-        equations.speeds,
-        equations.inputs,
-        equations.outputs,
-        equations.constraints,
-        {key: function.shape for key, function in program.functions.items()},
-        kernels_source(kernel_source(program), sizes, f"model {name}"),
-        operation_counts(reference_source(program)),
+        **named,
+        shapes={key: function.shape for key, function in program.functions.items()},
+        constants=len(program.constant_symbols),
+        sources=kernel_sources(text),
+        operations=operation_counts(text),
     )
-
-
-def _text(made: Derivation) -> str:
-    """Text of a derivation after the hash of that text."""
-    content = json.dumps(asdict(made))
-    return f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}"
 
 
 # A derivation does not change under its digest.
 @lru_cache(maxsize=8)
-def _read(path: Path) -> Derivation:
-    """A derivation from its file; `ValueError` if that isn't as it was written."""
-    digest, _, written = path.read_text(encoding="utf-8").partition("\n")
-    if digest != hashlib.sha256(written.encode()).hexdigest():
-        raise ValueError("the file is damaged")
-    content = json.loads(written)
-    quantities = {key: tuple(Quantity(**entry) for entry in content[key]) for key in QUANTITIES}
-    shapes = {key: tuple(shape) for key, shape in content["shapes"].items()}
-    return Derivation(
-        **quantities,
-        shapes=shapes,
-        source=content["source"],
-        operations=content["operations"],
-    )
+def _read(content: bytes) -> Derivation:
+    written = json.loads(content)
+    for key in QUANTITIES:
+        written[key] = tuple(Quantity(**entry) for entry in written[key])
+    written["shapes"] = {key: tuple(shape) for key, shape in written["shapes"].items()}
+    written["joints"] = tuple(written["joints"])
+    written["sources"] = {
+        name: KernelSource(
+            **{key: tuple(v) if isinstance(v, list) else v for key, v in kernel.items()}
+        )
+        for name, kernel in written["sources"].items()
+    }
+    return Derivation(**{field.name: written[field.name] for field in fields(Derivation)})

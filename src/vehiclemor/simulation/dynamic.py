@@ -5,32 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.parameters import ParameterSet
-from vehiclemor.simulation import system_loops
 from vehiclemor.simulation.checks import (
     check_inputs,
     checked_array,
     cut_short,
     left_validity,
     lifted_wheels,
-    loop_array,
 )
-from vehiclemor.simulation.spaces import Spaces, full_space
-from vehiclemor.simulation.system import Run, System
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
-# Kernels that the loops call, in the order of their addresses.
-KERNELS = ("derivative", "outputs", "second_order", "speeds")
 NEEDED_FOR = {
     "second_order": "equations of motion can't be projected in the coordinates, nor weighed by "
     "energy",
@@ -53,7 +49,7 @@ class DynamicModel:
     parameters
         Validated parameter set.
     kernels
-        Module of the model's compiled kernels.
+        The model's kernels, compiled when they are first used.
     kernel_hash
         Hash of the source of kernels and loops, and of the compiler's versions.
     constants
@@ -62,13 +58,13 @@ class DynamicModel:
         Start -> state (2 n,).
     active
         Numbers of the states that the right-hand side depends on, cyclic ones left out.
-    typical
+    error_scale
         Magnitude of each state (2 n,) below which errors are measured absolutely.
     validity
         Output -> (smallest, largest) value at which the model means anything.
     loads
         Outputs that are zero where a wheel has left the road.
-    turning
+    rotating
         Numbers of the heading angle and of the pairs of states that turn with it; empty where the
         states are components in the vehicle.
     planar
@@ -80,15 +76,15 @@ class DynamicModel:
     kind: str
     equations: Derivation
     parameters: ParameterSet
-    kernels: ModuleType
+    kernels: Kernels
     kernel_hash: str
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
     active: np.ndarray
-    typical: np.ndarray
+    error_scale: np.ndarray
     validity: Mapping[str, tuple[float, float]]
     loads: tuple[str, ...]
-    turning: np.ndarray
+    rotating: np.ndarray
     planar: np.ndarray
 
     counts = DYNAMIC_COUNTS
@@ -124,29 +120,18 @@ class DynamicModel:
         """Names of the initial conditions."""
         return tuple(self.initial)
 
-    @property
-    def loops(self) -> ModuleType:
-        """Module of compiled loops, the same for all dynamic models."""
-        return self.system.loops
-
     @cached_property
     def system(self) -> System:
         """The model as the compiled loops take it; its Jacobian freezes at straight running."""
         return System(
-            self.machine,
+            self.kernels,
+            self.constants,
             len(self.inputs),
             self.start(),
-            self.typical,
+            self.error_scale,
             self.active,
-            self.turning,
+            self.rotating,
         )
-
-    @cached_property
-    def machine(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the loops call: constants and addresses of kernels, zero where there is none."""
-        machines = [getattr(self.kernels, f"_{name}_machine", None) for name in KERNELS]
-        addresses = [0 if machine is None else machine.address for machine in machines]
-        return self.constants, np.array(addresses, dtype=np.int64)
 
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""
@@ -186,16 +171,13 @@ class DynamicModel:
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
-        result = np.empty((len(states), len(self.outputs)))
-        self.loops.output_path(*self._paths(states, inputs), self.machine, result)
-        return result
+        paths = self._paths(states, inputs)
+        return self.system.along("outputs", *paths, len(self.outputs))
 
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
-        states, inputs = self._paths(states, inputs)
-        result = np.empty(states.shape)
-        self.loops.derivative_path(states, inputs, self.machine, result)
-        return result
+        paths = self._paths(states, inputs)
+        return self.system.along("derivative", *paths, 2 * len(self.coordinates))
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
@@ -241,7 +223,7 @@ class DynamicModel:
         times
             Increasing times (samples,) in s.
         solver
-            `explicit`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
+            `dopri5`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
             Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
             straight running, for all steps and runs.  `etdrk4`: exponential Runge-Kutta method of
             order 4, with the same.
@@ -260,8 +242,8 @@ class DynamicModel:
         trajectory = self.integrate(
             maneuver,
             self.start(start),
-            full_space(len(self.coordinates)),
-            solver or "explicit",
+            whole_space(2 * len(self.coordinates)),
+            solver or "dopri5",
             REFERENCE_TOLERANCE if tolerance is None else tolerance,
             times,
             longest_step,
@@ -274,7 +256,7 @@ class DynamicModel:
         self,
         maneuver: Maneuver,
         state: np.ndarray,
-        spaces: Spaces,
+        windows: ProjectionWindows,
         solver: str,
         tolerance: float,
         times: np.ndarray | None = None,
@@ -286,13 +268,14 @@ class DynamicModel:
         ----------
         state
             Initial state (2 n,).
-        spaces
-            Form of the system and its subspaces by window.
+        windows
+            Formulation of the system and its subspaces by window.
         """
         check_inputs(maneuver, self.name, self.inputs)
-        if spaces.form == system_loops.COORDINATES:
+        if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
-        run = self.system.run(maneuver, state, spaces, solver, tolerance, times, longest_step)
+        how = Solver(solver, tolerance, times, longest_step)
+        run = self.system.run(maneuver, state, windows, how)
         return self.recorded(maneuver, run, maneuver.at(run.times), run.path)
 
     def recorded(
@@ -338,7 +321,7 @@ class DynamicModel:
 
     def _paths(self, states: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Paths as the loops want them; they read as many numbers as the model has."""
-        paths = loop_array(states), loop_array(inputs)
+        paths = np.asarray(states, dtype=float), np.asarray(inputs, dtype=float)
         expected = 2 * len(self.coordinates), len(self.inputs)
         for path, name, size in zip(paths, ("states", "inputs"), expected, strict=True):
             if path.shape != (len(states), size):
@@ -349,8 +332,7 @@ class DynamicModel:
         self.require(function)
         x, u = checked_array(x, 2 * len(self.coordinates), "x", self.name), self._inputs(u)
         result = np.empty(self.equations.shapes[function])
-        work = np.zeros(self.kernels.WORK)
-        getattr(self.kernels, function)(x, u, self.constants, work, result)
+        self.kernels.call(function, x, u, self.constants, result)
         return result
 
     def _inputs(self, u: Any) -> np.ndarray:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import kernel_hash, load_module
 from vehiclemor.codegen.derivation import Derivation, derivation
+from vehiclemor.codegen.loops import loops_digest
+from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component
-from vehiclemor.simulation.compiled_loops import loops_digest
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 
 def build(
@@ -37,10 +37,11 @@ def build(
         for key, declared in definition.PARAMETERS.items()
     }
     definition.check(values)
-    equations, kernels, digest = compiled(name, definition)
-    values |= solved_parameters(definition, values, parameters, kernels)
+    equations, digest = compiled(name, definition)
+    kernels = equations.kernels
+    values |= solved_parameters(definition, values, parameters, equations)
     solved = [float(values[key]) for key in _to_solve(definition)]
-    constants = hoisted_constants(kernels, parameters, solved)
+    constants = hoisted_constants(equations, parameters, solved)
     states = [q.name for q in (*equations.coordinates, *equations.speeds)]
     typical = dict.fromkeys(states, 1.0) | dict(getattr(definition, "TYPICAL", {}))
     return DynamicModel(
@@ -62,11 +63,10 @@ def build(
     )
 
 
-def compiled(name: str, definition: Any) -> tuple[Derivation, ModuleType, str]:
-    """Derivation and compiled kernels of a model, and their hash; parameters play no part here."""
+def compiled(name: str, definition: Any) -> tuple[Derivation, str]:
+    """Derivation of a model and the hash of its kernels; parameters play no part here."""
     made = derivation(name, definition)
-    digest = kernel_hash(f"{made.source}\n{loops_digest()}")
-    return made, load_module(name, made.source), digest
+    return made, kernel_hash(f"{made.source}\n{loops_digest(LOOP_SOURCES)}")
 
 
 def _to_solve(definition: Any) -> tuple[str, ...]:
@@ -75,26 +75,26 @@ def _to_solve(definition: Any) -> tuple[str, ...]:
 
 
 def hoisted_constants(
-    kernels: ModuleType, parameters: ParameterSet, solved: list[float]
+    equations: Derivation, parameters: ParameterSet, solved: list[float]
 ) -> np.ndarray:
     """Hoisted constants of a parameter set."""
-    constants = np.empty(kernels.CONSTANTS)
+    constants = np.empty(equations.constants)
     flat = np.concatenate([parameters.flat(), solved])
-    kernels.constants(flat, np.empty(kernels.WORK), constants)
+    equations.kernels.call("constants", flat, constants)
     return constants
 
 
 def solved_parameters(
-    definition: Any, values: Mapping[str, Any], parameters: ParameterSet, kernels: ModuleType
+    definition: Any, values: Mapping[str, Any], parameters: ParameterSet, equations: Derivation
 ) -> dict[str, float]:
     """What a model solves for before it can start, by name."""
     if not _to_solve(definition):
         return {}
-    work = np.zeros(kernels.WORK)
 
     def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
         result = np.empty(len(x))
-        kernels.derivative(x, u, hoisted_constants(kernels, parameters, solved), work, result)
+        constants = hoisted_constants(equations, parameters, solved)
+        equations.kernels.call("derivative", x, u, constants, result)
         return result
 
     return definition.settle(values, derivative)

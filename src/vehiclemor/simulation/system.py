@@ -1,44 +1,49 @@
-"""First-order systems dx/dt = f(x, u) as the compiled loops take them, full and reduced alike."""
+"""First-order systems dx/dt = f(x, u) as the compiled loop takes them, full and reduced alike."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.registry import unknown
-from vehiclemor.simulation import system_loops
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
-from vehiclemor.simulation.clock import timed
-from vehiclemor.simulation.compiled_loops import loops_module
-from vehiclemor.simulation.exponential_functions import TABLES, exponential_tables
-from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2
-from vehiclemor.simulation.signals import signal_of
-from vehiclemor.simulation.spaces import Spaces
+from vehiclemor.simulation.input_splines import signal_of
+from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.integrators.exponential_functions import block_functions
+from vehiclemor.simulation.integrators.structures import (
+    NOT_FINITE,
+    SINGULAR,
+    STEP_TOO_SMALL,
+    TOO_MANY_CALLS,
+    Equations,
+    Method,
+    Output,
+)
+from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
-SOLVERS = ("explicit", "rodas4", "ros34pw2", "etdrk4")
-# Those with one Jacobian for all runs.
-FROZEN = ("ros34pw2", "etdrk4")
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
-# A run that needs more evaluations of its right-hand side than this is going nowhere.
-MOST_CALLS = 100_000
-# Longest first step (s) after a break point of the inputs.
-RESTART = 0.05
-# Step sizes (s) for which inverses and matrix functions are stored.  Where a step and its rung
-# differ more, its error grows and steps are rejected.
-LADDER = 2.0 ** (0.125 * np.arange(-128, 25))
 REASONS = {
-    1: f"more than {MOST_CALLS} evaluations of the right-hand side",
-    2: "a state is not finite",
-    3: "the matrix of a linear system is singular",
-    4: "the step size has become too small",
+    TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side",
+    NOT_FINITE: "a state is not finite",
+    SINGULAR: "the matrix of a linear system is singular",
+    STEP_TOO_SMALL: "the step size has become too small",
 }
+# Kernels that a formulation calls; a fused step comes besides.
+CALLED = {
+    "full": ("derivative",),
+    "state": ("derivative",),
+    "coordinates": ("derivative", "second_order", "speeds"),
+}
+PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Run:
     times
         Output times (samples,) in s.
     path
-        States (samples, dim) at these times; not a number from a failure on.
+        States (samples, dim) at these times; NaN from a failure on.
     counts
         Numbers in the order of `DYNAMIC_COUNTS`.
     seconds
@@ -66,49 +71,90 @@ class Run:
     failure: str
 
 
+class Solver(NamedTuple):
+    """How a run is integrated.
+
+    Attributes
+    ----------
+    name
+        One of `catalogue.INTEGRATORS`.
+    tolerance
+        Largest local error of a state relative to its scale plus its own size.
+    times
+        Output times (samples,) in s, the maneuver's by default.
+    longest_step
+        In s; unlimited by default.
+    """
+
+    name: str
+    tolerance: float
+    times: np.ndarray | None = None
+    longest_step: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class System:
     """A first-order system whose right-hand side is machine code.
 
     Attributes
     ----------
-    machine
-        Constants and addresses of the kernels, see `system_loops`.
+    kernels
+        `derivative` and, where the system has them, `outputs`, `second_order`, `speeds`.
+    constants
+        Hoisted constants of the kernels.
     inputs
         Number of inputs.
     reference
         State (dim,) at which the Jacobian is frozen, all inputs zero.
-    typical
+    error_scale
         Magnitude of each state (dim,) below which errors are measured absolutely.
     active
         Numbers of the states that the right-hand side depends on.
-    turning
+    rotating
         Numbers of the heading and of the pairs of states that turn with it; may be empty.
-    stepped
-        Whether a kernel takes whole steps of the W-method, see `stepped_loops`.
+    fused
+        Integrator -> kernel that takes whole steps of it.
     diagonal
-        Numbers of states by diagonal block of the Jacobian, if a kernel takes whole steps of the
-        exponential method, see `modal_loops`; may be empty.
+        Numbers of states by diagonal block of the Jacobian, where a fused step relies on them.
     """
 
-    machine: tuple[np.ndarray, np.ndarray]
+    kernels: Kernels
+    constants: np.ndarray
     inputs: int
     reference: np.ndarray
-    typical: np.ndarray
+    error_scale: np.ndarray
     active: np.ndarray
-    turning: np.ndarray
-    stepped: bool = False
+    rotating: np.ndarray
+    fused: Mapping[str, str] = field(default_factory=dict)
     diagonal: tuple[tuple[int, ...], ...] = ()
 
-    @property
-    def loops(self) -> ModuleType:
-        """Module of compiled loops, the same for all systems."""
-        return loops_module()
+    def equations(self, *names: str, fused: str = "") -> Equations:
+        """Kernels of these names, at their places, as compiled loops take them.
+
+        Parameters
+        ----------
+        fused
+            Kernel that takes whole steps, if any.
+        """
+        places = ("derivative", "outputs", "second_order", "speeds")
+        found = [self.kernels.address(name) if name in names else 0 for name in places]
+        found.append(self.kernels.address(fused) if fused else 0)
+        return Equations(np.array(found, dtype=np.int64), self.constants, self.error_scale)
 
     def jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """df/dx (dim, dim) by central differences; columns of inactive states are zero."""
         result = np.empty((len(x), len(x)))
-        self.loops.jacobian_at(loop_array(x), loop_array(u), self.machine, self.active, result)
+        loop = path_loops()["jacobian_at"]
+        equations, work = self.called("full", ""), np.empty((3, len(x)))
+        loop(loop_array(x), loop_array(u), equations, self.active, work, result)
+        return result
+
+    def along(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
+        """Results (samples, size) of a kernel along a path of states and inputs."""
+        result = np.empty((len(path), size))
+        address = np.array([self.kernels.address(kernel)], dtype=np.int64)
+        loop = path_loops()["kernel_path"]
+        loop(loop_array(path), loop_array(inputs), address, self.constants, result)
         return result
 
     @cached_property
@@ -117,125 +163,88 @@ class System:
         return self.jacobian(self.reference, np.zeros(self.inputs))
 
     @cached_property
-    def frozen_inverses(self) -> np.ndarray:
-        """Transposed active columns of (I - gamma h J)^-1 on the ladder of step sizes."""
-        frozen = self.frozen_jacobian
-        identity = np.eye(len(frozen))
-        inverses = [np.linalg.inv(identity - ROS34PW2.gamma * h * frozen) for h in LADDER]
-        return loop_array(np.stack([inverse[:, self.active].T for inverse in inverses]))
+    def _ready(self) -> dict[tuple, Ready]:
+        # What integrators store of the frozen Jacobian is made when it is first used.
+        return {}
 
-    @cached_property
-    def frozen_exponentials(self) -> np.ndarray:
-        """Matrix functions of the exponential method on the ladder, see `exponential_loops`."""
-        if not self.diagonal:
-            tables = exponential_tables(self.frozen_jacobian, LADDER)
-            return loop_array(tables.reshape(len(LADDER), -1, tables.shape[-1]))
-        parts = []
-        for numbers in self.diagonal:
-            block = exponential_tables(self.frozen_jacobian[np.ix_(numbers, numbers)], LADDER)
-            parts.append(block.swapaxes(2, 3).reshape(len(LADDER), TABLES, -1))
-        entries = np.concatenate(parts, axis=2)
-        return loop_array(entries.reshape(len(LADDER), 1, -1))
+    def method(self, solver: str, active: np.ndarray) -> Ready:
+        """What an integrator needs beside its code; kept for further runs."""
+        key = solver, active.tobytes()
+        if key not in self._ready:
+            chosen = catalogue.integrator(solver)
+            if chosen.operators is None:
+                operators = np.zeros((1, 1, 1))
+            elif solver in self.fused and self.diagonal:
+                blocks = self.diagonal
+                operators = block_functions(self.frozen_jacobian, blocks, catalogue.STEP_GRID)
+            else:
+                operators = chosen.operators(self.frozen_jacobian, active)
+            grid = catalogue.STEP_GRID
+            self._ready[key] = ready(Method(chosen.tableau, grid, operators, active, self.rotating))
+        return self._ready[key]
+
+    def called(self, formulation: str, fused: str) -> Ready:
+        """The kernels that a run calls; kept for further runs."""
+        key = formulation, fused
+        if key not in self._ready:
+            self._ready[key] = ready(self.equations(*CALLED[formulation], fused=fused))
+        return self._ready[key]
 
     def run(
-        self,
-        maneuver: Maneuver,
-        state: np.ndarray,
-        spaces: Spaces,
-        solver: str,
-        tolerance: float,
-        times: np.ndarray | None = None,
-        longest_step: float | None = None,
+        self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
     ) -> Run:
-        """Integrate from a state (dim,) over a maneuver; see `arguments`."""
-        arguments = self.arguments(maneuver, state, spaces, solver, tolerance, times, longest_step)
-        sampled, path, counts = arguments[-3:]
-        if not self.loops.run.signatures:
-            # Compile, or load machine code, outside of the time that is measured.
-            edges, one = np.array([0.0, 1e-9]), np.zeros(1, dtype=np.int64)
-            copies = path.copy(), counts.copy()
-            self.loops.run(*arguments[:3], edges, one, one, *arguments[6:-2], *copies)
-        (status, reached), seconds = timed(lambda: self.loops.run(*arguments), counts)
-        failure = f"{REASONS[status]} at t = {reached:.6g} s" if status else ""
-        return Run(sampled, path, counts, seconds, failure)
-
-    def arguments(
-        self,
-        maneuver: Maneuver,
-        state: np.ndarray,
-        spaces: Spaces,
-        solver: str,
-        tolerance: float,
-        times: np.ndarray | None = None,
-        longest_step: float | None = None,
-    ) -> tuple:
-        """Arguments of the compiled `run`; times, path and counts come last.
-
-        Parameters
-        ----------
-        maneuver
-            Its inputs are the system's.
-        state
-            Initial state (dim,).
-        spaces
-            Form of the system and its subspaces by window.
-        solver, tolerance
-            One of `SOLVERS`; largest local error of a state relative to its typical size.
-        times
-            Output times (samples,) in s, the maneuver's by default.
-        longest_step
-            In s; unlimited by default.
+        """Integrate from a state (n,) over a maneuver.
 
         Raises
         ------
         InputError
             If a value is out of bounds or a name is unknown.
         """
-        times = maneuver.times if times is None else loop_array(times)
-        check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
-        if longest_step is not None:
-            check_positive("longest_step", longest_step)
-        if solver not in SOLVERS:
-            raise unknown("solver", solver, SOLVERS)
-        full = spaces.form == system_loops.FULL
-        if solver in FROZEN and not full:
-            raise InputError(f"{solver} freezes the full model's Jacobian: not for a reduced model")
-        tableau = ROS34PW2 if solver == "ros34pw2" else RODAS4
-        frozen, stored = self._frozen(solver)
+        loop, arguments = self.prepared(maneuver, state, windows, solver)
+        output: Output = arguments[7]
+        status, seconds = timed(loop.prepared(*arguments), output.counts)
+        failure = f"{REASONS[status]} at t = {arguments[8][0]:.6g} s" if status else ""
+        return Run(output.samples, output.path, output.counts, seconds, failure)
+
+    def prepared(
+        self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
+    ) -> tuple[Loop, tuple]:
+        """The compiled loop of a run and its arguments; see `run`."""
+        times = maneuver.times if solver.times is None else loop_array(solver.times)
+        longest = solver.longest_step
+        check_positive("tolerance", solver.tolerance, SMALLEST_TOLERANCE)
+        if longest is not None:
+            check_positive("longest_step", longest)
+        name = catalogue.ALIASES.get(solver.name, solver.name)
+        chosen = catalogue.integrator(name)
+        full = windows.formulation == "full"
+        catalogue.check_formulation(name, full)
         check_times(times, maneuver)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
-        edges, segments, windows = spaces.spans(signal.edges, end)
-        path = np.full((len(times), len(state)), np.nan)
-        counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-        return (
-            spaces.form,
-            solver == "explicit",
+        fused = self.fused.get(name, "") if full else ""
+        active = self.active if full else np.arange(windows.ranks.max())
+        dim, n = int(windows.ranks.max()), len(state)
+        arguments = (
             loop_array(state),
-            loop_array(edges),
-            segments,
-            windows,
-            *spaces.arrays,
-            signal.arrays,
-            self.machine,
-            self.typical,
-            (float(tolerance), float(longest_step or np.inf), MOST_CALLS),
-            RESTART,
-            tableau.arguments,
-            frozen,
-            self.active if full else np.arange(spaces.ranks.max()),
-            self.turning,
-            LADDER,
-            stored,
-            times,
-            path,
-            counts,
+            self.called(windows.formulation, fused),
+            signal,
+            windows.spans(signal.bundle.edges, end),
+            windows.subspaces,
+            self.method(name, active),
+            catalogue.control_of(name, float(solver.tolerance), float(longest or np.inf)),
+            Output(
+                times,
+                np.full((len(times), n), np.nan),
+                np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64),
+            ),
+            np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, bool(fused))),
+            np.empty(dim + 4, dtype=np.int64),
         )
+        modules = catalogue.loop_modules(chosen, windows.formulation, bool(fused))
+        return loops(modules, ("integrate",))["integrate"], arguments
 
-    def _frozen(self, solver: str) -> tuple[int, np.ndarray]:
-        """Number by which the compiled `run` knows a solver, and what is stored for it."""
-        if solver == "ros34pw2":
-            return 2 if self.stepped else 1, self.frozen_inverses
-        if solver == "etdrk4":
-            return 4 if self.diagonal else 3, self.frozen_exponentials
-        return 0, np.zeros((1, 1, 1))
+
+def path_loops() -> Mapping[str, Loop]:
+    """Loops over the samples of a path, the same for all systems."""
+    return loops(PATH_LOOPS, ("kernel_path", "jacobian_at"))

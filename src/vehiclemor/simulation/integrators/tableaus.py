@@ -1,46 +1,14 @@
 """Coefficients of the Rosenbrock methods, in the form that needs no product with the Jacobian."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 
-@dataclass(frozen=True, eq=False)
-class Tableau:
-    """Coefficients of a method with s stages; see `rosenbrock_loops`.
+def rodas4() -> np.ndarray:
+    """Tableau (16, 6) of RODAS: a, c, alpha, d, m, e; gamma is 1/4.
 
-    Attributes
-    ----------
-    a, c
-        Strictly lower triangular matrices (s, s).
-    alpha, d
-        Times of the stages and weights of the time derivative (s,).
-    m, e
-        Weights of the solution and of its error (s,).
-    gamma
-        Diagonal coefficient.
-    order
-        Order of the solution; that of the embedded one is lower by one.
+    Hairer, Wanner, Solving Ordinary Differential Equations II (2nd ed., Springer 1996), section
+    VI.4.
     """
-
-    a: np.ndarray
-    c: np.ndarray
-    alpha: np.ndarray
-    d: np.ndarray
-    m: np.ndarray
-    e: np.ndarray
-    gamma: float
-    order: int
-
-    @property
-    def arguments(self) -> tuple:
-        """Argument of the compiled loop."""
-        exponent = 1.0 / self.order
-        return self.a, self.c, self.alpha, self.d, self.m, self.e, self.gamma, exponent
-
-
-def _rodas4() -> Tableau:
-    """RODAS: Hairer, Wanner, Solving ODEs II (2nd ed., Springer 1996), section VI.4, order 4(3)."""
     a, c = np.zeros((6, 6)), np.zeros((6, 6))
     a[1, :1] = [1.544]
     a[2, :2] = [0.9466785280815826, 0.2557011698983284]
@@ -65,11 +33,15 @@ def _rodas4() -> Tableau:
     e[5] = 1.0
     alpha = np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0])
     d = np.array([0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0])
-    return Tableau(a, c, alpha, d, m, e, 0.25, 4)
+    return np.vstack([a, c, alpha, d, m, e])
 
 
-def _ros34pw2() -> Tableau:
-    """ROS34PW2: J. Rang, L. Angermann, BIT Numer. Math. 45 (2005); order 3 for any matrix."""
+def ros34pw2() -> np.ndarray:
+    """Tableau (11, 4) of ROS34PW2: a, gamma c, alpha, m, e; gamma is that of its module.
+
+    J. Rang, L. Angermann, BIT Numer. Math. 45 (2005).  The time derivative is left out: order 3
+    holds for any matrix, its column of f_t included.
+    """
     gamma = 4.3586652150845900e-01
     alpha = np.zeros((4, 4))
     alpha[1, 0] = 8.7173304301691801e-01
@@ -84,18 +56,7 @@ def _ros34pw2() -> Tableau:
         [3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.1793326075422950e-01]
     )
     inverse = np.linalg.inv(g)
-    # The time derivative is left out: order 3 holds for any matrix, its column of f_t included.
-    return Tableau(
-        np.tril(alpha @ inverse, -1),
-        np.tril(np.eye(4) / gamma - inverse, -1),
-        alpha.sum(axis=1),
-        np.zeros(4),
-        b @ inverse,
-        (b - embedded) @ inverse,
-        gamma,
-        3,
-    )
-
-
-RODAS4 = _rodas4()
-ROS34PW2 = _ros34pw2()
+    a = np.tril(alpha @ inverse, -1)
+    c = np.tril(np.eye(4) / gamma - inverse, -1)
+    m, e = b @ inverse, (b - embedded) @ inverse
+    return np.vstack([a, gamma * c, alpha.sum(axis=1), m, e])

@@ -6,14 +6,17 @@ result)` makes the array that the other functions read.
 """
 
 import ast
+from collections.abc import Iterator
 
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from vehiclemor.codegen.batches import LANES, RESULTS, SMALLEST_BATCH
 from vehiclemor.codegen.schedule import Batch, schedule
+from vehiclemor.codegen.vector_lanes import LANES, RESULTS, SMALLEST_BATCH
 from vehiclemor.symbolic.program import Function, Program
 
+# Results of functions that are evaluated in batches are variables with these prefixes.
+BATCHED_PREFIXES = tuple(f"{prefix}_" for prefixes in RESULTS.values() for prefix in prefixes)
 OPERATIONS = ("add", "multiply", "divide", "negate", "sqrt", "trigonometric", "power")
 
 
@@ -169,39 +172,6 @@ def _evaluation(batch: Batch, first: int) -> list[str]:
     return given + evaluated + taken
 
 
-def tangent_source(program: Program) -> str:
-    """Source of `residual_tangent(q, u, constants, work, basis, r, result)`.
-
-    Made from `residual_jacobian`: result[:, :r] is the Jacobian times basis[:, :r] and result[:, n]
-    the residual.  Structural zeros of the Jacobian cost nothing.
-    """
-    function = program.functions["residual_jacobian"]
-    rows, columns = function.shape
-    text = _function_source(
-        "residual_tangent", program.arguments, program.constant_symbols, function, True
-    )
-    lines = text.splitlines()
-    lines[0] = lines[0].replace("_result):", "_basis, _r, _result):")
-    body = lines[: len(lines) - rows * columns]
-    printer = _Printer(batched=True)
-    products: list[str] = []
-    for i in range(rows):
-        terms = []
-        for j in range(columns - 1):
-            entry = function.results[i * columns + j]
-            if entry == 0:
-                continue
-            if entry in (1, -1):
-                terms.append(f"{'' if entry == 1 else '-'}_basis[{j}, _k]")
-                continue
-            body.append(f"    _j_{i}_{j} = {printer.doprint(entry)}")
-            terms.append(f"_j_{i}_{j}*_basis[{j}, _k]")
-        products.append(f"        _result[{i}, _k] = {' + '.join(terms) or '0.0'}")
-        residual = printer.doprint(function.results[i * columns + columns - 1])
-        body.append(f"    _result[{i}, {columns - 1}] = {residual}")
-    return "\n".join([*body, "    for _k in range(_r):", *products]) + "\n"
-
-
 def _subscript(index: int, shape: tuple[int, ...]) -> str:
     if len(shape) == 1:
         return str(index)
@@ -209,7 +179,7 @@ def _subscript(index: int, shape: tuple[int, ...]) -> str:
 
 
 def operation_counts(source: str) -> dict[str, dict[str, int]]:
-    """Count the arithmetic operations that each function of a reference source executes.
+    """Count the arithmetic operations that each function of a source executes.
 
     Returns
     -------
@@ -224,12 +194,21 @@ def operation_counts(source: str) -> dict[str, dict[str, int]]:
         if not isinstance(definition, ast.FunctionDef):
             continue
         count: dict[str, int] = dict.fromkeys(OPERATIONS, 0)
-        for node in ast.walk(definition):
+        for node in _arithmetic(definition):
             if isinstance(node, ast.BinOp):
                 count[operators.get(type(node.op), "power")] += 1
             elif isinstance(node, ast.UnaryOp) and not isinstance(node.operand, ast.Constant):
                 count["negate"] += 1
             elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 count["sqrt" if node.func.attr == "sqrt" else "trigonometric"] += 1
+            elif isinstance(node, ast.Name) and node.id.startswith(BATCHED_PREFIXES):
+                count["trigonometric"] += 1
         counts[definition.name] = count | {"total": sum(count.values())}
     return counts
+
+
+def _arithmetic(definition: ast.FunctionDef) -> Iterator[ast.AST]:
+    """Nodes of what is computed; of a batched function each use counts, not its evaluation."""
+    for statement in definition.body:
+        if isinstance(statement, ast.Assign):
+            yield from ast.walk(statement.value)

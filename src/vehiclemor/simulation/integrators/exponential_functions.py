@@ -1,4 +1,4 @@
-"""Matrix functions of the exponential Runge-Kutta method ETDRK4, for a ladder of step sizes.
+"""Matrix functions of the exponential Runge-Kutta method ETDRK4, for a grid of step sizes.
 
 phi_0(z) = exp(z), phi_k(z) = (phi_{k-1}(z) - 1/(k-1)!) / z.  Taylor series at a small argument,
 then doubling (N. Higham, Functions of Matrices, SIAM 2008, section 10.7):
@@ -9,13 +9,13 @@ so that defective matrices, those of stabilised constraints, are no exception.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 # Norm of the matrix below which the series is used, and its terms: rounding is larger.
 SMALL, TERMS = 0.1, 10
-# Tables of a step size, see `exponential_loops`: J, then functions of h J / 2 and h J.
+# Tables of a step size, see `etdrk4`: J, then functions of h J / 2 and h J.
 TABLES = 7
 
 
@@ -49,13 +49,13 @@ def _doubled(functions: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential_tables(jacobian: np.ndarray, ladder: Iterable[float]) -> np.ndarray:
+def exponential_tables(jacobian: np.ndarray, grid: Iterable[float]) -> np.ndarray:
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of
     z = h J.
     """
-    steps = [float(h) for h in ladder]
+    steps = [float(h) for h in grid]
     tables = np.empty((len(steps), TABLES, *jacobian.shape))
     for table, h in zip(tables, steps, strict=True):
         half = phi_functions(0.5 * h * jacobian)
@@ -65,3 +65,20 @@ def exponential_tables(jacobian: np.ndarray, ladder: Iterable[float]) -> np.ndar
         table[3], table[4] = first.T, 2.0 * second.T
         table[5], table[6] = (2.0 * second - 4.0 * third).T, (4.0 * third - second).T
     return tables
+
+
+def block_functions(
+    jacobian: np.ndarray, blocks: Sequence[Sequence[int]], grid: Iterable[float]
+) -> np.ndarray:
+    """Entries (step sizes, 1, 7 entries) of the tables' diagonal blocks, for fused steps.
+
+    Parameters
+    ----------
+    blocks
+        Numbers of the states of each block.
+    """
+    steps, parts = list(grid), []
+    for numbers in blocks:
+        block = exponential_tables(jacobian[np.ix_(numbers, numbers)], steps)
+        parts.append(block.swapaxes(2, 3).reshape(len(steps), TABLES, -1))
+    return np.ascontiguousarray(np.concatenate(parts, axis=2).reshape(len(steps), 1, -1))

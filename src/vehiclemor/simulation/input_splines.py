@@ -4,47 +4,23 @@ Between two break points of a maneuver an input is smooth: quintic splines on eq
 doubled until the error at the midpoints is below `ACCURACY` times the input's largest value.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
+from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
 DEGREE = 5
 
 
-@dataclass(frozen=True)
-class Signal:
-    """Piecewise polynomial inputs.
-
-    Attributes
-    ----------
-    edges
-        Ends of the smooth segments (segments + 1,) in s: start, break points, end.
-    first
-        Number of the first piece of each segment (segments + 1,).
-    coefficients
-        Polynomials (pieces, inputs, 6) in the part of the piece that has passed (0 to 1), lowest
-        power first.
-    """
-
-    edges: np.ndarray
-    first: np.ndarray
-    coefficients: np.ndarray
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Arguments of the compiled loops."""
-        return self.edges, self.first, self.coefficients
-
-
 @lru_cache(maxsize=64)
-def signal_of(maneuver: Maneuver) -> Signal:
+def signal_of(maneuver: Maneuver) -> Ready:
     """Piecewise polynomial inputs of a maneuver.
 
     Raises
@@ -68,7 +44,7 @@ def signal_of(maneuver: Maneuver) -> Signal:
     largest = np.abs(samples).max(axis=0) + 1e-300
     parts = [_segment(maneuver, a, b, largest) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
-    return Signal(edges, first.astype(np.int64), np.concatenate(parts))
+    return ready(Signal(edges, first.astype(np.int64), np.concatenate(parts)))
 
 
 def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.ndarray:

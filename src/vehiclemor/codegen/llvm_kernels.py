@@ -8,26 +8,16 @@ functions become vector instructions, from the text of the same scalar functions
 """
 
 import ast
-import ctypes
-import hashlib
 import inspect
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.errors import TypingError
-from numba.core.typing import signature
-from numba.extending import intrinsic
 
 from vehiclemor.codegen import arctangent, exponential, sincos, weighted_sums
-from vehiclemor.codegen.batches import LANES, RESULTS
+from vehiclemor.codegen.vector_lanes import LANES, RESULTS
 
 # A product and a sum may become one operation, as in the loops that are compiled with them.
 FLAGS = ("contract",)
@@ -37,7 +27,7 @@ WIDTH = LANES // 2
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
-POINTER = types.CPointer(types.float64)
+POINTER = DOUBLE.as_pointer()
 SOURCES: dict[str, ModuleType] = {
     "sincos": sincos,
     "atan": arctangent,
@@ -66,23 +56,13 @@ COMPARISONS = {
 }
 
 Key = str | tuple[str, int]
-# Calls a function of `math` on values: the compiler's own way to the C library.
-Library = Callable[[str, Sequence[Any]], Any]
-
-
-def source_hash() -> str:
-    """Hash of the source that makes the machine code: this module and the elementary functions."""
-    modules = [inspect.getmodule(source_hash), weighted_sums, *SOURCES.values()]
-    texts = [inspect.getsource(module) for module in modules if module is not None]
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
 class _Expressions:
     """Writes the instructions of expressions of floats, or of vectors of floats."""
 
-    def __init__(self, builder: Any, library: Library) -> None:
+    def __init__(self, builder: Any) -> None:
         self._builder = builder
-        self._library = library
 
     def value(self, node: ast.expr, names: Callable[[ast.expr], Any], kind: ir.Type) -> Any:
         """Value of an expression; `names` gives those of its names and array entries."""
@@ -170,7 +150,9 @@ class _Expressions:
         if name == "power_of_two" and len(arguments) == 1:
             return self._power_of_two(arguments[0])
         if name.removeprefix("math.") in LIBRARY and name.startswith("math."):
-            return self._library(name.removeprefix("math."), arguments)
+            double = [DOUBLE] * len(arguments)
+            function = _declared(self._builder, name.removeprefix("math."), DOUBLE, double)
+            return self._builder.call(function, arguments)
         raise ValueError(f"{ast.unparse(node)}: {name} is not straight-line")
 
     def _power_of_two(self, number: Any) -> Any:
@@ -185,8 +167,15 @@ class _Expressions:
 def _function(builder: Any, name: str, *kinds: ir.Type) -> Any:
     """An LLVM function of floats or vectors, by its name without the suffix of its type."""
     suffix = f"v{WIDTH}f64" if kinds[0] == VECTOR else "f64"
-    function = ir.FunctionType(kinds[0], kinds)
-    return cgutils.get_or_insert_function(builder.module, function, f"{name}.{suffix}")
+    return _declared(builder, f"{name}.{suffix}", kinds[0], kinds)
+
+
+def _declared(builder: Any, name: str, returned: ir.Type, kinds: Sequence[ir.Type]) -> Any:
+    """An outside function, declared once in a module."""
+    known = builder.module.globals
+    if name not in known:
+        return ir.Function(builder.module, ir.FunctionType(returned, kinds), name)
+    return known[name]
 
 
 def _constant(kind: ir.Type, number: float) -> ir.Constant:
@@ -207,10 +196,21 @@ def _elementary(name: str) -> tuple[dict[str, float], ast.FunctionDef]:
     return {k: v for k, v in vars(module).items() if isinstance(v, float)}, function
 
 
-class _Kernel:
-    """Text of a kernel as statements that know what they need and what they define."""
+class KernelText:
+    """Text of a kernel as statements that know what they need and what they define.
+
+    Attributes
+    ----------
+    name, arguments
+        Of the kernel; scratch space is an argument of the text, not of the machine code.
+    sizes
+        Argument -> smallest number of floats.
+    dimensions
+        Of the result.
+    """
 
     def __init__(self, text: str) -> None:
+        self.text = text
         tree = ast.parse(text).body
         if len(tree) != 1 or not isinstance(tree[0], ast.FunctionDef):
             raise ValueError("a kernel is one function")
@@ -246,11 +246,6 @@ class _Kernel:
         return [name for name in self.arguments if name != "_work"]
 
 
-@cache
-def _kernel(text: str) -> _Kernel:
-    return _Kernel(text)
-
-
 def _places(node: ast.Subscript) -> tuple[int, ...]:
     elements = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
     places = [e.value for e in elements if isinstance(e, ast.Constant) and isinstance(e.value, int)]
@@ -259,27 +254,37 @@ def _places(node: ast.Subscript) -> tuple[int, ...]:
     return tuple(places)
 
 
-def emit(text: str, builder: Any, pointers: Mapping[str, Any], library: Library) -> None:
+def kernel_module(kernels: Sequence[KernelText]) -> ir.Module:
+    """LLVM module of kernels, each a C function of pointers to floats by the kernel's name."""
+    module = ir.Module("kernels")
+    for kernel in kernels:
+        kind = ir.FunctionType(ir.VoidType(), [POINTER] * len(kernel.pointers))
+        function = ir.Function(module, kind, kernel.name)
+        function.attributes.add("nounwind")
+        builder = ir.IRBuilder(function.append_basic_block())
+        emit(kernel, builder, dict(zip(kernel.pointers, function.args, strict=True)))
+        builder.ret_void()
+    return module
+
+
+def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
     """Write the instructions of a kernel.
 
     Parameters
     ----------
-    text
-        Its source, as `kernel_source` prints it.
+    kernel
+        What to write.
     builder
         Where the instructions go.
     pointers
         Argument -> pointer to its first float; the scratch space needs none.
-    library
-        Calls a function of `math`.
 
     Raises
     ------
     ValueError
         If the text has anything but straight-line arithmetic.
     """
-    kernel = _kernel(text)
-    expressions = _Expressions(builder, library)
+    expressions = _Expressions(builder)
     values: dict[Key, Any] = {}
 
     def address(name: str, place: int) -> Any:
@@ -360,142 +365,3 @@ def _batch(builder: Any, expressions: _Expressions, name: str, lanes: Sequence[A
         for part in parts
         for place in places
     ]
-
-
-def machine_signature(pointers: int) -> Any:
-    """Signature of a kernel's machine code with a number of pointers."""
-    return types.void(*[POINTER] * pointers)
-
-
-@dataclass(frozen=True)
-class KernelShape:
-    """What a kernel wants of its arrays.
-
-    Attributes
-    ----------
-    name
-        Of the kernel.
-    arguments
-        Names of its arguments, scratch space included.
-    sizes
-        Argument -> smallest number of floats.
-    dimensions
-        Of the result.
-    """
-
-    name: str
-    arguments: tuple[str, ...]
-    sizes: dict[str, int]
-    dimensions: int
-
-
-def kernel_shape(text: str) -> KernelShape:
-    """Read off a kernel's text what it wants of its arrays."""
-    kernel = _kernel(text)
-    return KernelShape(kernel.name, tuple(kernel.arguments), kernel.sizes, kernel.dimensions)
-
-
-def straight_line(text: str) -> Any:
-    """Function for compiled code that executes a kernel, given a tuple of pointers to floats.
-
-    Parameters
-    ----------
-    text
-        Source of the kernel, as `kernel_source` prints it.
-    """
-
-    @intrinsic
-    def execute(typing_context: Any, pointers: Any) -> Any:
-        del typing_context
-
-        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            def library(name: str, values: Sequence[Any]) -> Any:
-                floats = [types.float64] * len(values)
-                function = getattr(math, name)
-                return context.get_function(function, signature(types.float64, *floats))(
-                    builder, values
-                )
-
-            given = cgutils.unpack_tuple(builder, args[0], len(sig.args[0]))
-            emit(text, builder, dict(zip(_kernel(text).pointers, given, strict=True)), library)
-            return context.get_dummy_value()
-
-        return types.void(pointers), generate
-
-    return execute
-
-
-def python_kernel(kernel: KernelShape, machine: Any) -> Callable[..., None]:
-    """A kernel as a function of arrays, to be called from Python.
-
-    Parameters
-    ----------
-    kernel
-        What it wants of its arrays.
-    machine
-        The C function that `straight_line` was compiled into.
-    """
-    count = len(kernel.arguments) - ("_work" in kernel.arguments)
-    function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * count)(machine.address)
-    # The machine code lives as long as its owner.
-    alive: tuple[Callable[..., None], Any] = function, machine
-
-    def checked(name: str, array: np.ndarray) -> Any:
-        dimensions = kernel.dimensions if name == "_result" else 1
-        if not (
-            isinstance(array, np.ndarray)
-            and array.dtype == np.float64
-            and array.flags.c_contiguous
-            and array.ndim == dimensions
-            and array.size >= kernel.sizes[name]
-            and (name != "_result" or array.flags.writeable)
-        ):
-            kind = f"{array.dtype}{array.shape}" if hasattr(array, "dtype") else type(array)
-            raise TypeError(
-                f"{kernel.name}: {name.removeprefix('_')} must be a C-contiguous array of at least "
-                f"{kernel.sizes[name]} floats with {dimensions} dimension(s), not {kind}"
-            )
-        return array.ctypes.data
-
-    def execute(*arrays: np.ndarray) -> None:
-        given = zip(kernel.arguments, arrays, strict=True)
-        alive[0](*[checked(name, array) for name, array in given if name != "_work"])
-
-    execute.__name__ = kernel.name
-    return execute
-
-
-@intrinsic
-def call_machine(typing_context: Any, model: Any, place: Any, x: Any, u: Any, result: Any) -> Any:
-    """Call the kernel of a model whose address has a place in the model's list, from loops.
-
-    `model` is (constants, addresses); the arrays must be as long as the kernel wants them.  Nothing
-    is taken out of a tuple by the caller: counting references would cost as much as the call.
-    """
-    del typing_context
-    constants, addresses = model
-    for kind in (x, u, constants, result):
-        if not _is_plain(kind, types.float64):
-            raise TypingError(f"a kernel needs C-contiguous arrays of floats, not {kind}")
-    if not result.mutable or not _is_plain(addresses, types.int64):
-        raise TypingError(f"a kernel can't be called at {addresses}, or write to {result}")
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        def data(kind: Any, array: Any) -> Any:
-            return context.make_array(kind)(context, builder, array).data
-
-        given = cgutils.unpack_tuple(builder, args[0], 2)
-        index = context.cast(builder, args[1], sig.args[1], types.intp)
-        address = builder.load(builder.gep(data(addresses, given[1]), [index]))
-        pointers = [data(x, args[2]), data(u, args[3]), data(constants, given[0])]
-        pointers.append(data(result, args[4]))
-        kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
-        function = builder.inttoptr(address, kind.as_pointer())
-        builder.call(function, pointers, attrs=("nounwind",))
-        return context.get_dummy_value()
-
-    return types.void(model, place, x, u, result), generate
-
-
-def _is_plain(kind: Any, number: Any) -> bool:
-    return isinstance(kind, types.Array) and kind.dtype == number and kind.layout == "C"

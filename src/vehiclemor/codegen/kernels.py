@@ -1,0 +1,132 @@
+"""Kernels of a model or a reduced model: source, machine code, calls from Python."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.object_cache import compiler_identity, fetched
+from vehiclemor.codegen.sources import source_digest
+
+
+@dataclass(frozen=True)
+class KernelSource:
+    """Text of a kernel, and what it wants of its arrays.
+
+    Attributes
+    ----------
+    name
+        Of the kernel.
+    text
+        Straight-line source, as `kernel_source` prints it.
+    arguments
+        Names of its arguments without scratch space, the result last.
+    sizes
+        Smallest number of floats of each argument.
+    dimensions
+        Of the result.
+    """
+
+    name: str
+    text: str
+    arguments: tuple[str, ...]
+    sizes: tuple[int, ...]
+    dimensions: int
+
+
+class Kernels:
+    """Kernels by name, each compiled when it is first used.
+
+    Parameters
+    ----------
+    sources
+        Name -> source.
+    """
+
+    def __init__(self, sources: Mapping[str, KernelSource]) -> None:
+        self.sources = dict(sources)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.sources
+
+    def address(self, name: str) -> int:
+        """Address of a kernel's machine code, for loops; 0 where there is no such kernel."""
+        return _machine(self.sources[name])[0] if name in self.sources else 0
+
+    def call(self, name: str, *arrays: np.ndarray) -> None:
+        """Run a kernel.
+
+        Parameters
+        ----------
+        arrays
+            Arguments in order, the result last: C-contiguous floats.
+
+        Raises
+        ------
+        TypeError
+            If an array is too short or of another kind.
+        """
+        source = self.sources[name]
+        function = _machine(source)[1]
+        function(*[_checked(source, k, array) for k, array in enumerate(arrays)])
+
+
+def _checked(source: KernelSource, place: int, array: Any) -> int:
+    last = place == len(source.arguments) - 1
+    dimensions, size = source.dimensions if last else 1, source.sizes[place]
+    if not (
+        isinstance(array, np.ndarray)
+        and array.dtype == np.float64
+        and array.flags.c_contiguous
+        and array.ndim == dimensions
+        and array.size >= size
+        and (not last or array.flags.writeable)
+    ):
+        kind = f"{array.dtype}{array.shape}" if hasattr(array, "dtype") else type(array)
+        raise TypeError(
+            f"{source.name}: {source.arguments[place].removeprefix('_')} must be a C-contiguous "
+            f"array of at least {size} floats with {dimensions} dimension(s), not {kind}"
+        )
+    return array.ctypes.data
+
+
+@cache
+def _machine(source: KernelSource) -> tuple[int, Any, MachineCode]:
+    """Address and C function of a kernel, and what owns its machine code."""
+    parts = [source.text, source_digest(("codegen",), (), ()), compiler_identity()]
+    key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
+
+    def make() -> bytes:
+        from vehiclemor.codegen.compiler import compiled_module
+        from vehiclemor.codegen.llvm_kernels import KernelText, kernel_module
+
+        return compiled_module(kernel_module([KernelText(source.text)]))
+
+    code = MachineCode(fetched(f"kernels/{source.name}-{key}.o", make))
+    address = code.address(source.name)
+    pointers = [ctypes.c_void_p] * len(source.arguments)
+    return address, ctypes.CFUNCTYPE(None, *pointers)(address), code
+
+
+def kernel_sources(text: str) -> dict[str, KernelSource]:
+    """Sources of the kernels in a text, by name."""
+    import ast
+
+    from vehiclemor.codegen.llvm_kernels import KernelText
+
+    found = {}
+    for node in ast.parse(text).body:
+        kernel = KernelText(f"{ast.unparse(node)}\n")
+        sizes = tuple(kernel.sizes[name] for name in kernel.pointers)
+        arguments = tuple(kernel.pointers)
+        found[kernel.name] = KernelSource(
+            kernel.name, kernel.text, arguments, sizes, kernel.dimensions
+        )
+    return found

@@ -1,0 +1,113 @@
+"""What only compiled loops can do: views of a buffer, calls of kernels, kernels in place."""
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
+
+from vehiclemor.codegen.llvm_kernels import DOUBLE, KernelText, emit
+
+WORD = ir.IntType(64)
+
+
+@intrinsic
+def vector(typing_context: Any, buffer: Any, first: Any, size: Any) -> Any:
+    """See `loop_types.vector`."""
+    del typing_context
+    kind = types.Array(types.float64, 1, "C")
+    return kind(buffer, first, size), _view(kind)
+
+
+@intrinsic
+def matrix(typing_context: Any, buffer: Any, first: Any, rows: Any, columns: Any) -> Any:
+    """See `loop_types.matrix`."""
+    del typing_context
+    kind = types.Array(types.float64, 2, "C")
+    return kind(buffer, first, rows, columns), _view(kind)
+
+
+def _view(kind: Any) -> Callable[..., Any]:
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        buffer = context.make_array(sig.args[0])(context, builder, args[0])
+        first, *shape = [
+            context.cast(builder, value, given, types.intp)
+            for value, given in zip(args[1:], sig.args[1:], strict=True)
+        ]
+        size, strides = WORD(8), []
+        for length in reversed(shape):
+            strides.insert(0, size)
+            size = builder.mul(size, length)
+        array = context.make_array(kind)(context, builder)
+        populate_array(
+            array,
+            data=builder.gep(buffer.data, [first]),
+            shape=shape,
+            strides=strides,
+            itemsize=WORD(8),
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    return generate
+
+
+@intrinsic
+def call_kernel(
+    typing_context: Any, kernels: Any, place: Any, x: Any, u: Any, constants: Any, result: Any
+) -> Any:
+    """See `loop_types.call_kernel`; the arrays must be as long as the kernel wants them."""
+    del typing_context
+    _require_plain(x, u, constants, result)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = context.cast(builder, args[1], sig.args[1], types.intp)
+        address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
+        pointers = [_data(context, builder, sig, args, k) for k in range(2, 6)]
+        kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
+        function = builder.inttoptr(address, kind.as_pointer())
+        builder.call(function, pointers, attrs=("nounwind",))
+        return context.get_dummy_value()
+
+    return types.void(kernels, place, x, u, constants, result), generate
+
+
+def inlined_kernel(text: str) -> Any:
+    """A kernel whose instructions are written where a loop calls it, given its arrays."""
+    kernel = KernelText(text)
+
+    @intrinsic
+    def execute(typing_context: Any, *arrays: Any) -> Any:
+        del typing_context
+        _require_plain(*arrays[0])
+        if len(arrays[0]) != len(kernel.pointers):
+            raise TypingError(f"{kernel.name} takes {', '.join(kernel.pointers)}")
+
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            kinds = sig.args[0]
+            given = cgutils.unpack_tuple(builder, args[0], len(kinds))
+            pointers = [
+                context.make_array(kind)(context, builder, value).data
+                for kind, value in zip(kinds, given, strict=True)
+            ]
+            emit(kernel, builder, dict(zip(kernel.pointers, pointers, strict=True)))
+            return context.get_dummy_value()
+
+        return types.void(types.StarArgTuple.from_types(arrays[0])), generate
+
+    return execute
+
+
+def _require_plain(*arrays: Any) -> None:
+    for kind in arrays:
+        plain = isinstance(kind, types.Array) and kind.dtype == types.float64
+        if not (plain and kind.layout == "C"):
+            raise TypingError(f"a kernel needs C-contiguous arrays of floats, not {kind}")
+
+
+def _data(context: Any, builder: Any, sig: Any, args: Any, place: int) -> Any:
+    return context.make_array(sig.args[place])(context, builder, args[place]).data

@@ -1,0 +1,188 @@
+"""Compiled loops with the kernels they call, cached by content and called from Python."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import inspect
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any, get_args
+
+import numpy as np
+
+from vehiclemor.codegen.loop_types import declared_arguments
+from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.object_cache import compiler_identity, fetched
+from vehiclemor.codegen.sources import source_digest
+
+_ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
+
+
+Kind = tuple[str, str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A bundle of arrays and numbers, taken apart once for many runs.
+
+    Attributes
+    ----------
+    bundle
+        Named tuple of declared types; it must not change.
+    words
+        Addresses, shapes and numbers as loops take them.
+    """
+
+    bundle: Any
+    words: list[int]
+
+
+def ready(bundle: Any) -> Ready:
+    """A named tuple as an argument of loops, its arrays checked."""
+    return Ready(bundle, _words(type(bundle).__name__, _kinds(type(bundle)), bundle))
+
+
+class Loop:
+    """A compiled loop as a function of arrays, numbers and named tuples of these.
+
+    Parameters
+    ----------
+    name
+        Of the entry.
+    declared
+        Name -> declared type of each argument.
+    code
+        Owner of the machine code.
+    """
+
+    def __init__(self, name: str, declared: Mapping[str, Any], code: MachineCode) -> None:
+        self.name = name
+        self._kinds = [_kinds(kind, argument) for argument, kind in declared.items()]
+        self._entry, self._code = _ENTRY(code.address(name)), code
+
+    def __call__(self, *arguments: Any) -> int:
+        """Run the loop; the lock of the interpreter is released meanwhile."""
+        return self.prepared(*arguments)()
+
+    def prepared(self, *arguments: Any) -> Callable[[], int]:
+        """The loop with its arguments; the caller keeps the arrays alive.
+
+        Raises
+        ------
+        TypeError
+            If an array has another type than the loop was compiled for.
+        """
+        words: list[int] = []
+        for kinds, value in zip(self._kinds, arguments, strict=True):
+            words += value.words if type(value) is Ready else _words(self.name, kinds, value)
+        entry, packed = self._entry, struct.pack(f"{len(words)}q", *words)
+        return lambda: entry(packed)
+
+
+def _words(loop: str, kinds: Sequence[Kind], value: Any) -> list[int]:
+    """Words of an argument: an array is its address and its shape."""
+    words: list[int] = []
+    for (name, code, dimensions), part in zip(kinds, _flat(value), strict=True):
+        if not dimensions:
+            words.append(int(part) if code == "l" else _bits(part))
+            continue
+        if not (
+            isinstance(part, np.ndarray)
+            and part.dtype.char == code
+            and part.ndim == dimensions
+            and part.flags.c_contiguous
+        ):
+            found = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
+            raise TypeError(
+                f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {found}"
+            )
+        words += (part.__array_interface__["data"][0], *part.shape)
+    return words
+
+
+def _flat(value: Any) -> list[Any]:
+    """Parts of an argument, named tuples taken apart."""
+    if not isinstance(value, tuple):
+        return [value]
+    return [part for field in value for part in _flat(field)]
+
+
+def _bits(value: float) -> int:
+    return struct.unpack("q", struct.pack("d", value))[0]
+
+
+def loops(
+    modules: Sequence[str],
+    entries: Sequence[str],
+    kernels: Mapping[str, str] | None = None,
+    sizes: Mapping[str, int] | None = None,
+) -> dict[str, Loop]:
+    """Compiled entries of modules of loops, from the cache or compiled now.
+
+    Parameters
+    ----------
+    modules
+        Names of modules below this package; a function of a later one takes the place of one of the
+        same name in an earlier one.
+    entries
+        Functions that Python calls, with declared types.
+    kernels
+        Name -> text of kernels that are written where the loops call them.
+    sizes
+        Name -> value of constants that the compiler shall know.
+    """
+    return _loops(
+        tuple(modules),
+        tuple(entries),
+        tuple((kernels or {}).items()),
+        tuple((sizes or {}).items()),
+    )
+
+
+@cache
+def _loops(
+    modules: tuple[str, ...],
+    entries: tuple[str, ...],
+    kernels: tuple[tuple[str, str], ...],
+    sizes: tuple[tuple[str, int], ...],
+) -> dict[str, Loop]:
+    imported = [import_module(f"vehiclemor.{name}") for name in modules]
+    parts = [loops_digest(modules), *modules, *entries, repr(kernels), repr(sizes)]
+    key = hashlib.sha256("\n".join([*parts, compiler_identity()]).encode()).hexdigest()[:20]
+
+    def make() -> bytes:
+        from vehiclemor.codegen.compiler import compiled_loops
+        from vehiclemor.codegen.loop_intrinsics import inlined_kernel
+
+        given = {name: inlined_kernel(text) for name, text in kernels}
+        return compiled_loops(imported, entries, given | dict(sizes))
+
+    code = MachineCode(fetched(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))
+    functions = {name: _entry(imported, name) for name in entries}
+    return {
+        name: Loop(name, declared_arguments(function), code) for name, function in functions.items()
+    }
+
+
+def loops_digest(modules: Sequence[str]) -> str:
+    """Hash of the source of loops and of what compiles them."""
+    files = [f"{name.replace('.', '/')}.py" for name in modules]
+    return source_digest(("codegen",), files, ())
+
+
+def _entry(modules: Sequence[ModuleType], name: str) -> Any:
+    return next(found for m in reversed(modules) if inspect.isfunction(found := vars(m).get(name)))
+
+
+def _kinds(declared: Any, name: str = "") -> list[Kind]:
+    """Name, type code and dimensions of the parts of a declared type."""
+    if not hasattr(declared, "_fields"):
+        _, number, dimensions = get_args(declared)
+        return [(name, "d" if number == "float64" else "l", dimensions)]
+    fields = declared.__annotations__.items()
+    return [kind for field, inner in fields for kind in _kinds(inner, f"{name}.{field}")]

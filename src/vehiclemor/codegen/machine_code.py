@@ -1,0 +1,38 @@
+"""Object code in memory: loaded with LLVM's own loader, without what has compiled it."""
+
+from functools import cache
+from typing import Any
+
+
+class MachineCode:
+    """Functions of an object file, at addresses in this process.
+
+    Parameters
+    ----------
+    content
+        The object file.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        import llvmlite.binding as llvm
+
+        # The engine owns the memory in which the code lies.
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+        self._engine.finalize_object()
+
+    def address(self, name: str) -> int:
+        """Address of a function."""
+        found = self._engine.get_function_address(name)
+        if not found:
+            raise ImportError(f"the object code has no function {name}")
+        return found
+
+
+@cache
+def _target_machine() -> Any:
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine()

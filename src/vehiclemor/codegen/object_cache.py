@@ -1,0 +1,117 @@
+"""Files in the user's cache, addressed by content and checked whenever they are read.
+
+Object code is executed, so a file counts only if it is this user's own and nobody else can write
+it, and if it is as it was written; else it is named once, and made again.
+"""
+
+import hashlib
+import logging
+import os
+import platform
+import stat
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_LOG = logging.getLogger("vehiclemor")
+
+
+@cache
+def compiler_identity() -> str:
+    """Versions of the compiler, and the processor that object code is made for."""
+    import llvmlite.binding as llvm
+
+    parts = [f"{package} {version(package)}" for package in COMPILER_PACKAGES]
+    features = llvm.get_host_cpu_features().flatten()
+    return "\n".join([*parts, platform.machine(), llvm.get_host_cpu_name(), features])
+
+
+def kernel_hash(source: str) -> str:
+    """Hash of a source and of what compiles it."""
+    return hashlib.sha256(f"{source}\n{compiler_identity()}".encode()).hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder of the cache: $VEHICLEMOR_CACHE, or the user's cache folder.
+
+    Where it can't be written, or others could write it, a temporary folder of this process: then
+    every process compiles for itself.
+    """
+    return _folder(os.environ.get("VEHICLEMOR_CACHE"))
+
+
+@cache
+def _folder(chosen: str | None) -> Path:
+    import platformdirs
+
+    folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        reason = _distrust(folder.stat())
+    except OSError as error:
+        reason = error.strerror or "it can't be written"
+    if not reason:
+        return folder
+    _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
+    return Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+
+
+def _distrust(status: os.stat_result) -> str:
+    """Why what lies there may be another user's; empty if it can't be."""
+    if not hasattr(os, "geteuid"):
+        return ""
+    if status.st_uid != os.geteuid():
+        return "it belongs to another user"
+    if status.st_mode & OTHERS_WRITE:
+        return "other users can write it"
+    return ""
+
+
+def fetched(name: str, make: Callable[[], bytes]) -> bytes:
+    """Content of a file of the cache; made and written if it is missing, damaged or not ours.
+
+    Parameters
+    ----------
+    name
+        Path in the cache; it holds the hash of all that determines the content.
+    make
+        Gives the content.
+    """
+    path = cache_folder() / name
+    content = _checked(path)
+    if content is None:
+        content = make()
+        digest = hashlib.sha256(content).hexdigest().encode()
+        write_whole(path, digest + b"\n" + content)
+    return content
+
+
+def _checked(path: Path) -> bytes | None:
+    """Content of a file, if it can be trusted."""
+    try:
+        with path.open("rb") as file:
+            reason = _distrust(os.fstat(file.fileno()))
+            digest, _, content = file.read().partition(b"\n")
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        digest, content, reason = b"", b"", error.strerror or "it can't be read"
+    if not reason and hashlib.sha256(content).hexdigest().encode() == digest:
+        return content
+    _LOG.warning("%s is made again: %s", path, reason or "the file is damaged")
+    return None
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file under a temporary name, then move it into place; its folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    with os.fdopen(handle, "wb") as file:
+        file.write(content)
+    os.replace(temporary, path)

@@ -1,0 +1,209 @@
+"""The one time loop: spans and windows, samples, limits, step sizes.
+
+An integrator gives `work_space`, `begin`, `longest_step`, `step`, `accept`, `prepare_curve` and
+`interpolate`, a formulation `rhs`, `lift`, `project` and `error_norm`: they are compiled together.
+"""
+
+import math
+
+from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
+from vehiclemor.simulation.formulations.full import error_norm, lift, project
+from vehiclemor.simulation.integrators.dopri5 import (
+    accept,
+    begin,
+    interpolate,
+    longest_step,
+    prepare_curve,
+    step,
+    work_space,
+)
+from vehiclemor.simulation.integrators.structures import (
+    FINISHED,
+    NOT_FINITE,
+    REJECTED_STEPS,
+    RHS_CALLS,
+    SINGULAR,
+    STEP_TOO_SMALL,
+    STEPS,
+    TOO_MANY_CALLS,
+    Control,
+    Equations,
+    Method,
+    Output,
+    Problem,
+    Signal,
+    Spans,
+    Subspaces,
+)
+
+INLINED = ("over_span", "on_span", "scratch_end")
+
+
+def integrate(
+    start: Vector,
+    equations: Equations,
+    signal: Signal,
+    spans: Spans,
+    subspaces: Subspaces,
+    method: Method,
+    control: Control,
+    output: Output,
+    buffer: Vector,
+    integers: IntVector,
+) -> Int:
+    """Integrate from the start over all spans; a new window projects the state onto its space.
+
+    Parameters
+    ----------
+    start
+        State (n,).
+    buffer, integers
+        Scratch space, see `catalogue.scratch_sizes`.
+
+    Returns
+    -------
+    int
+        Why the run has ended; if early, when is the first number of the buffer.
+    """
+    n, inputs = len(start), signal.coefficients.shape[1]
+    x = vector(buffer, 0, n)
+    for i in range(n):
+        x[i] = start[i]
+    samples, path, counts = output.samples, output.path, output.counts
+    sample, window, segment, h = 0, -1, -1, 0.0
+    dim = subspaces.ranks[0]
+    t = spans.edges[0]
+    for span in range(len(spans.segments)):
+        entered = spans.windows[span] != window
+        window = spans.windows[span]
+        dim = subspaces.ranks[window]
+        problem = on_span(
+            equations, signal, subspaces, spans.segments[span], window, (n, inputs), buffer
+        )
+        first = scratch_end(n, inputs)
+        work = work_space(buffer, first, integers, dim, inputs)
+        if entered:
+            project(problem, t, x, work.y, counts)
+            while sample < len(samples) and samples[sample] <= t:
+                lift(problem, work.y, path[sample])
+                sample += 1
+        if segment >= 0 and spans.segments[span] != segment:
+            h = min(h, control.restart)
+        segment = spans.segments[span]
+        end = spans.edges[span + 1]
+        status, t, h, sample = over_span(
+            problem, t, end, h, method, control, work, samples, sample, path, counts
+        )
+        if status != FINISHED:
+            buffer[0] = t
+            return status
+        lift(problem, work.y, x)
+        for i in range(n):
+            if not math.isfinite(x[i]):
+                buffer[0] = t
+                return NOT_FINITE
+    return FINISHED
+
+
+def scratch_end(n, inputs):
+    """First place of the buffer that `on_span` leaves to the integrator."""
+    half = n // 2
+    return 3 * n + inputs + 2 * half * (half + 1)
+
+
+def on_span(equations, signal, subspaces, segment, window, sizes, buffer):
+    """The problem on one span; its scratch space follows the state (n,) in the buffer."""
+    n, inputs = sizes
+    half = n // 2
+    first = 3 * n + inputs
+    return Problem(
+        segment,
+        signal,
+        equations,
+        subspaces.means[window],
+        subspaces.trial[window],
+        subspaces.test[window],
+        vector(buffer, n, n),
+        vector(buffer, 3 * n, inputs),
+        vector(buffer, 2 * n, n),
+        matrix(buffer, first, half, half + 1),
+        matrix(buffer, first + half * (half + 1), half, half + 1),
+    )
+
+
+def over_span(problem, t, end, h, method, control, work, samples, sample, path, counts):
+    """Integrate to the end of one span, recording the states at the sample times inside.
+
+    Parameters
+    ----------
+    h
+        First step size to try in s; none if zero.
+    sample
+        Number of the first sample that is not recorded yet.
+
+    Returns
+    -------
+    tuple
+        Status, time, step size for what follows, number of the next sample.
+    """
+    y, f = work.y, work.f
+    begin(problem, t, method, work)
+    counts[RHS_CALLS] += 1
+    if h <= 0.0:
+        # The slope changes the state by a hundredth of its scale, at most.
+        size = error_norm(problem, f, y, 1.0)
+        h = control.longest
+        if not size <= 1e-10:
+            h = max(control.shortest_first, 0.01 / size)
+    tried = h
+    before, rejected = control.memory_start, False
+    while t < end - 1e-12 * (1.0 + abs(end)):
+        if counts[RHS_CALLS] > control.most_calls:
+            return TOO_MANY_CALLS, t, tried, sample
+        h = longest_step(min(tried, control.longest), method, work)
+        if t + 1.0001 * h > end:
+            h = end - t
+        elif control.halve_last > 0.0 and t + 2.0 * h > end:
+            # Two equal steps are better than a long and a tiny one.
+            h = 0.5 * (end - t)
+        if not h > 1e-14 * (1.0 + abs(t)):
+            return STEP_TOO_SMALL, t, tried, sample
+        if not step(problem, t, h, method, work, counts):
+            return SINGULAR, t, tried, sample
+        error = error_norm(problem, work.error, work.new, control.tolerance)
+        if not error <= 1.0:
+            counts[REJECTED_STEPS] += 1
+            rejected = True
+            if error > 1e15 or not error == error:
+                # Not finite: a much shorter step, until none is left.
+                tried = 0.1 * h
+                if tried < 1e-9:
+                    return NOT_FINITE, t, tried, sample
+                continue
+            tried = h * max(control.shrink_least, 0.9 * error**-control.rejected_exponent)
+            continue
+        counts[STEPS] += 1
+        accept(problem, t, h, method, work, counts)
+        reached = t + h + 1e-12 * (1.0 + abs(t))
+        if sample < len(samples) and samples[sample] <= reached:
+            prepare_curve(h, work)
+            while sample < len(samples) and samples[sample] <= reached:
+                interpolate((samples[sample] - t) / h, h, work)
+                lift(problem, work.middle, path[sample])
+                sample += 1
+        # Proportional and integral control (Hairer, Wanner, Solving Ordinary Differential
+        # Equations II, section IV.2): fewer rejections where stability limits the step.
+        error = max(error, 1e-10)
+        factor = 0.9 * error**-control.exponent * before**control.memory_exponent
+        before = max(error, control.memory_floor)
+        factor = min(control.grow, max(control.shrink, factor))
+        if rejected:
+            factor = min(1.0, factor)
+            rejected = False
+        for i in range(len(y)):
+            y[i], f[i] = work.new[i], work.f_new[i]
+        whole = t + 1.0001 * h <= end
+        t += h
+        # A step that was cut at the end of the span says nothing against longer ones.
+        tried = h * factor if whole else max(tried, h * factor)
+    return FINISHED, t, tried, sample

@@ -1,0 +1,48 @@
+"""Step sizes for which operators are stored, and vectors turned to heading zero."""
+
+import math
+
+INLINED = ("index_above", "index_below", "nearest_index", "heading_of")
+
+
+def index_above(grid, index, h):
+    """Number of the shortest step of the grid that is not below h, from the last one on."""
+    while index > 0 and grid[index - 1] >= 0.999 * h:
+        index -= 1
+    while index < len(grid) - 1 and grid[index] < 0.999 * h:
+        index += 1
+    return index
+
+
+def index_below(grid, index, h):
+    """Number of the longest step of the grid that is not above h, from the last one on."""
+    while index > 0 and grid[index] > 1.0001 * h:
+        index -= 1
+    while index < len(grid) - 1 and grid[index + 1] <= 1.0001 * h:
+        index += 1
+    return index
+
+
+def nearest_index(grid, index, h):
+    """Number of the step of the grid that is nearest to h, from the last one on."""
+    while index > 0 and grid[index - 1] * grid[index] > h * h:
+        index -= 1
+    while index < len(grid) - 1 and grid[index + 1] * grid[index] < h * h:
+        index += 1
+    return index
+
+
+def heading_of(method, y):
+    """Cosine and sine of the heading; 1 and 0 where nothing turns with it."""
+    if len(method.rotating) == 0:
+        return 1.0, 0.0
+    heading = y[method.rotating[0]]
+    return math.cos(heading), math.sin(heading)
+
+
+def rotate(vector, rotating, cosine, sine):
+    """Rotate the pairs of states that turn with the heading, in place."""
+    for k in range(1, len(rotating), 2):
+        a, b = vector[rotating[k]], vector[rotating[k + 1]]
+        vector[rotating[k]] = cosine * a - sine * b
+        vector[rotating[k + 1]] = sine * a + cosine * b

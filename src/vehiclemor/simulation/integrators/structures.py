@@ -1,0 +1,231 @@
+"""What goes through the compiled time loop, in named bundles."""
+
+from typing import NamedTuple
+
+from vehiclemor.codegen.loop_types import Cube, Float, IntVector, Matrix, Vector
+
+# Places of a system's kernels in its list of addresses; see `System`.
+DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, FUSED_STEP = range(5)
+# Why a run has ended: all well, too many evaluations, not finite, singular matrix, tiny step.
+FINISHED, TOO_MANY_CALLS, NOT_FINITE, SINGULAR, STEP_TOO_SMALL = range(5)
+# Places of the counts of a run.
+RHS_CALLS, STEPS, REJECTED_STEPS, JACOBIANS, FACTORISATIONS, LINEAR_SOLVES = range(6)
+
+
+class Signal(NamedTuple):
+    """Piecewise polynomial inputs.
+
+    Attributes
+    ----------
+    edges
+        Ends of the smooth segments (segments + 1,) in s.
+    first
+        Number of the first piece of each segment (segments + 1,).
+    coefficients
+        Polynomials (pieces, inputs, 6) in the part of the piece that has passed, lowest power
+        first.
+    """
+
+    edges: Vector
+    first: IntVector
+    coefficients: Cube
+
+
+class Equations(NamedTuple):
+    """Compiled equations dx/dt = f(x, u).
+
+    Attributes
+    ----------
+    kernels
+        Addresses of the kernels by place, zero where there is none.
+    constants
+        Hoisted constants of the parameters.
+    error_scale
+        Magnitude of each state below which errors count absolutely.
+    """
+
+    kernels: IntVector
+    constants: Vector
+    error_scale: Vector
+
+
+class Spans(NamedTuple):
+    """Parts of a run without a break point of the inputs or an edge of a window inside.
+
+    Attributes
+    ----------
+    edges
+        Times (spans + 1,) in s.
+    segments, windows
+        Segment of the signal and projection window of each span.
+    """
+
+    edges: Vector
+    segments: IntVector
+    windows: IntVector
+
+
+class Subspaces(NamedTuple):
+    """One affine subspace for each window, see `ProjectionWindows`."""
+
+    means: Matrix
+    trial: Cube
+    test: Cube
+    ranks: IntVector
+
+
+class Method(NamedTuple):
+    """What an integrator needs beside its code.
+
+    Attributes
+    ----------
+    tableau
+        Coefficients, packed as the integrator wants them.
+    grid
+        Step sizes (s) for which operators are stored.
+    operators
+        Stored operators of each step size.
+    active
+        Numbers of the states that the right-hand side depends on.
+    rotating
+        Numbers of the heading and of pairs of states that turn with it: stored operators belong to
+        heading zero.  May be empty.
+    """
+
+    tableau: Matrix
+    grid: Vector
+    operators: Cube
+    active: IntVector
+    rotating: IntVector
+
+
+class Control(NamedTuple):
+    """Limits of a run, and how step sizes follow the errors.
+
+    Attributes
+    ----------
+    tolerance
+        Largest local error of a state relative to its scale plus its own size.
+    longest, shortest_first
+        Longest step, and shortest first guess of one, in s.
+    restart
+        Longest first step after a break point of the inputs in s.
+    most_calls
+        Evaluations of the right-hand side after which a run is given up.
+    exponent, memory_exponent
+        Of this error and of the one before in the factor of the next step.
+    memory_start, memory_floor
+        What counts as the error before the first step, and at least as that before any other.
+    rejected_exponent
+        Of the error in the factor after a rejected step.
+    shrink_least, shrink, grow
+        Smallest factor after a rejected and after an accepted step, largest factor.
+    halve_last
+        Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
+    """
+
+    tolerance: Float
+    longest: Float
+    shortest_first: Float
+    restart: Float
+    most_calls: Float
+    exponent: Float
+    memory_exponent: Float
+    memory_start: Float
+    memory_floor: Float
+    rejected_exponent: Float
+    shrink_least: Float
+    shrink: Float
+    grow: Float
+    halve_last: Float
+
+
+class Output(NamedTuple):
+    """Where a run is recorded.
+
+    Attributes
+    ----------
+    samples
+        Output times in s.
+    path
+        States (samples, n) at these times.
+    counts
+        By place, see above.
+    """
+
+    samples: Vector
+    path: Matrix
+    counts: IntVector
+
+
+class Problem(NamedTuple):
+    """Equations on one span and one window, with scratch space.
+
+    Attributes
+    ----------
+    segment
+        Number of the segment of the signal.
+    mean, trial, test
+        Mean (n,) of the window, trial basis and test basis (R, n) by rows.
+    x, u, dx
+        Scratch: state (n,), inputs, rates (n,).
+    second_order, small
+        Scratch (n / 2, n / 2 + 1): mass matrix and forces, and their projection.
+    """
+
+    segment: int
+    signal: Signal
+    equations: Equations
+    mean: Vector
+    trial: Matrix
+    test: Matrix
+    x: Vector
+    u: Vector
+    dx: Vector
+    second_order: Matrix
+    small: Matrix
+
+
+class Work(NamedTuple):
+    """Scratch space of an integrator; what it doesn't use is empty.
+
+    Attributes
+    ----------
+    y, f
+        Reduced state (dim,) and right-hand side at the beginning of the step.
+    new, f_new
+        The same at its end, once the step is accepted.
+    error
+        Estimate of the local error (dim,).
+    middle
+        State of a stage.
+    stages
+        Rows of stages (stages, dim).
+    curve
+        Coefficients (3, dim) of the interpolation, powers 1 to 3 of the part that has passed.
+    jacobian, factors
+        Jacobian and factorised matrix (dim, dim).
+    pivots, places
+        Rows of the factorisation (dim,); the integrator's own integers (4,).
+    memory
+        The integrator's own numbers (4,).
+    given, values, result
+        Arguments and result of a fused step.
+    """
+
+    y: Vector
+    f: Vector
+    new: Vector
+    f_new: Vector
+    error: Vector
+    middle: Vector
+    stages: Matrix
+    curve: Matrix
+    jacobian: Matrix
+    factors: Matrix
+    pivots: IntVector
+    places: IntVector
+    memory: Vector
+    given: Vector
+    values: Vector
+    result: Vector

@@ -1,0 +1,35 @@
+"""Kernels along a path of states, and Jacobians by differences, compiled."""
+
+from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel
+from vehiclemor.simulation.integrators.structures import DERIVATIVE, Equations
+
+
+def kernel_path(
+    path: Matrix, inputs: Matrix, kernel: IntVector, constants: Vector, result: Matrix
+) -> Int:
+    """Results (samples, size) of one kernel at every sample of a path of states."""
+    for sample in range(len(path)):
+        call_kernel(kernel, 0, path[sample], inputs[sample], constants, result[sample])
+    return 0
+
+
+def jacobian_at(
+    x: Vector, u: Vector, equations: Equations, active: IntVector, work: Matrix, result: Matrix
+) -> Int:
+    """Columns of df/dx (n, n) by central differences; inactive ones are zero."""
+    size, kernels, constants = len(x), equations.kernels, equations.constants
+    shifted, above, below = work[0], work[1], work[2]
+    for i in range(size):
+        for j in range(size):
+            result[i, j] = 0.0
+    for column in active:
+        change = 6e-6 * max(abs(x[column]), 1.0)
+        for i in range(size):
+            shifted[i] = x[i]
+        shifted[column] = x[column] + change
+        call_kernel(kernels, DERIVATIVE, shifted, u, constants, above)
+        shifted[column] = x[column] - change
+        call_kernel(kernels, DERIVATIVE, shifted, u, constants, below)
+        for i in range(size):
+            result[i, column] = (above[i] - below[i]) / (2.0 * change)
+    return 0

@@ -1,0 +1,87 @@
+"""Subspaces by time window, and the spans on which a run is smooth."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.simulation.integrators.structures import Spans, Subspaces
+
+# Of the equations that are integrated; see the modules of these names in `formulations`.
+FORMULATIONS = ("full", "state", "coordinates")
+
+
+@dataclass(frozen=True)
+class ProjectionWindows:
+    """Formulation of a system with one affine subspace for each window.
+
+    Attributes
+    ----------
+    formulation
+        One of `FORMULATIONS`.
+    edges
+        Window edges (windows + 1,) in s.
+    means
+        Means (windows, 2 n).
+    trial_basis, test_basis
+        Bases and projections by rows (windows, R, 2 n); rows beyond a window's rank are not used.
+    ranks
+        Dimensions (windows,) of the reduced systems.
+    """
+
+    formulation: str
+    edges: np.ndarray
+    means: np.ndarray
+    trial_basis: np.ndarray
+    test_basis: np.ndarray
+    ranks: np.ndarray
+
+    @cached_property
+    def subspaces(self) -> Ready:
+        """Subspaces as the compiled loop takes them."""
+        return ready(Subspaces(self.means, self.trial_basis, self.test_basis, self.ranks))
+
+    @cached_property
+    def _spans(self) -> dict[tuple[bytes, float], Ready]:
+        return {}
+
+    def spans(self, breaks: np.ndarray, end: float) -> Ready:
+        """Spans without a break point or window edge inside, from 0 to `end`; kept for more runs.
+
+        Parameters
+        ----------
+        breaks
+            Ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
+        """
+        key = breaks.tobytes(), end
+        if key not in self._spans:
+            self._spans[key] = ready(smooth_spans(breaks, self.edges, end))
+        return self._spans[key]
+
+
+def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float) -> Spans:
+    """Spans from 0 to `end` without a break point of the inputs or a window edge inside."""
+    cuts = np.unique(np.concatenate([breaks, edges, [0.0, end]]))
+    cuts = cuts[cuts <= end]
+    # Times that differ by rounding are one.
+    cuts = cuts[np.concatenate([[True], np.diff(cuts) > 1e-9 * max(end, 1.0)])]
+    cuts[-1] = end
+    middles = (cuts[1:] + cuts[:-1]) / 2.0
+    segments = np.clip(np.searchsorted(breaks, middles) - 1, 0, len(breaks) - 2)
+    windows = np.clip(np.searchsorted(edges, middles) - 1, 0, len(edges) - 2)
+    return Spans(cuts, segments.astype(np.int64), windows.astype(np.int64))
+
+
+@lru_cache(maxsize=64)
+def whole_space(dim: int) -> ProjectionWindows:
+    """The whole space of a system with `dim` states, in one window."""
+    nothing = np.zeros((1, 1, 1))
+    return ProjectionWindows(
+        "full",
+        np.array([0.0, np.inf]),
+        np.zeros((1, 1)),
+        nothing,
+        nothing,
+        np.array([dim], dtype=np.int64),
+    )
