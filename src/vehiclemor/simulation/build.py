@@ -124,7 +124,6 @@ def _compiled_algebraic(
 def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicModel:
     """A model of equations of motion."""
     from vehiclemor.simulation.dynamic import DynamicModel
-    from vehiclemor.simulation.model import Model
 
     values = {
         key: parameters[key] if declared.size > 1 else float(parameters[key])
