@@ -5,14 +5,14 @@ Timings are reported, never gated.  Counts and operation counts stand beside the
 
 import numpy as np
 import pytest
-from vehiclemor.simulation.spaces import full_space
 
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.models.independent_suspension import definition as independent_suspension_vehicle
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.spaces import full_space
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

@@ -11,19 +11,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
-from vehiclemor.simulation.spaces import full_space
 
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS, lane_change
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.projection import (
     projected_state,
     simulate_projected,
     without_stabilisation,
 )
+from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 

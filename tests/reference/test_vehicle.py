@@ -8,14 +8,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import linear_sum_assignment
 from sksundae.cvode import CVODE
-from vehiclemor.simulation.spaces import full_space
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation import linearisation
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 

@@ -9,12 +9,12 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from vehiclemor.codegen.emit import operation_counts, reference_source
 
 from tests.unit import standard_problems
 from vehiclemor.codegen import derivation as kept
 from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation, derived
+from vehiclemor.codegen.emit import operation_counts, reference_source
 from vehiclemor.models import equations
 from vehiclemor.models.quantities import Quantity
 

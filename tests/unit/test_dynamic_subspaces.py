@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from vehiclemor.simulation.spaces import Spaces, full_space
-from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
@@ -15,7 +13,9 @@ from vehiclemor.reduction.projection.inner_products import coordinate_weight, st
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.simulation import linearisation
-from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 N = 14
 TIMES = np.linspace(0.0, 4.0, 41)

@@ -7,6 +7,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 import sympy as sp
+
+from tests.oracles.kinematics import precise_jacobian, precise_residual
+from tests.unit.programs import precise, run
 from vehiclemor.codegen.emit import (
     OPERATIONS,
     kernel_source,
@@ -14,9 +17,6 @@ from vehiclemor.codegen.emit import (
     reference_source,
     work_size,
 )
-
-from tests.oracles.kinematics import precise_jacobian, precise_residual
-from tests.unit.programs import precise, run
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape

@@ -10,8 +10,6 @@ import math
 
 import numpy as np
 import pytest
-from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2, Tableau
-from vehiclemor.simulation.spaces import full_space
 
 from tests.unit.standard_problems import (
     ANGLE,
@@ -23,6 +21,8 @@ from tests.unit.standard_problems import (
 )
 from vehiclemor.simulation import explicit_loops as pair
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2, Tableau
+from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 

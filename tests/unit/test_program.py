@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import sympy as sp
-from vehiclemor.codegen.emit import operation_counts, reference_source
 
 from tests.unit.programs import inlined, precise, random_program, run
+from vehiclemor.codegen.emit import operation_counts, reference_source
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
-from vehiclemor.simulation.spaces import full_space
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
@@ -25,6 +24,7 @@ from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.linearisation import reduced_jacobian
+from vehiclemor.simulation.spaces import full_space
 from vehiclemor.steering_maneuvers import rack_step_steer, step_steer
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")

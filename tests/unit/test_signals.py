@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vehiclemor.simulation.signals import Signal, signal_of
 
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
+from vehiclemor.simulation.signals import Signal, signal_of
 
 LANE_CHANGE = component("maneuver", "lane_change")
 

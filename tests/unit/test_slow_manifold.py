@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from vehiclemor.simulation.spaces import whole_space
 
 from vehiclemor.maneuvers import lane_change, rack_lane_change, straight_ahead
 from vehiclemor.reduction.methods import slow_manifold
@@ -16,8 +15,9 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import build
+from vehiclemor.simulation.spaces import whole_space
 
 LANE_CHANGES = {
     "independent_suspension_vehicle": lane_change,

@@ -81,16 +81,17 @@ def derivation(name: str, definition: Any) -> Derivation:
 def derived(equations: AlgebraicEquations | DynamicEquations) -> Derivation:
     """Sources and description of the kernels of a model's equations."""
     # Only here is anything symbolic: a model that was derived before starts without it.
-    from vehiclemor.codegen.kernel_text import kernel_source, operation_counts
+    from vehiclemor.codegen.kernel_text import kernel_source, operation_counts, tangent_source
 
     program = equations.program
     text = kernel_source(program)
+    further = tangent_source(program) if "residual_jacobian" in program.functions else ""
     named = {name: getattr(equations, name, ()) for name in (*QUANTITIES, "joints")}
     return Derivation(
         **named,
         shapes={key: function.shape for key, function in program.functions.items()},
         constants=len(program.constant_symbols),
-        sources=kernel_sources(text),
+        sources=kernel_sources(text + further),
         operations=operation_counts(text),
     )
 

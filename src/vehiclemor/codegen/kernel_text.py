@@ -172,6 +172,35 @@ def _evaluation(batch: Batch, first: int) -> list[str]:
     return given + evaluated + taken
 
 
+def tangent_source(program: Program) -> str:
+    """Source of two kernels by which a Jacobian is multiplied with vectors.
+
+    `tangent_parts(q, u, constants, work, result)` gives the entries of the Jacobian that are no
+    structural constants, then the residual; `tangent(parts, column, result)` the product.
+    """
+    function = program.functions["residual_jacobian"]
+    rows, columns = function.shape
+    entries: list[sp.Expr] = []
+    lines = ["def tangent(_parts, _column, _result):"]
+    for i in range(rows):
+        terms = []
+        for j in range(columns - 1):
+            entry = function.results[i * columns + j]
+            if entry in (1, -1):
+                terms.append(f"{'' if entry == 1 else '-'}_column[{j}]")
+            elif entry != 0:
+                terms.append(f"_parts[{len(entries)}]*_column[{j}]")
+                entries.append(entry)
+        lines.append(f"    _result[{i}] = {' + '.join(terms) or '0.0'}")
+    residual = [function.results[(i + 1) * columns - 1] for i in range(rows)]
+    results = (*entries, *residual)
+    parts = Function(function.assignments, results, (len(results),))
+    text = _function_source(
+        "tangent_parts", program.arguments, program.constant_symbols, parts, True
+    )
+    return f"{text}\n\n\n" + "\n".join(lines) + "\n"
+
+
 def _subscript(index: int, shape: tuple[int, ...]) -> str:
     if len(shape) == 1:
         return str(index)

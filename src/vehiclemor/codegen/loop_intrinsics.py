@@ -83,8 +83,8 @@ def inlined_kernel(text: str) -> Any:
     @intrinsic
     def execute(typing_context: Any, *arrays: Any) -> Any:
         del typing_context
-        _require_plain(*arrays[0])
-        if len(arrays[0]) != len(kernel.pointers):
+        _require_plain(*arrays)
+        if len(arrays) != len(kernel.pointers):
             raise TypingError(f"{kernel.name} takes {', '.join(kernel.pointers)}")
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -97,7 +97,7 @@ def inlined_kernel(text: str) -> Any:
             emit(kernel, builder, dict(zip(kernel.pointers, pointers, strict=True)))
             return context.get_dummy_value()
 
-        return types.void(types.StarArgTuple.from_types(arrays[0])), generate
+        return types.void(types.StarArgTuple.from_types(arrays)), generate
 
     return execute
 

@@ -21,7 +21,7 @@ from vehiclemor.reduction.settings import Value
 from vehiclemor.report.contestants import Contestant
 from vehiclemor.report.published import load_published
 from vehiclemor.report.timing import measure
-from vehiclemor.simulation.model import build
+from vehiclemor.simulation.build import build
 from vehiclemor.study.provenance import code_digest, machine
 from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from vehiclemor.report.compare import NOMINAL, comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.regenerate import write_text
-from vehiclemor.simulation.model import build
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
 

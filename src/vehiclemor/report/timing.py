@@ -20,7 +20,8 @@ from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
 from vehiclemor.report.contestants import RACES, Contestant
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.study.provenance import code_digest, machine, versions
 from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
 
@@ -68,7 +69,7 @@ def measure(model: Model, contestants: tuple[Contestant, ...], start: str) -> xr
     """Time the contestants on the model's nominal maneuver from one start."""
     import xarray as xr
 
-    maneuver: Maneuver = component("maneuver", component("model", model.name).MANEUVER)
+    maneuver: Maneuver = component("maneuver", component("model", model.name).maneuver)
     fits: list[list[float]] = [[] for _ in contestants]
     reduced: list[ReducedModel] = []
     tolerances: list[float] = []

@@ -4,32 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from pathlib import Path
-from types import ModuleType
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import kernel_hash, load_module
-from vehiclemor.codegen.emit import (
-    kernel_source,
-    operation_counts,
-    reference_source,
-    tangent_source,
-    work_size,
-)
-from vehiclemor.codegen.link import linked_source
-from vehiclemor.errors import ConvergenceError, GeometryError, InputError, UnreachableError
+from vehiclemor.codegen.derivation import Derivation
+from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.equations import AlgebraicEquations
-from vehiclemor.parameters import ParameterSet, load_parameters
-from vehiclemor.registry import component, unknown
-from vehiclemor.simulation import newton_loops, projected_loops
+from vehiclemor.parameters import ParameterSet
+from vehiclemor.registry import unknown
+from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import check_inputs, checked_array
-from vehiclemor.simulation.clock import timed
-from vehiclemor.simulation.reach import reachable_range
+from vehiclemor.simulation.paths import along
+from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.travel_limits import reachable_range
 
 # Input increment (m) above which a step of the input is cut into substeps.  Beside a fold, Newton's
 # method jumps to the other branch from farther away than this.
@@ -40,12 +31,17 @@ SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
-# Within this travel of the wheel centre (m) the limits of reach are looked for, by default.
-TRAVEL_LIMIT = 0.5
 # Rack displacements at which the limits of travel are found; between them the tighter ones count.
 RACKS_OF_REACH = 9
-# Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
-SMALLEST_SINGULAR_VALUE = 1e-8
+# Loops of the full-order solution, and the kernels that stand in loops.
+KINEMATIC_LOOPS = ("simulation.newton_loops",)
+INLINED_KERNELS = (
+    "residual",
+    "residual_jacobian",
+    "newton_step",
+    "tangent_parts",
+    "tangent",
+)
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",
@@ -62,25 +58,24 @@ class AlgebraicModel:
     name, summary, kind
         Registered name, one line, and `ae`.
     equations
-        Named quantities and symbolic program.
+        Named quantities and what was derived.
     parameters
         Validated parameter set.
-    kernels
-        Linked module of compiled kernels and loops.
     kernel_hash
         Hash of the kernels' source and of the compiler's versions.
     constants
         Hoisted constants of the parameter set.
     design
         Coordinates (n,) at the design position, where all inputs are zero.
+    travel_limit
+        Travel in m up to which the limits of reach are looked for.
     """
 
     name: str
     summary: str
     kind: str
-    equations: AlgebraicEquations
+    equations: Derivation
     parameters: ParameterSet
-    kernels: ModuleType
     kernel_hash: str
     constants: np.ndarray
     design: np.ndarray
@@ -124,7 +119,7 @@ class AlgebraicModel:
     @cached_property
     def operation_counts(self) -> dict[str, dict[str, int]]:
         """Operations of each generated function, by kind and in total."""
-        return operation_counts(reference_source(self.equations.program))
+        return self.equations.operations
 
     def start(self, name: Start = STARTS[0]) -> np.ndarray:
         """Coordinates (n,) from which a simulation starts its first iteration."""
@@ -138,36 +133,32 @@ class AlgebraicModel:
         """Residual Phi(q; u), shape (n,)."""
         q, u = self._coordinates(q), self._inputs(u)
         result = np.empty(len(q))
-        self.kernels.residual(q, u, self.constants, self._work(), result)
+        self.equations.kernels.call("residual", q, u, self.constants, result)
         return result
 
     def jacobian(self, q: Any, u: Any) -> np.ndarray:
         """Analytic Jacobian of the residual with respect to q, shape (n, n)."""
         q, u = self._coordinates(q), self._inputs(u)
         result = np.empty((len(q), len(q) + 1))
-        self.kernels.residual_jacobian(q, u, self.constants, self._work(), result)
+        self.equations.kernels.call("residual_jacobian", q, u, self.constants, result)
         return result[:, :-1].copy()
 
     def newton_step(self, q: Any, u: Any) -> np.ndarray:
         """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
         q, u = self._coordinates(q), self._inputs(u)
         result = np.empty(len(q))
-        self.kernels.newton_step(q, u, self.constants, self._work(), result)
+        self.equations.kernels.call("newton_step", q, u, self.constants, result)
         return result
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of coordinates and inputs."""
-        result = np.empty((len(states), len(self.outputs)))
-        self.kernels.output_path(
-            np.ascontiguousarray(states), np.ascontiguousarray(inputs), self.constants, result
-        )
-        return result
+        return self._along("outputs", states, inputs, len(self.outputs))
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
-        result = np.empty(self.equations.program.functions["joints"].shape)
+        result = np.empty(self.equations.shapes["joints"])
         q, u = self._coordinates(q), np.zeros(len(self.inputs))
-        self.kernels.joints(q, u, self.constants, self._work(), result)
+        self.equations.kernels.call("joints", q, u, self.constants, result)
         return dict(zip(self.equations.joints, result, strict=True))
 
     def solve(self, u: Any) -> np.ndarray:
@@ -240,23 +231,24 @@ class AlgebraicModel:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
         inputs = np.ascontiguousarray(inputs, dtype=float)
         self.check_reach(times, inputs)
-        path = np.full((len(inputs), len(self.coordinates)), np.nan)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
-        u_start = np.zeros(len(self.inputs))
-        settings = (tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, path, counts)
+        n = len(self.coordinates)
+        solution = newton_loops.Solution(np.full((len(inputs), n), np.nan), new_counts())
+        iteration = newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT)
+        how: Any
         if solver in ("newton", "newton_dense"):
-            dense = solver == "newton_dense"
-            arguments = (self.design, u_start, inputs, self.constants, dense, *settings)
-            loop = self.kernels.newton_path
+            loop, how = self.loop("newton_path"), int(solver == "newton_dense")
         elif solver != "chord":
             raise unknown("solver", solver, SOLVERS)
         else:
-            inverse_t = np.linalg.inv(self.jacobian(self.design, u_start)).T.copy()
-            counts[2] = 1
-            arguments = (self.design, u_start, inputs, self.constants, inverse_t, *settings)
-            loop = self.kernels.chord_path
-        (status, sample), seconds = timed(lambda: loop(*arguments), counts)
+            inverse = np.linalg.inv(self.jacobian(self.design, np.zeros(len(self.inputs))))
+            loop, how = self.loop("chord_path"), inverse.T.copy()
+            solution.counts[newton_loops.JACOBIANS] = 1
+        buffer = np.empty(2 * n + 3 * len(self.inputs) + n * (n + 1))
+        arguments = (self.design, inputs, self.constants, how, iteration, solution, buffer)
+        status, seconds = timed(loop.prepared(*arguments), solution.counts)
+        path, counts = solution
         if status != newton_loops.CONVERGED:
+            sample = int(counts[newton_loops.SAMPLE])
             low, high = self.reach(float(inputs[sample, 1]))
             raise ConvergenceError(
                 f"{self.name}: {REASONS[status]} at t = {times[sample]:.6g} s, height "
@@ -285,7 +277,7 @@ class AlgebraicModel:
             path,
             np.empty((len(path), 0)),
             self.outputs_at(path, inputs),
-            {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=True)},
+            {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=False)},
             seconds,
             status,
             message,
@@ -293,11 +285,28 @@ class AlgebraicModel:
 
     def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Residuals (samples, n) along a path of coordinates and inputs."""
-        result = np.empty_like(coordinates)
-        self.kernels.residual_path(
-            np.ascontiguousarray(coordinates), np.ascontiguousarray(inputs), self.constants, result
-        )
-        return result
+        return self._along("residual", coordinates, inputs, len(self.coordinates))
+
+    def _along(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
+        sizes = len(self.coordinates), len(self.inputs)
+        return along(self.equations.kernels, kernel, self.constants, (path, inputs), (*sizes, size))
+
+    def loop(self, name: str, *further: str) -> Loop:
+        """A compiled loop with the model's kernels inlined.
+
+        Parameters
+        ----------
+        name
+            Of the entry, in the last of the modules.
+        further
+            Modules behind those of the full-order loops.
+        """
+        n, parts = len(self.coordinates), self.equations.sources["tangent_parts"].sizes[-1]
+        sizes = {"N": n, "INPUTS": len(self.inputs), "ENTRIES": parts - n}
+        texts = {key: kernel.text for key, kernel in self.equations.sources.items()}
+        inlined = {key: texts[key] for key in INLINED_KERNELS}
+        modules = (*KINEMATIC_LOOPS, *further)
+        return loops(modules, (name,), inlined, sizes)[name]
 
     def check_reach(self, times: np.ndarray, inputs: np.ndarray) -> None:
         """Raise if a height is out of reach or an input isn't finite.
@@ -335,9 +344,6 @@ class AlgebraicModel:
                 f"(rack at {racks[sample]:g} m)"
             )
 
-    def _work(self) -> np.ndarray:
-        return np.empty(self.kernels.WORK)
-
     def _coordinates(self, q: Any) -> np.ndarray:
         return checked_array(q, len(self.coordinates), "q", self.name)
 
@@ -345,61 +351,6 @@ class AlgebraicModel:
         return checked_array(u, len(self.inputs), "u", self.name)
 
 
-@lru_cache(maxsize=8)
-def _compiled(name: str) -> tuple[AlgebraicEquations, ModuleType, str]:
-    """Equations and compiled kernels of a registered model; parameters play no part here."""
-    equations: AlgebraicEquations = component("model", name).derive()
-    sizes = {
-        "N": len(equations.coordinates),
-        "INPUTS": len(equations.inputs),
-        "OUTPUTS": len(equations.outputs),
-        "WORK": work_size(equations.program),
-    }
-    kernels = kernel_source(equations.program) + "\n\n" + tangent_source(equations.program)
-    source = linked_source(kernels, [newton_loops, projected_loops], sizes, f"model {name}")
-    return equations, load_module(name, source), kernel_hash(source)
-
-
-def build(
-    name: str,
-    parameter_file: Path | None = None,
-    overrides: Mapping[str, object] | None = None,
-) -> AlgebraicModel:
-    """Derive (or fetch), compile and parametrise a registered kinematic model.
-
-    Raises
-    ------
-    GeometryError
-        If the mechanism can't be assembled, or is locked at its design position.
-    """
-    definition = component("model", name)
-    # A plug-in brings its own parameter file.
-    path = parameter_file or getattr(definition, "PARAMETER_FILE", None)
-    parameters = load_parameters(name, definition.PARAMETERS, path, overrides)
-    design = definition.design_coordinates(parameters.values())
-    equations, kernels, digest = _compiled(name)
-    constants = np.empty(len(equations.program.constant_symbols))
-    kernels.constants(parameters.flat(), np.empty(kernels.WORK), constants)
-    model = AlgebraicModel(
-        name,
-        definition.SUMMARY,
-        definition.KIND,
-        equations,
-        parameters,
-        kernels,
-        digest,
-        constants,
-        design,
-        getattr(definition, "TRAVEL_LIMIT", TRAVEL_LIMIT),
-    )
-    nothing = np.zeros(len(model.inputs))
-    gap = float(np.abs(model.residual(design, nothing)).max())
-    if not gap < 1e-9:
-        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
-    smallest = float(np.linalg.svd(model.jacobian(design, nothing), compute_uv=False)[-1])
-    if smallest < SMALLEST_SINGULAR_VALUE:
-        raise GeometryError(
-            f"the geometry can't be assembled: the mechanism is locked at design "
-            f"(smallest singular value of the Jacobian {smallest:.1e})"
-        )
-    return model
+def new_counts() -> np.ndarray:
+    """Counts of a loop, and behind them the sample at which it stops."""
+    return np.zeros(newton_loops.SAMPLE + 1, dtype=np.int64)

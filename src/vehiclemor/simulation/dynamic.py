@@ -171,13 +171,11 @@ class DynamicModel:
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
-        paths = self._paths(states, inputs)
-        return self.system.along("outputs", *paths, len(self.outputs))
+        return self.system.along("outputs", states, inputs, len(self.outputs))
 
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
-        paths = self._paths(states, inputs)
-        return self.system.along("derivative", *paths, 2 * len(self.coordinates))
+        return self.system.along("derivative", states, inputs, 2 * len(self.coordinates))
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
@@ -318,15 +316,6 @@ class DynamicModel:
             message,
             lifted_wheels(self.loads, self.outputs, times, outputs),
         )
-
-    def _paths(self, states: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Paths as the loops want them; they read as many numbers as the model has."""
-        paths = np.asarray(states, dtype=float), np.asarray(inputs, dtype=float)
-        expected = 2 * len(self.coordinates), len(self.inputs)
-        for path, name, size in zip(paths, ("states", "inputs"), expected, strict=True):
-            if path.shape != (len(states), size):
-                raise InputError(f"{name} have shape {path.shape}, not ({len(states)}, {size})")
-        return paths
 
     def _call(self, function: str, x: Any, u: Any) -> np.ndarray:
         self.require(function)

@@ -1,27 +1,67 @@
-"""Full-order solution of Phi(q; u(t)) = 0 along time: compiled loops, linked with the kernels.
+"""Full-order solution of Phi(q; u(t)) = 0 along time: compiled loops with the kernels inlined.
 
-Every loop returns (status, sample): 0 and the number of samples, or why and where it stopped.
+Every entry returns why it has stopped, and writes the sample at which to `Solution.counts`.
 """
 
 import math
+from typing import NamedTuple
 
-import numpy as np
+from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, matrix, vector
 
-from vehiclemor.codegen.stubs import (
-    INPUTS,
-    OUTPUTS,
-    WORK,
-    N,
-    newton_step,
-    outputs,
-    residual,
-    residual_jacobian,
-)
+CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR = range(4)
+# Places of the counts; behind them the sample at which a loop has stopped.
+ITERATIONS, RESIDUALS, JACOBIANS, LINEAR_SOLVES, SAMPLE = range(5)
+# Sizes that the compiler knows: coordinates, inputs.
+N, INPUTS = 0, 0
 
-CONVERGED = 0
-TOO_MANY_ITERATIONS = 1
-NOT_FINITE = 2
-SINGULAR = 3
+
+class Iteration(NamedTuple):
+    """When an iteration ends.
+
+    Attributes
+    ----------
+    tolerance
+        Largest component of the last step.
+    limit
+        Most iterations for a sample.
+    largest_increment
+        Increment of an input above which its step is cut into substeps.
+    """
+
+    tolerance: Float
+    limit: Int
+    largest_increment: Float
+
+
+class Solution(NamedTuple):
+    """Where a solution is recorded.
+
+    Attributes
+    ----------
+    path
+        Coordinates (samples, n).
+    counts
+        By place, see above (5,).
+    """
+
+    path: Matrix
+    counts: IntVector
+
+
+# Short functions: their arrays would cost as much to pass as they take.
+INLINED = ("all_below", "failure", "small_solve", "increments", "scratch")
+
+
+def residual(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
+    """Residual Phi(q; u) into result (N,): a kernel that stands in the loop."""
+
+
+def residual_jacobian(q: Vector, u: Vector, constants: Vector, result: Matrix) -> None:
+    """Jacobian into result[:, :N] and residual into result[:, N]."""
+
+
+def newton_step(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
+    """Newton step Phi_q^-1 Phi into result (N,), by straight-line elimination."""
 
 
 def increments(u, target, largest):
@@ -48,8 +88,8 @@ def failure(q):
     """Status of an iteration that has used up its limit."""
     for i in range(N):
         if not math.isfinite(q[i]):
-            return 2
-    return 1
+            return NOT_FINITE
+    return TOO_MANY_ITERATIONS
 
 
 def small_solve(a, r):
@@ -83,57 +123,81 @@ def small_solve(a, r):
 
 
 def newton_path(
-    q_start, u_start, inputs, constants, dense, tolerance, limit, largest, path, counts
-):
+    q_start: Vector,
+    inputs: Matrix,
+    constants: Vector,
+    dense: Int,
+    iteration: Iteration,
+    solution: Solution,
+    buffer: Vector,
+) -> Int:
     """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
 
     The step comes from the generated straight-line elimination or, if `dense`, from elimination
     with partial pivoting, as a solver that knows nothing about the model would do it.
 
-    An input increment above `largest` is cut into substeps, so that the iteration can't jump to
-    another branch of solutions.
+    Inputs begin at zero.  An increment above the largest is cut into substeps, so that the
+    iteration can't jump to another branch of solutions.
     """
-    q, step, work = q_start.copy(), np.empty(N), np.empty(WORK)
-    u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
-    full = np.empty((N, N + 1))
+    path, counts = solution.path, solution.counts
+    q, step, u, previous, target = scratch(q_start, buffer)
+    full = matrix(buffer, 2 * N + 3 * INPUTS, N, N + 1)
     iterations = 0
     for sample in range(inputs.shape[0]):
+        counts[SAMPLE] = sample
         for i in range(INPUTS):
             target[i] = inputs[sample, i]
-        substeps = increments(previous, target, largest)
+        substeps = increments(previous, target, iteration.largest_increment)
         for substep in range(1, substeps + 1):
             for i in range(INPUTS):
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
             converged = False
-            for _ in range(limit):
+            for _ in range(iteration.limit):
                 if dense:
-                    residual_jacobian(q, u, constants, work, full)
+                    residual_jacobian(q, u, constants, full)
                     if not small_solve(full, N):
-                        return 3, sample
+                        return SINGULAR
                     for i in range(N):
                         step[i] = full[i, N]
                 else:
-                    newton_step(q, u, constants, work, step)
+                    newton_step(q, u, constants, step)
                 iterations += 1
                 for i in range(N):
                     q[i] -= step[i]
-                if all_below(step, N, tolerance):
+                if all_below(step, N, iteration.tolerance):
                     converged = True
                     break
             if not converged:
-                return failure(q), sample
+                return failure(q)
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):
             path[sample, i] = q[i]
     for kind in range(4):
         counts[kind] = iterations
-    return 0, inputs.shape[0]
+    return CONVERGED
+
+
+def scratch(q_start, buffer):
+    """Coordinates, step and inputs in the buffer: now, at the sample before and at the next."""
+    q, step = vector(buffer, 0, N), vector(buffer, N, N)
+    u, previous = vector(buffer, 2 * N, INPUTS), vector(buffer, 2 * N + INPUTS, INPUTS)
+    for i in range(N):
+        q[i] = q_start[i]
+    for i in range(INPUTS):
+        u[i], previous[i] = 0.0, 0.0
+    return q, step, u, previous, vector(buffer, 2 * N + 2 * INPUTS, INPUTS)
 
 
 def chord_path(
-    q_start, u_start, inputs, constants, inverse_t, tolerance, limit, largest, path, counts
-):
+    q_start: Vector,
+    inputs: Matrix,
+    constants: Vector,
+    inverse_t: Matrix,
+    iteration: Iteration,
+    solution: Solution,
+    buffer: Vector,
+) -> Int:
     """Chord method: one constant inverse Jacobian, started from a quadratic extrapolation in time.
 
     `inverse_t` is the transposed inverse Jacobian at the design position.  Only the residual is
@@ -141,13 +205,15 @@ def chord_path(
     worse start.  One of higher order would start nearer, but multiplies the errors of earlier
     samples by more than one iteration takes away (15 times, cubic, against 7).
     """
-    q, phi, step, work = q_start.copy(), np.empty(N), np.empty(N), np.empty(WORK)
-    u, previous, target = u_start.copy(), u_start.copy(), np.empty(INPUTS)
+    path, counts = solution.path, solution.counts
+    q, step, u, previous, target = scratch(q_start, buffer)
+    phi = vector(buffer, 2 * N + 3 * INPUTS, N)
     evaluations, smooth = 0, 0
     for sample in range(inputs.shape[0]):
+        counts[SAMPLE] = sample
         for i in range(INPUTS):
             target[i] = inputs[sample, i]
-        substeps = increments(previous, target, largest)
+        substeps = increments(previous, target, iteration.largest_increment)
         # An extrapolation over a jump of the input could end on another branch.
         smooth = smooth + 1 if substeps == 1 else 0
         if smooth > 3:
@@ -157,8 +223,8 @@ def chord_path(
             for i in range(INPUTS):
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
             converged = False
-            for _ in range(limit):
-                residual(q, u, constants, work, phi)
+            for _ in range(iteration.limit):
+                residual(q, u, constants, phi)
                 evaluations += 1
                 for i in range(N):
                     step[i] = 0.0
@@ -167,40 +233,15 @@ def chord_path(
                         step[i] += inverse_t[j, i] * phi[j]
                 for i in range(N):
                     q[i] -= step[i]
-                if all_below(step, N, tolerance):
+                if all_below(step, N, iteration.tolerance):
                     converged = True
                     break
             if not converged:
-                return failure(q), sample
+                return failure(q)
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):
             path[sample, i] = q[i]
-    counts[0], counts[1], counts[3] = evaluations, evaluations, evaluations
-    return 0, inputs.shape[0]
-
-
-def output_path(path, inputs, constants, result):
-    """Outputs at every sample of a path of coordinates into result (samples, OUTPUTS)."""
-    q, u, y, work = np.empty(N), np.empty(INPUTS), np.empty(OUTPUTS), np.empty(WORK)
-    for sample in range(path.shape[0]):
-        for i in range(N):
-            q[i] = path[sample, i]
-        for i in range(INPUTS):
-            u[i] = inputs[sample, i]
-        outputs(q, u, constants, work, y)
-        for i in range(OUTPUTS):
-            result[sample, i] = y[i]
-
-
-def residual_path(path, inputs, constants, result):
-    """Residuals at every sample of a path of coordinates into result (samples, N)."""
-    q, u, phi, work = np.empty(N), np.empty(INPUTS), np.empty(N), np.empty(WORK)
-    for sample in range(path.shape[0]):
-        for i in range(N):
-            q[i] = path[sample, i]
-        for i in range(INPUTS):
-            u[i] = inputs[sample, i]
-        residual(q, u, constants, work, phi)
-        for i in range(N):
-            result[sample, i] = phi[i]
+    counts[ITERATIONS], counts[RESIDUALS] = evaluations, evaluations
+    counts[LINEAR_SOLVES] = evaluations
+    return CONVERGED

@@ -1,97 +1,156 @@
-"""Reduced solution of algebraic equations along time: a compiled loop, linked with the kernels.
+"""Reduced solution of algebraic equations along time: a compiled loop with the kernels inlined.
 
 With q = mean + basis qh the reduced equations are W^T Phi(mean + basis qh; u) = 0: W is a constant
 test basis (Petrov-Galerkin), or W = Phi_q basis, fresh in each iteration (least squares by
-Gauss-Newton).  Bases are padded with zero columns to N x N, so that the compiler knows all sizes.
+Gauss-Newton).  Bases stand by rows, padded with zeros to N x N, so that the compiler knows all
+sizes.
 """
 
-import numpy as np
+from typing import NamedTuple
 
-from vehiclemor.codegen.stubs import INPUTS, WORK, N, residual_tangent
-from vehiclemor.simulation.newton_loops import all_below, failure, small_solve
+from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
+from vehiclemor.simulation.newton_loops import (
+    CONVERGED,
+    INPUTS,
+    SAMPLE,
+    SINGULAR,
+    Iteration,
+    N,
+    Solution,
+    all_below,
+    failure,
+    small_solve,
+)
+
+# Number of entries of the Jacobian that are no structural zeros.
+ENTRIES = 0
+INLINED = ("weighted", "lift", "tangent_product", "enter_window")
+
+
+class Windows(NamedTuple):
+    """Subspaces by window.
+
+    Attributes
+    ----------
+    first_samples
+        Window k holds the samples from entry k up to entry k + 1.
+    means
+        Means (windows, N).
+    bases, tests
+        Basis and test basis by rows (windows, N, N).
+    ranks
+        Rows that are used (windows,).
+    """
+
+    first_samples: IntVector
+    means: Matrix
+    bases: Cube
+    tests: Cube
+    ranks: IntVector
+
+
+def tangent_parts(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
+    """Entries of the Jacobian, then the residual, into result (ENTRIES + N,)."""
+
+
+def tangent(parts: Vector, column: Vector, result: Vector) -> None:
+    """Jacobian, by its entries, times a column (N,) into result (N,)."""
 
 
 def weighted(test, k, product, j):
-    """Column k of the test basis times column j of the product."""
+    """Row k of the test basis times row j of the product."""
     total = 0.0
     for i in range(N):
-        total += test[i, k] * product[i, j]
+        total += test[k, i] * product[j, i]
     return total
 
 
 def lift(mean, basis, qh, r, q):
-    """Full coordinates mean + basis qh into q."""
+    """Full coordinates mean + qh basis into q."""
     for i in range(N):
         total = mean[i]
         for j in range(r):
-            total += basis[i, j] * qh[j]
+            total += basis[j, i] * qh[j]
         q[i] = total
 
 
+def tangent_product(parts, basis, r, product):
+    """Jacobian times the rows of the basis into rows of the product, the residual into row N."""
+    for k in range(r):
+        tangent(parts, basis[k], product[k])
+    for i in range(N):
+        product[N, i] = parts[ENTRIES + i]
+
+
+def enter_window(mean, basis, r, q, qh):
+    """Reduced coordinates of q in a new subspace, and q projected onto it."""
+    for j in range(r):
+        qh[j] = 0.0
+        for i in range(N):
+            qh[j] += basis[j, i] * (q[i] - mean[i])
+    lift(mean, basis, qh, r, q)
+
+
 def projected_path(
-    q_start,
-    first_samples,
-    means,
-    bases,
-    tests,
-    ranks,
-    least_squares,
-    inputs,
-    constants,
-    tolerance,
-    limit,
-    path,
-    counts,
-):
+    q_start: Vector,
+    windows: Windows,
+    least_squares: Int,
+    inputs: Matrix,
+    constants: Vector,
+    iteration: Iteration,
+    solution: Solution,
+    buffer: Vector,
+) -> Int:
     """Solve the reduced equations sample by sample, window by window.
 
-    Window k holds the samples from first_samples[k] up to first_samples[k + 1].  The iteration
-    starts from the previous sample, at the start of a window from its projection onto the new
-    subspace.  Returns (status, sample) as the full-order loops do; 3 is a singular reduced matrix.
+    The iteration starts from the previous sample, at the start of a window from its projection onto
+    the new subspace.
     """
-    q, u, work = q_start.copy(), np.empty(INPUTS), np.empty(WORK)
+    path, counts = solution.path, solution.counts
+    q, qh, step = vector(buffer, 0, N), vector(buffer, N, N), vector(buffer, 2 * N, N)
+    u, parts = vector(buffer, 3 * N, INPUTS), vector(buffer, 3 * N + INPUTS, ENTRIES + N)
+    first = 4 * N + INPUTS + ENTRIES
+    product = matrix(buffer, first, N + 1, N)
+    reduced = matrix(buffer, first + N * (N + 1), N, N + 1)
     iterations = 0
-    product = np.empty((N, N + 1))
-    reduced = np.empty((N, N + 1))
-    basis, mean, qh, step = np.empty((N, N)), np.empty(N), np.empty(N), np.empty(N)
-    test = product if least_squares else np.empty((N, N + 1))
-    for window in range(ranks.shape[0]):
-        r = ranks[window]
-        for i in range(N):
-            mean[i] = means[window, i]
-            for j in range(N):
-                basis[i, j] = bases[window, i, j]
-                if not least_squares:
-                    test[i, j] = tests[window, i, j]
-        for j in range(r):
-            qh[j] = 0.0
-            for i in range(N):
-                qh[j] += basis[i, j] * (q[i] - mean[i])
-        lift(mean, basis, qh, r, q)
-        for sample in range(first_samples[window], first_samples[window + 1]):
+    for i in range(N):
+        q[i] = q_start[i]
+    for window in range(windows.ranks.shape[0]):
+        r, mean, basis = windows.ranks[window], windows.means[window], windows.bases[window]
+        test = windows.tests[window]
+        enter_window(mean, basis, r, q, qh)
+        for sample in range(windows.first_samples[window], windows.first_samples[window + 1]):
+            counts[SAMPLE] = sample
             for i in range(INPUTS):
                 u[i] = inputs[sample, i]
             converged = False
-            for _ in range(limit):
-                residual_tangent(q, u, constants, work, basis, r, product)
+            for _ in range(iteration.limit):
+                tangent_parts(q, u, constants, parts)
+                tangent_product(parts, basis, r, product)
                 iterations += 1
                 for k in range(r):
                     for j in range(r):
-                        reduced[k, j] = weighted(test, k, product, j)
-                    reduced[k, N] = weighted(test, k, product, N)
+                        if least_squares:
+                            reduced[k, j] = weighted(product, k, product, j)
+                        else:
+                            reduced[k, j] = weighted(test, k, product, j)
+                    if least_squares:
+                        reduced[k, N] = weighted(product, k, product, N)
+                    else:
+                        reduced[k, N] = weighted(test, k, product, N)
                 if not small_solve(reduced, r):
-                    return 3, sample
+                    return SINGULAR
                 for j in range(r):
                     step[j] = reduced[j, N]
                     qh[j] -= step[j]
                 lift(mean, basis, qh, r, q)
-                if all_below(step, r, tolerance):
+                if all_below(step, r, iteration.tolerance):
                     converged = True
                     break
             if not converged:
-                return failure(q), sample
+                return failure(q)
             for i in range(N):
                 path[sample, i] = q[i]
     for kind in range(4):
         counts[kind] = iterations
-    return 0, inputs.shape[0]
+    return CONVERGED

@@ -15,8 +15,8 @@ import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Trajectory
 
@@ -37,7 +37,9 @@ def without_stabilisation(model: DynamicModel) -> DynamicModel:
     if not set(GAINS) <= set(model.parameters.entries):
         raise InputError(f"{model.name} has no constraints that are stabilised")
     values = {name: entry.value for name, entry in model.parameters.entries.items()}
-    return build(model.name, overrides=values | dict.fromkeys(GAINS, 0.0))
+    free = build(model.name, overrides=values | dict.fromkeys(GAINS, 0.0))
+    assert isinstance(free, DynamicModel)
+    return free
 
 
 def projected_state(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
+from vehiclemor.simulation.paths import along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
@@ -43,7 +44,6 @@ CALLED = {
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
 }
-PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")
 
 
 @dataclass(frozen=True)
@@ -151,11 +151,8 @@ class System:
 
     def along(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
         """Results (samples, size) of a kernel along a path of states and inputs."""
-        result = np.empty((len(path), size))
-        address = np.array([self.kernels.address(kernel)], dtype=np.int64)
-        loop = path_loops()["kernel_path"]
-        loop(loop_array(path), loop_array(inputs), address, self.constants, result)
-        return result
+        sizes = len(self.reference), self.inputs, size
+        return along(self.kernels, kernel, self.constants, (path, inputs), sizes)
 
     @cached_property
     def frozen_jacobian(self) -> np.ndarray:
@@ -244,7 +241,3 @@ class System:
         modules = catalogue.loop_modules(chosen, windows.formulation, bool(fused))
         return loops(modules, ("integrate",))["integrate"], arguments
 
-
-def path_loops() -> Mapping[str, Loop]:
-    """Loops over the samples of a path, the same for all systems."""
-    return loops(PATH_LOOPS, ("kernel_path", "jacobian_at"))

@@ -9,7 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +50,7 @@ def figure_5(results: Mapping[str, xr.Dataset]) -> Figure:
     """Mechanism at design, with its positions at +-0.1 m of travel, and the graph."""
     del results
     model = build("double_wishbone")
+    assert isinstance(model, AlgebraicModel)
     # Placed by hand: the style's automatic layout can't deal with axes in space.
     figure = plt.figure(figsize=(6.7, 4.1))
     figure.set_layout_engine("none")

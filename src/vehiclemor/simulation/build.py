@@ -1,0 +1,173 @@
+"""How a registered model of any kind is made ready to run: derived, compiled, parametrised."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.codegen.derivation import Derivation, derivation
+from vehiclemor.codegen.loops import loops_digest
+from vehiclemor.codegen.object_cache import kernel_hash
+from vehiclemor.errors import GeometryError
+from vehiclemor.models.definition import ModelDefinition, Values
+from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.registry import component
+from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
+
+if TYPE_CHECKING:
+    from vehiclemor.simulation.algebraic import AlgebraicModel
+    from vehiclemor.simulation.dynamic import DynamicModel
+    from vehiclemor.simulation.model import Model
+
+# Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
+CLOSED = 1e-9
+# Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
+SMALLEST_SINGULAR_VALUE = 1e-8
+
+
+def build(
+    name: str,
+    parameter_file: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> Model:
+    """Derive (or fetch), compile and parametrise a registered model.
+
+    Parameters
+    ----------
+    parameter_file
+        The model's own by default.
+    overrides
+        Parameter name -> value in SI units that replaces the file's.
+
+    Returns
+    -------
+    AlgebraicModel or DynamicModel
+        As the model's kind is `ae`, or `ode` and `dae`; both are a `Model`.
+
+    Raises
+    ------
+    InputError
+        If the name or an override is wrong.
+    VehiclemorError
+        If the parameters can't be read, or the model can't be assembled from them or can't stand.
+    """
+    definition: ModelDefinition = component("model", name)
+    path = parameter_file or definition.parameter_file
+    parameters = load_parameters(name, definition.parameters, path, overrides)
+    make = _algebraic if definition.kind == "ae" else _dynamic
+    return make(definition, parameters)
+
+
+def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> AlgebraicModel:
+    """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
+    # Imported here: a model of one kind needs nothing of the other.
+    from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
+
+    design = definition.design_coordinates(parameters.values())
+    equations, digest = compiled(definition.name, definition, KINEMATIC_LOOPS)
+    model = AlgebraicModel(
+        name=definition.name,
+        summary=definition.summary,
+        kind=definition.kind,
+        equations=equations,
+        parameters=parameters,
+        kernel_hash=digest,
+        constants=hoisted_constants(equations, parameters, []),
+        design=design,
+        travel_limit=definition.travel_limit,
+    )
+    nothing = np.zeros(len(model.inputs))
+    gap = float(np.abs(model.residual(design, nothing)).max())
+    if not gap < CLOSED:
+        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
+    smallest = float(np.linalg.svd(model.jacobian(design, nothing), compute_uv=False)[-1])
+    if smallest < SMALLEST_SINGULAR_VALUE:
+        raise GeometryError(
+            f"the geometry can't be assembled: the mechanism is locked at design "
+            f"(smallest singular value of the Jacobian {smallest:.1e})"
+        )
+    return model
+
+
+def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicModel:
+    """A model of equations of motion."""
+    from vehiclemor.simulation.dynamic import DynamicModel
+
+    values = {
+        key: parameters[key] if declared.size > 1 else float(parameters[key])
+        for key, declared in definition.parameters.items()
+    }
+    definition.check(values)
+    equations, digest = compiled(definition.name, definition)
+    values |= solved_parameters(definition, values, parameters, equations)
+    solved = [float(values[key]) for key in definition.solved]
+    states = definition.states
+    # The heading comes after the place; it matters where states turn with it.
+    rotating = [definition.planar[2]] if definition.heading_pairs else []
+    rotating += [state for pair in definition.heading_pairs for state in pair]
+    return DynamicModel(
+        name=definition.name,
+        summary=definition.summary,
+        kind=definition.kind,
+        equations=equations,
+        parameters=parameters,
+        kernels=equations.kernels,
+        kernel_hash=digest,
+        constants=hoisted_constants(equations, parameters, solved),
+        initial=definition.starts(values),
+        active=_numbers(states, [state for state in states if state not in definition.cyclic]),
+        error_scale=np.array([definition.error_scale.get(state, 1.0) for state in states]),
+        validity=definition.validity,
+        loads=definition.loads,
+        rotating=_numbers(states, rotating),
+        planar=_numbers(states, definition.planar),
+    )
+
+
+def _numbers(states: tuple[str, ...], chosen: list[str] | tuple[str, ...]) -> np.ndarray:
+    """Places of some states among all."""
+    return np.array([states.index(state) for state in chosen], dtype=np.int64)
+
+
+def compiled(
+    name: str, definition: Any, loops: Sequence[str] = LOOP_SOURCES
+) -> tuple[Derivation, str]:
+    """Derivation of a model, and the hash of its kernels and loops; parameters play no part here.
+
+    Parameters
+    ----------
+    definition
+        What has `derive`: a model's definition, or a module of equations.
+    loops
+        Modules of the loops that run it.
+    """
+    made = derivation(name, definition)
+    return made, kernel_hash(f"{made.source}\n{loops_digest(loops)}")
+
+
+def hoisted_constants(
+    equations: Derivation, parameters: ParameterSet, solved: list[float]
+) -> np.ndarray:
+    """Hoisted constants of a parameter set and of the values that were solved for."""
+    constants = np.empty(equations.constants)
+    equations.kernels.call("constants", np.concatenate([parameters.flat(), solved]), constants)
+    return constants
+
+
+def solved_parameters(
+    definition: ModelDefinition, values: Values, parameters: ParameterSet, equations: Derivation
+) -> dict[str, float]:
+    """What a model solves for before it can start, by name."""
+    if not definition.solved:
+        return {}
+
+    def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        result = np.empty(len(x))
+        constants = hoisted_constants(equations, parameters, solved)
+        equations.kernels.call("derivative", x, u, constants, result)
+        return result
+
+    return definition.solve_equilibrium(values, derivative)
