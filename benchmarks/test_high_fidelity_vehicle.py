@@ -216,7 +216,7 @@ def test_method(benchmark, model, references, label):
     benchmark.group = "methods, 10 s, with the outputs"
     name, preset, chosen = METHODS[label]
     method = component("method", name)
-    settings = validated(name, method.settings(model.kind), chosen, method.presets(model)[preset])
+    settings = validated(method, model.kind, chosen, preset)
     start = "equilibrium"
     runs = training_runs(model, rack_lane_change, start, "matched")
     reduced = method.fit(model, runs, settings)

@@ -93,7 +93,7 @@ def test_method(benchmark, model, reference, label):
     benchmark.group = "methods, 25 s, with the outputs"
     name, preset, chosen = METHODS[label]
     method = component("method", name)
-    settings = validated(name, method.settings(model.kind), chosen, method.presets(model)[preset])
+    settings = validated(method, model.kind, chosen, preset)
     start = model.starts[0]
     reduced = method.fit(model, training_runs(model, lane_change, start, "matched"), settings)
     run = benchmark(reduced.simulate, lane_change, start)

@@ -23,8 +23,7 @@ def fitted(
 ) -> ReducedModel:
     """Reduced model by a registered method, its recommended preset and these settings."""
     definition = component("method", method)
-    preset = definition.presets(model)["recommended"]
-    complete = validated(method, definition.settings(model.kind), settings, preset)
+    complete = validated(definition, model.kind, settings)
     definition.check(model, complete)
     runs = training_runs(model, maneuver, model.starts[0], policy)
     return definition.fit(model, runs, complete)

@@ -88,18 +88,17 @@ def check_method(name: str, model_name: str) -> None:
     """
     method: Method = component("method", name)
     model = build(model_name)
-    assert method.SUMMARY, f"{name}: no summary"
+    assert method.summary, f"{name}: no summary"
     accepted, reason = method.accepts(model)
     if not accepted:
         assert reason, f"{name}: refuses {model_name} without a reason"
         return
-    presets, declared = method.presets(model), method.settings(model.kind)
-    assert "recommended" in presets, f"{name}: no preset 'recommended'"
-    for setting in declared.values():
-        assert setting.doc, f"{name}: a setting is not described"
+    assert model.kind in method.settings, f"{name}: has no settings for kind {model.kind}"
+    for setting in method.settings[model.kind].model_fields.values():
+        assert setting.description, f"{name}: a setting is not described"
     maneuver = _nominal(model)
-    for preset, values in presets.items():
-        settings = validated(name, declared, {}, values)
+    for preset in method.presets_of(model.kind):
+        settings = validated(method, model.kind, {}, preset)
         method.check(model, settings)
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)

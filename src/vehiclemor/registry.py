@@ -1,7 +1,7 @@
 """Models, methods and maneuvers by entry point: built-ins and plug-ins register the same way.
 
-An entry point of the group `vehiclemor.models` or `vehiclemor.methods` names a module, one of
-`vehiclemor.maneuvers` a `Maneuver`.
+An entry point of the group `vehiclemor.models` names a module, one of `vehiclemor.methods` a
+`Method`, one of `vehiclemor.maneuvers` a `Maneuver`.
 """
 
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ GROUPS = {
 # What a component must have; see `reduction/interface.py` and the handbook.
 REQUIRED = {
     "model": ("KIND", "SUMMARY", "MANEUVER", "PARAMETERS", "derive"),
-    "method": ("SUMMARY", "REFERENCE", "settings", "presets", "accepts", "check", "fit"),
+    "method": ("summary", "reference", "settings", "presets", "accepts", "check", "fit"),
     "maneuver": ("summary", "signal", "inputs", "duration", "samples", "perturbed"),
 }
 # What a model of a kind must have besides.

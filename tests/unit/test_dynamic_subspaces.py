@@ -40,7 +40,7 @@ def whole_space(form, edges, mean=0.0, mixing=None):
 
 
 def fitted(model, start="equilibrium", maneuver=lane_change, **chosen):
-    settings = validated("pod", pod.settings("ode"), chosen)
+    settings = validated(pod.METHOD, "ode", chosen)
     pod.check(model, settings)
     return pod.fit(model, training_runs(model, maneuver, start, "matched"), settings)
 
@@ -145,7 +145,7 @@ def test_weighted_basis_spans_what_pymor_finds(model):
     assert np.abs(difference).max() < 1e-6
 
 
-def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
+def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = whole_space(STATE, [0.0, 25.0])
     jacobian = linearisation.reduced_jacobian(model, whole, 0, model.start())
@@ -155,8 +155,8 @@ def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
     assert np.sort(found.real)[: fast.sum()] == pytest.approx(
         np.sort(expected.real[fast]), rel=1e-4
     )
-    assert len(reduced.growth_rates) == 50
-    assert reduced.growth_rate == reduced.growth_rates.max()
+    assert len(reduced.spectral_abscissas) == 50
+    assert reduced.spectral_abscissa == reduced.spectral_abscissas.max()
 
 
 def test_a_tighter_rank_tolerance_drops_modes_of_noise(model):

@@ -15,6 +15,7 @@ from vehiclemor.codegen import cache, straight_line
 from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.projection.dynamic import check_subspace
+from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.registry import component
 from vehiclemor.simulation import dynamic_build, newton_loops, system_loops
 from vehiclemor.simulation.spaces import Spaces, full_space
@@ -141,11 +142,11 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking: str) 
     whole = standard()
     shapes = {k: v for k, v in whole.equations.shapes.items() if k != lacking}
     model = replace(whole, equations=replace(whole.equations, shapes=shapes))
-    settings = {"rank": 1, "snapshots": 2, "formulation": "state", "inner_product": "range"}
+    settings = DynamicPodSettings(rank=1, snapshots=2, formulation="state", inner_product="range")
     check_subspace(model, settings)
     for wrong in ({"formulation": "coordinates"}, {"inner_product": "energy"}):
         with pytest.raises(InputError, match=f"has no {lacking}"):
-            check_subspace(model, settings | wrong)
+            check_subspace(model, settings.model_copy(update=wrong))
     nothing = np.zeros((1, 1, 4))
     edges, rank = np.array([0.0, 9.0]), np.array([2])
     spaces = Spaces(COORDINATES, edges, np.zeros((1, 4)), nothing, nothing, rank)

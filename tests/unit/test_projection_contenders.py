@@ -32,8 +32,8 @@ TIGHT = 1e-8
 
 
 def fitted(method, model, training=(), **settings):
-    complete = validated(method.__name__, method.settings(model.kind), settings)
-    method.check(model, complete)
+    complete = validated(method.METHOD, model.kind, settings)
+    method.METHOD.check(model, complete)
     return method.fit(model, training, complete)
 
 
@@ -87,7 +87,7 @@ def test_softening_lowers_the_fastest_eigenvalue_by_its_factor(name):
     model = vm.model(name)
     fastest = [
         np.abs(np.linalg.eigvals(VehicleShape(m).linearised.a)).max()
-        for m in (model, fitted(softened_slip, model, factor=2.0).softened)
+        for m in (model, softened_slip.softened(model, 2.0))
     ]
     assert fastest[0] / fastest[1] == pytest.approx(2.0, rel=0.05)
 
@@ -298,6 +298,6 @@ def test_ranks_beyond_the_states_are_refused(vehicle):
     ids=lambda m: m.__name__.rpartition(".")[2],
 )
 def test_a_model_that_is_no_vehicle_is_refused(method):
-    accepted, reason = method.accepts(SimpleNamespace(name="box", kind="ode", planar=()))
+    accepted, reason = method.METHOD.accepts(SimpleNamespace(name="box", kind="ode", planar=()))
     assert not accepted
     assert "no vehicle" in reason

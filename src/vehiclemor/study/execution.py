@@ -12,6 +12,7 @@ from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, Ve
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import largest, rms, signal_range
 from vehiclemor.reduction.interface import Method, Offline
+from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model, build
@@ -52,7 +53,8 @@ def compute_cell(
     if not accepted:
         return _failed(model, maneuver, cell, "rejected", reason)
     try:
-        method.check(model, cell.settings)
+        settings = validated(method, model.kind, cell.settings)
+        method.check(model, settings)
     except InputError as error:
         return _failed(model, maneuver, cell, "rejected", str(error))
     whose = "the full-order reference: "
@@ -60,7 +62,7 @@ def compute_cell(
         reference = model.simulate(maneuver, cell.start)
         whose = ""
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
-        reduced = method.fit(model, runs, cell.settings)
+        reduced = method.fit(model, runs, settings)
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(maneuver, cell.start)
         trajectory = reduced.simulate(maneuver, cell.start)
@@ -81,7 +83,7 @@ def compute_cell(
         approximation,
         reduced.offline,
         reduced.effective_rank,
-        float(getattr(reduced, "growth_rate", np.nan)),
+        float(getattr(reduced, "spectral_abscissa", np.nan)),
     )
 
 

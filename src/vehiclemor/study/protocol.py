@@ -153,11 +153,7 @@ def _contestant(
         complete: Settings = {}
         # A refused model is a result: settings for a model of another kind can't be judged here.
         if method.accepts(model)[0]:
-            presets = method.presets(model)
-            if preset not in presets:
-                raise unknown(f"preset of {entry.method}", preset, presets)
-            defaults = presets[str(preset)]
-            complete = validated(entry.method, method.settings(model.kind), settings, defaults)
+            complete = validated(method, model.kind, settings, str(preset)).model_dump()
         if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)

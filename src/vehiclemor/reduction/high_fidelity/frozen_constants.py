@@ -10,7 +10,7 @@ import numpy as np
 
 from vehiclemor.models.high_fidelity import frozen_inertia as frozen
 from vehiclemor.models.high_fidelity.independent import PLACES
-from vehiclemor.reduction.vehicle.independent import free_lengths, independent_kernels
+from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.dynamic_build import compiled
 
