@@ -93,7 +93,6 @@ def check_method(name: str, model_name: str) -> None:
     if not accepted:
         assert reason, f"{name}: refuses {model_name} without a reason"
         return
-    assert model.kind in method.settings, f"{name}: has no settings for kind {model.kind}"
     for setting in method.settings[model.kind].model_fields.values():
         assert setting.description, f"{name}: a setting is not described"
     maneuver = _nominal(model)

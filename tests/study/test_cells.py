@@ -161,7 +161,7 @@ def test_settings_of_a_method_that_refuses_the_model_are_not_judged(monkeypatch)
     from vehiclemor.reduction.methods import pod
 
     refusing = dataclasses.replace(
-        pod.METHOD, accepts=lambda model: (False, f"pod can't reduce {model.name}")
+        pod.METHOD, refusal=lambda model: f"pod can't reduce {model.name}"
     )
     monkeypatch.setattr(pod, "METHOD", refusing)
     cell = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rnk": 3}, "x")

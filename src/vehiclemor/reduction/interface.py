@@ -73,9 +73,9 @@ class ReducedModel(Protocol):
         ...
 
 
-def accepts_all(model: Model) -> tuple[bool, str]:  # noqa: ARG001
-    """Every model is accepted."""
-    return True, ""
+def never_refused(model: Any) -> str:  # noqa: ARG001
+    """Every model of a kind that the method has settings for can be reduced."""
+    return ""
 
 
 def fits_all(model: Model, settings: Any) -> None:
@@ -98,8 +98,8 @@ class Method:
         (model, training runs, settings) -> reduced model.
     reference
         DOI of the publication, if there is one.
-    accepts
-        Model -> whether the method can reduce it, and why not.
+    refusal
+        Model of such a kind -> why the method can't reduce it all the same; empty if it can.
     check
         (model, settings): raises `InputError` if valid settings don't fit the model or each other.
     presets
@@ -112,9 +112,17 @@ class Method:
     settings: Mapping[str, type[Settings]]
     fit: Callable[[Any, Sequence[TrainingRun], Any], ReducedModel]
     reference: str = ""
-    accepts: Callable[[Any], tuple[bool, str]] = accepts_all
+    refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all
     presets: Mapping[str, Presets] = field(default_factory=dict)
+
+    def accepts(self, model: Model) -> tuple[bool, str]:
+        """Whether the method can reduce a model, and why not."""
+        if model.kind not in self.settings:
+            kinds = " or ".join(self.settings)
+            return False, f"{self.name} reduces kind {kinds}; {model.name} is of kind {model.kind}"
+        reason = self.refusal(model)
+        return not reason, reason
 
     def presets_of(self, kind: str) -> Presets:
         """Presets for models of a kind: name -> values that differ from the defaults."""

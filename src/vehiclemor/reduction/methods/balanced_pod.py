@@ -29,7 +29,7 @@ from vehiclemor.reduction.projection.bases import check_snapshots
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_vehicle
+from vehiclemor.reduction.vehicle.acceptance import lacking, no_vehicle
 from vehiclemor.reduction.vehicle.mirror import with_mirrored
 from vehiclemor.reduction.vehicle.projected_vehicle import one_window, projected_vehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -52,13 +52,9 @@ class BalancedPodSettings(ProjectedSettings):
     snapshots: int = Field(500, ge=2, description="snapshots in each training run")
 
 
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles with the outputs that modes are weighed by."""
-    accepted, reason = is_vehicle(model)
-    if not accepted:
-        return accepted, reason
-    missing = [name for name in OUTPUTS if name not in model.outputs]
-    return not missing, f"{model.name} has no output {', '.join(missing)}"
+def refusal(model: Model) -> str:
+    """Vehicles with the outputs that modes are weighed by are accepted."""
+    return no_vehicle(model) or lacking(model, OUTPUTS)
 
 
 def check(model: DynamicModel, settings: BalancedPodSettings) -> None:
@@ -163,7 +159,7 @@ METHOD = Method(
     summary="balanced POD: one Petrov-Galerkin basis, heading and place as quadratures",
     reference="10.1142/S0218127405012429",
     settings=dict.fromkeys(("ode", "dae"), BalancedPodSettings),
-    accepts=accepts,
+    refusal=refusal,
     check=check,
     fit=fit,
 )

@@ -24,7 +24,7 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.projection.balancing import balancing, gramian_factor
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_steered_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -121,7 +121,7 @@ METHOD = Method(
     summary="linearised vehicle, balanced between steering and lateral outputs",
     reference="10.1109/TAC.1981.1102568",
     settings=dict.fromkeys(("ode", "dae"), BalancedTruncationSettings),
-    accepts=is_steered_vehicle,
+    refusal=no_steered_vehicle,
     check=check,
     fit=fit,
 )

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vehiclemor.reduction.high_fidelity.acceptance import has_closed_forms
+from vehiclemor.reduction.high_fidelity.acceptance import no_closed_forms
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OnlineSettings
@@ -57,6 +57,6 @@ METHOD = Method(
     name="frozen_inertia",
     summary="14 coordinates, inertia frozen at design, exact tires (high-fidelity vehicle)",
     settings={"dae": OnlineSettings},
-    accepts=has_closed_forms,
+    refusal=no_closed_forms,
     fit=fit,
 )

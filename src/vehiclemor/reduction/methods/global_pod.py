@@ -25,11 +25,10 @@ from vehiclemor.reduction.projection.dynamic import ReducedDynamicModel
 from vehiclemor.reduction.projection.inner_products import coordinate_weight
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.mirror import with_mirrored
 from vehiclemor.reduction.vehicle.shape import spin_angles
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.spaces import Spaces
 from vehiclemor.simulation.system_loops import COORDINATES
 
@@ -43,14 +42,12 @@ class GlobalPodSettings(ProjectedSettings):
     snapshots: int = Field(500, ge=2, description="snapshots in each training run")
 
 
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles with equations of motion that can be projected."""
-    accepted, reason = is_vehicle(model)
-    if accepted and isinstance(model, DynamicModel):
-        missing = {"second_order", "speeds"} - set(model.equations.shapes)
-        if missing:
-            return False, f"{model.name} has no {min(missing)} to project"
-    return accepted, reason
+def refusal(model: DynamicModel) -> str:
+    """Vehicles with equations of motion that can be projected are accepted."""
+    if reason := no_vehicle(model):
+        return reason
+    missing = {"second_order", "speeds"} - set(model.equations.shapes)
+    return f"{model.name} has no {min(missing)} to project" if missing else ""
 
 
 def check(model: DynamicModel, settings: GlobalPodSettings) -> None:
@@ -121,7 +118,7 @@ METHOD = Method(
     summary="POD with one energy-weighted basis for all inputs, place and heading kept apart",
     reference="10.1090/qam/910462",
     settings=dict.fromkeys(("ode", "dae"), GlobalPodSettings),
-    accepts=accepts,
+    refusal=refusal,
     check=check,
     fit=fit,
 )

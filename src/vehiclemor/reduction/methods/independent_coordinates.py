@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vehiclemor.reduction.high_fidelity.acceptance import has_closed_forms
+from vehiclemor.reduction.high_fidelity.acceptance import no_closed_forms
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OnlineSettings
@@ -59,6 +59,6 @@ METHOD = Method(
     summary="constraints eliminated in closed form, 14 coordinates (exact, high-fidelity vehicle)",
     reference="10.1115/1.3256318",
     settings={"dae": OnlineSettings},
-    accepts=has_closed_forms,
+    refusal=no_closed_forms,
     fit=fit,
 )

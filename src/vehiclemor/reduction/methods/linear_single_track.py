@@ -29,7 +29,7 @@ import numpy as np
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_steered_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.linear_vehicle import (
     CORNERING,
@@ -133,6 +133,6 @@ METHOD = Method(
     summary="linear single-track car with the model's own effective stiffnesses",
     reference="10.1007/BF02086921",
     settings=dict.fromkeys(("ode", "dae"), OnlineSettings),
-    accepts=is_steered_vehicle,
+    refusal=no_steered_vehicle,
     fit=fit,
 )

@@ -23,7 +23,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_steered_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -82,7 +82,7 @@ METHOD = Method(
     summary="slow lateral modes of the linearised vehicle, the others static",
     reference="10.1109/TAC.1966.1098264",
     settings=dict.fromkeys(("ode", "dae"), ModalTruncationSettings),
-    accepts=is_steered_vehicle,
+    refusal=no_steered_vehicle,
     check=check,
     fit=fit,
 )

@@ -31,7 +31,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_steered_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, polynomial_features
 from vehiclemor.reduction.vehicle.linear_vehicle import HEADING, MARGIN, PLACE
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
@@ -157,7 +157,7 @@ METHOD = Method(
     summary="global POD, reduced operators fitted on projected rates of training runs",
     reference="10.1016/j.cma.2016.03.025",
     settings=dict.fromkeys(("ode", "dae"), OperatorInferenceSettings),
-    accepts=is_steered_vehicle,
+    refusal=no_steered_vehicle,
     check=check,
     fit=fit,
 )

@@ -116,13 +116,6 @@ class PathMapModel:
         del states
 
 
-def accepts(model: Model) -> tuple[bool, str]:
-    """Whether the model is one of a mechanism whose inputs move all of its coordinates."""
-    if isinstance(model, AlgebraicModel):
-        return True, ""
-    return False, f"path_map is for kinematic models: {model.name} is of kind {model.kind}"
-
-
 def check(model: Model, settings: PathMapSettings) -> None:  # noqa: ARG001
     """Raise `InputError` if the degree is too high for powers of the travel."""
     if settings.degree > HIGHEST_DEGREE:
@@ -180,7 +173,6 @@ METHOD = Method(
     summary="the coordinates as polynomials in the wheel travel: no equation is solved",
     reference="10.1137/1.9781611975949",
     settings={"ae": PathMapSettings},
-    accepts=accepts,
     check=check,
     fit=fit,
 )

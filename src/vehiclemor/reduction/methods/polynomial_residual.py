@@ -34,7 +34,6 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.clock import timed
-from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
 # Every monomial is a line of machine code in each equation.
@@ -159,11 +158,8 @@ class PolynomialResidualModel:
         return residual_module(len(self.model.inputs), self.basis.rank, self.degree)
 
 
-def accepts(model: Model) -> tuple[bool, str]:
-    """Whether the model is kinematic, and its inputs enter the equations linearly."""
-    name = "polynomial_residual"
-    if not isinstance(model, AlgebraicModel):
-        return False, f"{name} is for kinematic models: {model.name} is of kind {model.kind}"
+def refusal(model: AlgebraicModel) -> str:
+    """Models whose inputs enter the equations linearly are accepted."""
     response = _response(model, model.design)
     generator = np.random.default_rng(0)
     for _ in range(LINEARITY_CHECKS):
@@ -171,8 +167,11 @@ def accepts(model: Model) -> tuple[bool, str]:
         u = generator.uniform(-0.1, 0.1, len(model.inputs))
         change = model.residual(q, u) - model.residual(q, np.zeros(len(u)))
         if np.abs(change - response @ u).max() > LINEARITY_TOLERANCE:
-            return False, f"{name} needs inputs that enter the equations of {model.name} linearly"
-    return True, ""
+            return (
+                "polynomial_residual needs inputs that enter the equations of "
+                f"{model.name} linearly"
+            )
+    return ""
 
 
 def check(model: AlgebraicModel, settings: PolynomialResidualSettings) -> None:
@@ -258,7 +257,7 @@ METHOD = Method(
     name="polynomial_residual",
     summary="POD with a fixed test space; the reduced equations are fitted polynomials",
     settings={"ae": PolynomialResidualSettings},
-    accepts=accepts,
+    refusal=refusal,
     check=check,
     fit=fit,
 )

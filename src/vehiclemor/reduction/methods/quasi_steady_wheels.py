@@ -26,19 +26,16 @@ from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.projected_vehicle import one_window, projected_vehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape, spin_angles
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
 
 
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles whose wheels spin."""
-    accepted, reason = is_vehicle(model)
-    if accepted and isinstance(model, DynamicModel) and not len(spin_angles(model)):
-        return False, f"{model.name} has no wheels that spin"
-    return accepted, reason
+def refusal(model: DynamicModel) -> str:
+    """Vehicles whose wheels spin are accepted."""
+    reason = no_vehicle(model)
+    return reason or ("" if len(spin_angles(model)) else f"{model.name} has no wheels that spin")
 
 
 def fit(
@@ -72,6 +69,6 @@ METHOD = Method(
     summary="spins of the wheels slaved to the other states (singular perturbation)",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), ProjectedSettings),
-    accepts=accepts,
+    refusal=refusal,
     fit=fit,
 )

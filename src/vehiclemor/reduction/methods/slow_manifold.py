@@ -28,7 +28,7 @@ from pydantic import Field
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_steered_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -230,6 +230,6 @@ METHOD = Method(
     summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
-    accepts=is_steered_vehicle,
+    refusal=no_steered_vehicle,
     fit=fit,
 )

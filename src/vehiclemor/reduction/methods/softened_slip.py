@@ -20,7 +20,7 @@ from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.acceptance import is_vehicle
+from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.simulation.spaces import full_space
@@ -39,12 +39,12 @@ class SoftenedSlipSettings(OnlineSettings):
     tolerance: Tolerance = 1e-4
 
 
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles whose tires have a slip stiffness of a known name."""
-    accepted, reason = is_vehicle(model)
-    if accepted and not _stiffnesses(model):
-        return False, f"{model.name} has no parameter {' or '.join(SLIP_STIFFNESS)}"
-    return accepted, reason
+def refusal(model: Model) -> str:
+    """Vehicles whose tires have a slip stiffness of a known name are accepted."""
+    if reason := no_vehicle(model):
+        return reason
+    missing = f"{model.name} has no parameter {' or '.join(SLIP_STIFFNESS)}"
+    return "" if _stiffnesses(model) else missing
 
 
 def softened(model: DynamicModel, factor: float) -> DynamicModel:
@@ -98,6 +98,6 @@ METHOD = Method(
     name="softened_slip",
     summary="the full model with softer longitudinal slip of its tires, for longer explicit steps",
     settings=dict.fromkeys(("ode", "dae"), SoftenedSlipSettings),
-    accepts=accepts,
+    refusal=refusal,
     fit=fit,
 )
