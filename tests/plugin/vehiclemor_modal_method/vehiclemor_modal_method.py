@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -18,10 +17,10 @@ class ModalSettings(Settings):
 
 
 @dataclass(frozen=True)
-class ModalModel:
+class Modal:
     """Equations z' = a z + b u + c of x = centre + right z, with z = left (x - centre)."""
 
-    model: Any
+    model: object
     centre: np.ndarray
     left: np.ndarray
     right: np.ndarray
@@ -55,8 +54,7 @@ def fit(model, training, settings):
     right, left = (vectors[:, :kept] for _, vectors, kept in spaces)
     left = np.linalg.solve(left.T @ right, left.T)
     cost = offline_cost(began, model, further=1 + 2 * (len(x) + len(none)))
-    equations = left @ a @ right, left @ b, left @ rate
-    return ModalModel(model, x, left, right, equations, cost, len(left))
+    return Modal(model, x, left, right, (left @ a @ right, left @ b, left @ rate), cost, len(left))
 
 
 METHOD = Method("modal_basis", "modes of the linearised model", {"ode": ModalSettings}, fit)
