@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import sine_travel
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import build
 from vehiclemor.study.run import run_studies

@@ -10,8 +10,8 @@ from sksundae.cvode import CVODE
 
 from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity import definition as high_fidelity_vehicle
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.signals import signal_of

@@ -8,8 +8,8 @@ import pytest
 
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.models.independent_suspension import definition as independent_suspension_vehicle
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import full_space

@@ -5,8 +5,8 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import ReducedModel
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory

@@ -8,8 +8,9 @@ import pytest
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.settings import Settings, validated
+from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.model import KINDS, Model, build
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory, trajectory_dataset

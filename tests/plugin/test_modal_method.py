@@ -13,7 +13,7 @@ from vehiclemor import registry
 from vehiclemor.contracts import check_method
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver, lane_change
-from vehiclemor.reduction.settings import validated
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import Trajectory
 

@@ -10,8 +10,8 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import Spaces, full_space

@@ -20,8 +20,8 @@ from vehiclemor.reduction.methods import (
     quasi_steady_wheels,
     softened_slip,
 )
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.linearisation import reduced_jacobian
 from vehiclemor.simulation.spaces import full_space

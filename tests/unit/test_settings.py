@@ -10,7 +10,8 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Settings, one_of, parsed, validated
+from vehiclemor.reduction.settings import Settings, one_of
+from vehiclemor.reduction.validation import parsed, validated
 
 
 class Declared(Settings):

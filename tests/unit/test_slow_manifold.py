@@ -8,8 +8,8 @@ import pytest
 
 from vehiclemor.maneuvers import lane_change, rack_lane_change, straight_ahead
 from vehiclemor.reduction.methods import slow_manifold
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape

@@ -6,8 +6,8 @@ import pytest
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import POLICIES, training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory

@@ -12,8 +12,9 @@ import numpy as np
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import POLICIES
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.study.definition import FACTORS, StudyFile, values

@@ -12,8 +12,8 @@ from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, Ve
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import largest, rms, signal_range
 from vehiclemor.reduction.interface import Method, Offline
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.settings import Value
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.model import Model, build

@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, VehiclemorError
 from vehiclemor.metrics import largest, rms
 from vehiclemor.reduction.interface import Method, Offline, ReducedModel
-from vehiclemor.reduction.settings import validated
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model, build
 from vehiclemor.study.protocol import Settings

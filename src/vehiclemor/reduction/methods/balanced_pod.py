@@ -73,9 +73,7 @@ def fit(
     """Balance the gramians of the training runs and of the linearisation."""
     began = time.perf_counter()
     shape, count = VehicleShape(model), settings.snapshots
-    runs = [
-        run.at(np.linspace(0.0, run.maneuver.duration, count)) for run in with_mirrored(training)
-    ]
+    runs = [run.snapshots(count) for run in with_mirrored(training)]
     # Gramians are integrals in time: a snapshot counts for as long as it stands for.
     parts = [
         (shape.of(run.states) - shape.reference) * np.sqrt(run.time[-1] / count) for run in runs

@@ -14,14 +14,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.projection.balancing import balancing, gramian_factor
+from vehiclemor.reduction.projection.balancing import Balanced, balancing, gramian_factor
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
@@ -40,23 +39,6 @@ class BalancedTruncationSettings(OnlineSettings):
     rank: int = Field(4, ge=1, description="lateral states kept")
 
 
-@dataclass(frozen=True, eq=False)
-class Balanced:
-    """Projection of a linear system on its balanced states.
-
-    Attributes
-    ----------
-    left, right
-        Reduced states per state (r, n) and back (n, r); left right = 1.
-    hankel
-        All Hankel singular values (n,).
-    """
-
-    left: np.ndarray
-    right: np.ndarray
-    hankel: np.ndarray
-
-
 def balanced(a: np.ndarray, b: np.ndarray, c: np.ndarray, rank: int) -> Balanced:
     """Balance a stable system x' = a x + b u, y = c x.
 
@@ -71,7 +53,7 @@ def balanced(a: np.ndarray, b: np.ndarray, c: np.ndarray, rank: int) -> Balanced
 
     reached = gramian_factor(solve_continuous_lyapunov(a, -b @ b.T))
     seen = gramian_factor(solve_continuous_lyapunov(a.T, -c.T @ c))
-    return Balanced(*balancing(reached, seen, rank))
+    return balancing(reached, seen, rank)
 
 
 def lateral_system(

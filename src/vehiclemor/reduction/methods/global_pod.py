@@ -66,9 +66,7 @@ def fit(
 
     began = time.perf_counter()
     n, count = len(model.coordinates), settings.snapshots
-    runs = [
-        run.at(np.linspace(0.0, run.maneuver.duration, count)) for run in with_mirrored(training)
-    ]
+    runs = [run.snapshots(count) for run in with_mirrored(training)]
     start = model.start()
     # Deviations from straight running, which so lies in the subspace: it stays what it is.
     moved = np.concatenate([run.coordinates for run in runs]) - start[:n]

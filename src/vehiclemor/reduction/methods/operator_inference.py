@@ -82,7 +82,7 @@ def fit(
     if not training:
         raise InputError("operator inference needs training runs")
     began = time.perf_counter()
-    runs = [run.at(run.maneuver.times) for run in training]
+    runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     u = np.concatenate([run.inputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])

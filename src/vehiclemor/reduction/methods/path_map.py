@@ -21,12 +21,12 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_module
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Beyond it powers of the travel lose digits to rounding.
 HIGHEST_DEGREE = 20
@@ -87,22 +87,18 @@ class PathMapModel:
         model.start(start)
         inputs = checked_inputs(model, maneuver)
         degree, n = len(self.coefficients) - 1, len(model.coordinates)
-        path = np.full((len(times), n), np.nan)
         (low, high), slack = self.travel, SLACK * (self.travel[1] - self.travel[0])
         limits = np.array([low - slack, high + slack, self.rack - slack, self.rack + slack])
         if not self.stops:
             limits = np.array([-np.inf, np.inf, -np.inf, np.inf])
         run = map_module(n, degree).map_path
-        fixed = (self.centre, self.scale, limits, self.coefficients, path)
+        fixed = (self.centre, self.scale, limits, self.coefficients)
         # Compile, or load machine code, outside of the time that is measured.
-        run(inputs[:0], *fixed)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
-        (status, sample), seconds = timed(lambda: run(inputs, *fixed), counts)
-        trajectory = model.trajectory(times, inputs, path, counts, seconds)
-        if status == 0:
-            return trajectory
-        message = self._outside(float(times[sample]), *inputs[sample].tolist())
-        return replace(trajectory, status="diverged", message=message)
+        run(inputs[:0], *fixed, np.zeros((0, n)))
+        found, sample = solved_path(model, times, inputs, lambda path, _: run(inputs, *fixed, path))
+        if found.status == "ok":
+            return found
+        return replace(found, message=self._outside(float(times[sample]), *inputs[sample].tolist()))
 
     def _outside(self, moment: float, travel: float, rack: float) -> str:
         low, high = self.travel
@@ -134,7 +130,7 @@ def fit(
     """
     began = time.perf_counter()
     degree = settings.degree
-    runs = [run.at(run.maneuver.times) for run in training]
+    runs = [run.recorded() for run in training]
     inputs = np.concatenate([run.inputs for run in runs])
     travel, racks = inputs[:, 0], inputs[:, 1]
     low, high = float(travel.min()), float(travel.max())

@@ -30,11 +30,11 @@ from vehiclemor.reduction.polynomials.kernels import (
 from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.clock import timed
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Every monomial is a line of machine code in each equation.
 MOST_MONOMIALS = 150
@@ -117,8 +117,6 @@ class PolynomialResidualModel:
         model, times = self.model, maneuver.times
         began_at = self.reduced(model.start(start)[None, :])[0]
         inputs = checked_inputs(model, maneuver)
-        path = np.full((len(times), len(model.coordinates)), np.nan)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
         arguments = (
             loop_array(began_at),
             np.concatenate([self.mean_inputs, self.basis.mean]),
@@ -129,15 +127,12 @@ class PolynomialResidualModel:
             self.newton,
             self.tolerance / self.scales,
             ITERATION_LIMIT,
-            path,
-            counts,
         )
         run = self._loops().reduced_path
         # Compile, or load machine code, outside of the time that is measured.
-        run(inputs[:0], *arguments)
-        (status, sample), seconds = timed(lambda: run(inputs, *arguments), counts)
-        failure = None if status == 0 else (status, sample)
-        return model.trajectory(times, inputs, path, counts, seconds, failure)
+        empty = np.zeros((0, len(model.coordinates))), np.zeros(4, dtype=np.int64)
+        run(inputs[:0], *arguments, *empty)
+        return solved_path(model, times, inputs, lambda *to: run(inputs, *arguments, *to))[0]
 
     def reduced(self, states: np.ndarray) -> np.ndarray:
         """Scaled reduced coordinates (samples, r) of states (samples, n)."""
@@ -199,7 +194,7 @@ def fit(
     """
     began = time.perf_counter()
     count, degree = settings.snapshots, settings.degree
-    runs = [run.at(np.linspace(0.0, run.maneuver.duration, count)) for run in training]
+    runs = [run.snapshots(count) for run in training]
     states = np.concatenate([run.coordinates for run in runs])
     mean_inputs = np.concatenate([run.inputs for run in runs]).mean(axis=0)
     if np.ptp(states, axis=0).max() == 0.0:

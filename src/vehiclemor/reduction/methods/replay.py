@@ -87,7 +87,7 @@ def fit(
 ) -> ReplayModel:
     """Record the training runs at the output times."""
     began = time.perf_counter()
-    recorded = tuple(run.at(run.maneuver.times) for run in training)
+    recorded = tuple(run.recorded() for run in training)
     return ReplayModel(model, recorded, offline_cost(began, model, recorded))
 
 

@@ -102,7 +102,7 @@ def fit(
 ) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.perf_counter()
-    runs = [run.at(run.maneuver.times) for run in training]
+    runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest)
     samples = _samples(shape, modes, runs)

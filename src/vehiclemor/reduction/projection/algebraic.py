@@ -15,11 +15,11 @@ from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
 from vehiclemor.reduction.projection.windows import first_samples
+from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 ITERATION_LIMIT = 50
 
@@ -64,8 +64,6 @@ class ProjectedModel:
                 tests[k, :, : basis.rank] = self.tests[k]
         means = np.array([basis.mean for basis in self.bases])
         ranks = np.array([basis.rank for basis in self.bases])
-        path = np.full((len(times), n), np.nan)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
         arguments = (
             model.start(start),
             first_samples(times, self.edges),
@@ -78,13 +76,9 @@ class ProjectedModel:
             model.constants,
             self.tolerance,
             ITERATION_LIMIT,
-            path,
-            counts,
         )
         loop = model.kernels.projected_path
-        (status, sample), seconds = timed(lambda: loop(*arguments), counts)
-        failure = None if status == 0 else (status, sample)
-        return model.trajectory(times, inputs, path, counts, seconds, failure)
+        return solved_path(model, times, inputs, lambda *results: loop(*arguments, *results))[0]
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""

@@ -3,12 +3,28 @@
 A. C. Antoulas, Approximation of Large-Scale Dynamical Systems (SIAM 2005), section 7.3.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 
-def balancing(
-    reached: np.ndarray, seen: np.ndarray, rank: int, smallest: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+class Balanced(NamedTuple):
+    """Projection of a linear system on its balanced states.
+
+    Attributes
+    ----------
+    left, right
+        Reduced states per state (r, n) and back (n, r); left right = 1.
+    hankel
+        All Hankel singular values (n,).
+    """
+
+    left: np.ndarray
+    right: np.ndarray
+    hankel: np.ndarray
+
+
+def balancing(reached: np.ndarray, seen: np.ndarray, rank: int, smallest: float = 0.0) -> Balanced:
     """Square-root balancing.
 
     Parameters
@@ -19,17 +35,12 @@ def balancing(
         Number of states to keep.
     smallest
         Part of the largest singular value below which a state is left out all the same.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        Reduced states per state (r, n), back (n, r), and all Hankel singular values.
     """
     u, hankel, vt = np.linalg.svd(seen.T @ reached, full_matrices=False)
     kept = min(rank, int(np.count_nonzero(hankel > smallest * hankel[0])))
     scale = 1.0 / np.sqrt(hankel[:kept])
     left = scale[:, None] * (u[:, :kept].T @ seen.T)
-    return left, reached @ vt[:kept].T * scale, hankel
+    return Balanced(left, reached @ vt[:kept].T * scale, hankel)
 
 
 def gramian_factor(gramian: np.ndarray) -> np.ndarray:

@@ -10,8 +10,8 @@ from scipy.linalg import subspace_angles
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.algebraic import fit_windows
 from vehiclemor.reduction.projection.windows import window_edges
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.criteria.finding import (
     INDISTINGUISHABLE,
