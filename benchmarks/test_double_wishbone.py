@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import sine_travel
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.run import run_studies
@@ -81,8 +81,7 @@ def test_method(benchmark, model, label):
     benchmark.group = "methods, 1001 time points"
     name, preset, chosen = METHODS[label]
     method = component("method", name)
-    declared = method.settings(model.kind)
-    settings = validated(name, declared, chosen, method.presets(model)[preset])
+    settings = validated(method, model.kind, chosen, preset)
     start = model.starts[0]
     reduced = method.fit(model, training_runs(model, sine_travel, start, "matched"), settings)
     trajectory = benchmark(reduced.simulate, sine_travel, start)

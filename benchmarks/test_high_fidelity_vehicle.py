@@ -10,12 +10,12 @@ from sksundae.cvode import CVODE
 
 from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity import definition as high_fidelity_vehicle
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.signals import signal_of
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.input_splines import signal_of
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system_loops import FULL as FULL_FORM
 from vehiclemor.symbolic.program import Program
 
@@ -93,7 +93,7 @@ def test_full_order(benchmark, model, references, label, start):
     benchmark.group = f"full order, 10 s, {start}"
     solver, tolerance = FULL[label]
     run = model.simulate(rack_lane_change, start, None, solver, tolerance)
-    whole = full_space(len(model.coordinates))
+    whole = whole_space(2 * len(model.coordinates))
     arguments = model.system.arguments(
         rack_lane_change, model.start(start), whole, solver, tolerance, rack_lane_change.times
     )
@@ -216,7 +216,7 @@ def test_method(benchmark, model, references, label):
     benchmark.group = "methods, 10 s, with the outputs"
     name, preset, chosen = METHODS[label]
     method = component("method", name)
-    settings = validated(name, method.settings(model.kind), chosen, method.presets(model)[preset])
+    settings = validated(method, model.kind, chosen, preset)
     start = "equilibrium"
     runs = training_runs(model, rack_lane_change, start, "matched")
     reduced = method.fit(model, runs, settings)

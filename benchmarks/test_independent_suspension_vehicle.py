@@ -8,11 +8,11 @@ import pytest
 
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.models.independent_suspension import definition as independent_suspension_vehicle
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000
@@ -67,7 +67,7 @@ def test_full_order(benchmark, model, reference, label):
     benchmark.group = "full order, 25 s, compiled loop"
     solver, tolerance = FULL[label]
     run = model.simulate(lane_change, None, None, solver, tolerance)
-    whole = full_space(len(model.coordinates))
+    whole = whole_space(2 * len(model.coordinates))
     arguments = model.system.arguments(
         lane_change, model.start(), whole, solver, tolerance, lane_change.times
     )
@@ -93,7 +93,7 @@ def test_method(benchmark, model, reference, label):
     benchmark.group = "methods, 25 s, with the outputs"
     name, preset, chosen = METHODS[label]
     method = component("method", name)
-    settings = validated(name, method.settings(model.kind), chosen, method.presets(model)[preset])
+    settings = validated(method, model.kind, chosen, preset)
     start = model.starts[0]
     reduced = method.fit(model, training_runs(model, lane_change, start, "matched"), settings)
     run = benchmark(reduced.simulate, lane_change, start)

@@ -5,8 +5,8 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import ReducedModel
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
@@ -23,8 +23,7 @@ def fitted(
 ) -> ReducedModel:
     """Reduced model by a registered method, its recommended preset and these settings."""
     definition = component("method", method)
-    preset = definition.presets(model)["recommended"]
-    complete = validated(method, definition.settings(model.kind), settings, preset)
+    complete = validated(definition, model.kind, settings)
     definition.check(model, complete)
     runs = training_runs(model, maneuver, model.starts[0], policy)
     return definition.fit(model, runs, complete)

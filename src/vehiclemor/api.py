@@ -26,7 +26,7 @@ def models() -> dict[str, str]:
 
 def methods() -> dict[str, str]:
     """Registered reduction methods: name -> one line."""
-    return _summaries("method", "SUMMARY")
+    return _summaries("method", "summary")
 
 
 def maneuvers() -> dict[str, str]:

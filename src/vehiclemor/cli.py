@@ -99,7 +99,7 @@ def simulate(
     out
         netCDF file for the result.
     """
-    from vehiclemor.reduction.settings import parsed
+    from vehiclemor.reduction.validation import parsed
 
     chosen: dict[str, Any] = {}
     for setting in settings:

@@ -11,8 +11,8 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
@@ -89,18 +89,16 @@ def check_method(name: str, model_name: str) -> None:
     """
     method: Method = component("method", name)
     model = build(model_name)
-    assert method.SUMMARY, f"{name}: no summary"
+    assert method.summary, f"{name}: no summary"
     accepted, reason = method.accepts(model)
     if not accepted:
         assert reason, f"{name}: refuses {model_name} without a reason"
         return
-    presets, declared = method.presets(model), method.settings(model.kind)
-    assert "recommended" in presets, f"{name}: no preset 'recommended'"
-    for setting in declared.values():
-        assert setting.doc, f"{name}: a setting is not described"
+    for setting in method.settings[model.kind].model_fields.values():
+        assert setting.description, f"{name}: a setting is not described"
     maneuver = _nominal(model)
-    for preset, values in presets.items():
-        settings = validated(name, declared, {}, values)
+    for preset in method.presets_of(model.kind):
+        settings = validated(method, model.kind, {}, preset)
         method.check(model, settings)
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)

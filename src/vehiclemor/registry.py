@@ -1,7 +1,7 @@
 """Models, methods and maneuvers by entry point: built-ins and plug-ins register the same way.
 
 An entry point of the group `vehiclemor.models` names a `ModelDefinition`, one of
-`vehiclemor.maneuvers` a `Maneuver`, one of `vehiclemor.methods` a module of the interface `Method`.
+`vehiclemor.methods` a `Method`, one of `vehiclemor.maneuvers` a `Maneuver`.
 """
 
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ CLASSES = {
     "maneuver": "vehiclemor.maneuvers:Maneuver",
 }
 # What a component of another kind must have; see `reduction/interface.py` and the handbook.
-REQUIRED = {"method": ("SUMMARY", "REFERENCE", "settings", "presets", "accepts", "check", "fit")}
+REQUIRED = {"method": ("summary", "reference", "settings", "presets", "accepts", "check", "fit")}
 
 
 def names(kind: str) -> list[str]:

@@ -18,7 +18,7 @@ def example(tmp_path, monkeypatch):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
     (tmp_path / "handbook_example.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
-    entry = EntryPoint("interpolation", "handbook_example", registry.GROUPS["method"])
+    entry = EntryPoint("interpolation", "handbook_example:METHOD", registry.GROUPS["method"])
     entries = {kind: dict(registry._entries(kind)) for kind in registry.GROUPS}
     entries["method"]["interpolation"] = entry
     monkeypatch.setattr(registry, "_entries", entries.__getitem__)

@@ -9,8 +9,9 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import KINDS
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.settings import Setting, validated
+from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -20,9 +21,8 @@ METHODS = names("method")
 
 
 def _declares(method: str, model: str) -> bool:
-    """Whether the method has settings for models of that kind, if it has any at all."""
-    settings = component("method", method).settings
-    return bool(settings(component("model", model).kind)) or not any(map(settings, KINDS))
+    """Whether the method has settings for models of that kind."""
+    return component("model", model).kind in component("method", method).settings
 
 
 PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(method, m)]
@@ -64,9 +64,8 @@ class Pair:
         return self._fitted[key]
 
     def fresh_fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:
-        differing = self.method.presets(self.model)[preset]
         chosen = SETTINGS.get(self.name, {})
-        settings = validated(self.name, self.method.settings(self.model.kind), chosen, differing)
+        settings = validated(self.method, self.model.kind, chosen, preset)
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)
         start = self.model.starts[0]
@@ -95,41 +94,49 @@ def pair(request: pytest.FixtureRequest) -> Pair:
 @pytest.mark.parametrize("name", METHODS)
 def test_method_describes_itself(name: str) -> None:
     method: Method = component("method", name)
-    assert method.SUMMARY
-    assert "\n" not in method.SUMMARY
-    assert isinstance(method.REFERENCE, str)
+    assert method.name == name
+    assert method.summary
+    assert "\n" not in method.summary
+    assert isinstance(method.reference, str)
+    assert method.settings
+    assert set(method.presets) <= set(method.settings) <= set(KINDS)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", METHODS)
 def test_settings_are_documented_and_their_defaults_allowed(name: str, kind: str) -> None:
-    declared = component("method", name).settings(kind)
-    for key, setting in declared.items():
+    method: Method = component("method", name)
+    if kind not in method.settings:
+        assert method.names_of(kind) == ()
+        pytest.skip(f"{name} reduces no model of kind {kind}")
+    declared = method.settings[kind]
+    assert issubclass(declared, Settings)
+    for key, field in declared.model_fields.items():
         assert key.isidentifier()
-        assert isinstance(setting, Setting)
-        assert setting.doc
-        assert "\n" not in setting.doc
-        assert setting.kind != "text" or not setting.choices or setting.default in setting.choices
-    defaults = validated(name, declared, {})
-    assert defaults == {key: setting.default for key, setting in declared.items()}
+        assert field.description
+        assert "\n" not in field.description
+    defaults = {key: field.default for key, field in declared.model_fields.items()}
+    assert validated(method, kind, {}).model_dump() == defaults
+    # What cells store is what they are made of again.
+    assert validated(method, kind, defaults).model_dump() == defaults
 
 
 def test_presets_are_valid(pair: Pair) -> None:
-    presets = pair.method.presets(pair.model)
-    declared = pair.method.settings(pair.model.kind)
+    presets = pair.method.presets_of(pair.model.kind)
     assert "recommended" in presets
-    for settings in presets.values():
-        complete = validated(pair.name, declared, settings)
-        assert set(complete) == set(declared)
+    for preset, values in presets.items():
+        complete = validated(pair.method, pair.model.kind, {}, preset).model_dump()
+        assert set(complete) == set(pair.method.names_of(pair.model.kind))
+        assert {name: complete[name] for name in values} == values
 
 
 def test_unknown_setting_is_refused(pair: Pair) -> None:
     with pytest.raises(InputError, match="unknown setting"):
-        validated(pair.name, pair.method.settings(pair.model.kind), {"no_such_setting": 1})
+        validated(pair.method, pair.model.kind, {"no_such_setting": 1})
 
 
 def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
-    for preset in pair.method.presets(pair.model):
+    for preset in pair.method.presets_of(pair.model.kind):
         run = pair.run(pair.fit(preset))
         assert (run.status, run.message) == ("ok", "")
         samples = pair.maneuver.samples

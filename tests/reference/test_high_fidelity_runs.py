@@ -23,7 +23,7 @@ from vehiclemor.simulation.projection import (
     simulate_projected,
     without_stabilisation,
 )
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -58,7 +58,7 @@ def integrate(
     tolerance: float = 1e-9,
     longest_step: float | None = None,
 ) -> Trajectory:
-    found = model.integrate(maneuver, start, full_space(N), solver, tolerance, times, longest_step)
+    found = model.integrate(maneuver, start, whole_space(N), solver, tolerance, times, longest_step)
     assert found.status == "ok", found.message
     return found
 
@@ -361,7 +361,7 @@ def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
 @pytest.mark.parametrize("factor", [20.0, 25.0, -30.0, 50.0])
 def test_a_rack_beyond_reach_ends_the_run(vehicle, factor):
     """The linkage locks near 1.3 rad; on the branch beyond it the closures hold all the same."""
-    space = full_space(N)
+    space = whole_space(N)
     run = vehicle.integrate(
         LANE_CHANGE.perturbed(amplitude=factor), vehicle.start(), space, "explicit", 1e-6
     )

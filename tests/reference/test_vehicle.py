@@ -15,7 +15,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -273,7 +273,7 @@ def integrate(
     tolerance: float,
     times: np.ndarray,
 ) -> Trajectory:
-    found = model.integrate(maneuver, start, full_space(14), solver, tolerance, times)
+    found = model.integrate(maneuver, start, whole_space(14), solver, tolerance, times)
     assert found.status == "ok", found.message
     return found
 
@@ -422,7 +422,7 @@ def test_the_path_in_the_plane_converges_with_the_order_of_the_method(vehicle, s
     errors = []
     for step in steps:
         found = vehicle.integrate(
-            LANE_CHANGE, vehicle.start(), full_space(14), solver, 1e6, TIMES, step
+            LANE_CHANGE, vehicle.start(), whole_space(14), solver, 1e6, TIMES, step
         )
         errors.append(np.abs(found.states - exact)[:, [0, 1]].max())
     assert np.log2(errors[0] / errors[1]) > order - 1.2, errors

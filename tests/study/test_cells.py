@@ -77,7 +77,7 @@ def test_a_plug_in_error_spoils_only_its_cell(cell, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("in a plug-in")
 
-    monkeypatch.setattr(pod, "fit", broken)
+    monkeypatch.setattr(pod, "METHOD", dataclasses.replace(pod.METHOD, fit=broken))
     dataset = compute_cell(cell)
     assert dataset["status"].item() == "error"
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
@@ -160,7 +160,10 @@ def test_rows_of_different_models_keep_their_units_and_counts():
 def test_settings_of_a_method_that_refuses_the_model_are_not_judged(monkeypatch):
     from vehiclemor.reduction.methods import pod
 
-    monkeypatch.setattr(pod, "accepts", lambda model: (False, f"pod can't reduce {model.name}"))
+    refusing = dataclasses.replace(
+        pod.METHOD, refusal=lambda model: f"pod can't reduce {model.name}"
+    )
+    monkeypatch.setattr(pod, "METHOD", refusing)
     cell = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rnk": 3}, "x")
     assert cell.settings == {}
     dataset = compute_cell(cell)

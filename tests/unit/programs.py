@@ -7,7 +7,7 @@ import mpmath as mp
 import numpy as np
 import sympy as sp
 
-from vehiclemor.codegen.emit import reference_source
+from vehiclemor.codegen.kernel_text import reference_source
 from vehiclemor.symbolic.elimination import Pivots
 from vehiclemor.symbolic.program import Program
 from vehiclemor.symbolic.tape import Tape, dependencies

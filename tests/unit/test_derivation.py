@@ -14,7 +14,7 @@ from tests.unit import standard_problems
 from vehiclemor.codegen import derivation as kept
 from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation, derived
-from vehiclemor.codegen.emit import operation_counts, reference_source
+from vehiclemor.codegen.kernel_text import operation_counts, reference_source
 from vehiclemor.models import equations
 from vehiclemor.models.quantities import Quantity
 

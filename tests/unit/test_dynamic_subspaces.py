@@ -10,11 +10,11 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 N = 14
@@ -36,11 +36,11 @@ def whole_space(form, edges, mean=0.0, mixing=None):
     lifts, drops = np.zeros((windows, size, 2 * N)), np.zeros((windows, size, 2 * N))
     lifts[:, :, :size], drops[:, :, :size] = basis, np.linalg.inv(basis).T
     ranks = np.full(windows, 2 * N, dtype=np.int64)
-    return Spaces(form, np.array(edges), np.full((windows, 2 * N), mean), lifts, drops, ranks)
+    return ProjectionWindows(form, np.array(edges), np.full((windows, 2 * N), mean), lifts, drops, ranks)
 
 
 def fitted(model, start="equilibrium", maneuver=lane_change, **chosen):
-    settings = validated("pod", pod.settings("ode"), chosen)
+    settings = validated(pod.METHOD, "ode", chosen)
     pod.check(model, settings)
     return pod.fit(model, training_runs(model, maneuver, start, "matched"), settings)
 
@@ -53,7 +53,7 @@ def test_the_whole_space_gives_the_full_model(model, form, start):
     mixing = np.eye(size) + 0.1 * generator.normal(size=(size, size))
     spaces = whole_space(form, [0.0, 0.7, 2.0, 25.0], mean=0.3, mixing=mixing)
     state = model.start(start)
-    full = model.integrate(lane_change, state, full_space(N), "explicit", 1e-10, TIMES)
+    full = model.integrate(lane_change, state, whole_space(N), "explicit", 1e-10, TIMES)
     reduced = model.integrate(lane_change, state, spaces, "explicit", 1e-10, TIMES)
     assert reduced.status == "ok"
     np.testing.assert_allclose(reduced.states, full.states, rtol=1e-7, atol=1e-6)
@@ -62,12 +62,12 @@ def test_the_whole_space_gives_the_full_model(model, form, start):
 def test_only_the_subspace_counts_not_its_basis(model):
     reduced = fitted(model, "dropped")
     spaces, generator = reduced.spaces, np.random.default_rng(1)
-    lifts, drops = spaces.lifts.copy(), spaces.drops.copy()
+    lifts, drops = spaces.trial_basis.copy(), spaces.test_basis.copy()
     for k, rank in enumerate(spaces.ranks // 2):
         mixing = np.linalg.qr(generator.normal(size=(rank, rank)))[0] * 2.0
         lifts[k, :rank] = mixing @ lifts[k, :rank]
         drops[k, :rank] = np.linalg.inv(mixing).T @ drops[k, :rank]
-    mixed = Spaces(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
+    mixed = ProjectionWindows(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
     state = model.start("dropped")
     runs = [
         model.integrate(lane_change, state, s, "explicit", 1e-10, TIMES) for s in (spaces, mixed)
@@ -94,7 +94,7 @@ def test_basis_is_orthonormal_in_its_inner_product(model):
         reduced = fitted(model, formulation=formulation, inner_product=inner_product)
         for k, basis in enumerate(reduced.bases[:6]):
             rank = basis.rank
-            product = reduced.spaces.drops[k, :rank] @ reduced.spaces.lifts[k, :rank].T
+            product = reduced.spaces.test_basis[k, :rank] @ reduced.spaces.trial_basis[k, :rank].T
             np.testing.assert_allclose(product, np.eye(rank), atol=1e-9)
 
 
@@ -145,7 +145,7 @@ def test_weighted_basis_spans_what_pymor_finds(model):
     assert np.abs(difference).max() < 1e-6
 
 
-def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
+def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = whole_space(STATE, [0.0, 25.0])
     jacobian = linearisation.reduced_jacobian(model, whole, 0, model.start())
@@ -155,8 +155,8 @@ def test_growth_rates_of_the_whole_space_are_the_eigenvalues(model):
     assert np.sort(found.real)[: fast.sum()] == pytest.approx(
         np.sort(expected.real[fast]), rel=1e-4
     )
-    assert len(reduced.growth_rates) == 50
-    assert reduced.growth_rate == reduced.growth_rates.max()
+    assert len(reduced.spectral_abscissas) == 50
+    assert reduced.spectral_abscissa == reduced.spectral_abscissas.max()
 
 
 def test_a_tighter_rank_tolerance_drops_modes_of_noise(model):

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from tests.unit.programs import function_of, pivot_shares, run
-from vehiclemor.codegen.emit import operation_counts, reference_source
+from vehiclemor.codegen.kernel_text import operation_counts, reference_source
 from vehiclemor.models.double_wishbone.equations import PIVOTS
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.elimination import (

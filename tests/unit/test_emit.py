@@ -10,7 +10,7 @@ import sympy as sp
 
 from tests.oracles.kinematics import precise_jacobian, precise_residual
 from tests.unit.programs import precise, run
-from vehiclemor.codegen.emit import (
+from vehiclemor.codegen.kernel_text import (
     OPERATIONS,
     kernel_source,
     operation_counts,

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.vehicle.feature_kernels import diagonal_blocks
 from vehiclemor.reduction.vehicle.features import Features
-from vehiclemor.simulation.exponential_functions import exponential_tables, phi_functions
-from vehiclemor.simulation.spaces import whole_space
+from vehiclemor.simulation.integrators.exponential_functions import exponential_tables, phi_functions
+from vehiclemor.simulation.projection_windows import whole_space
 
 
 def augmented(matrix: np.ndarray) -> list[np.ndarray]:

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity.independent import PLACES
-from vehiclemor.reduction.vehicle.frozen_constants import frozen_encoder, frozen_kernels
-from vehiclemor.reduction.vehicle.independent import independent_kernels
+from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
+from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 

@@ -22,7 +22,7 @@ from tests.unit.standard_problems import (
 from vehiclemor.simulation import explicit_loops as pair
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2, Tableau
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -36,7 +36,7 @@ def model(standard) -> DynamicModel:
 
 
 def integrate(model, man, solver, tolerance, times, longest_step=None) -> Trajectory:
-    space = full_space(len(model.coordinates))
+    space = whole_space(2 * len(model.coordinates))
     return model.integrate(man, model.start(), space, solver, tolerance, times, longest_step)
 
 

@@ -15,9 +15,10 @@ from vehiclemor.codegen import cache, straight_line
 from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.projection.dynamic import check_subspace
+from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.registry import component
 from vehiclemor.simulation import build, newton_loops, system_loops
-from vehiclemor.simulation.spaces import Spaces, full_space
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.system_loops import COORDINATES
 
@@ -37,7 +38,7 @@ LINKED = (
     """
 import json
 import numpy as np
-from vehiclemor.codegen.cache import load_module
+from vehiclemor.codegen.object_cache import load_module
 from vehiclemor.codegen.link import linked_source
 from vehiclemor.simulation import newton_loops
 
@@ -54,7 +55,7 @@ ADDRESSED = (
     """
 import json
 import numpy as np
-from vehiclemor.codegen.cache import load_module
+from vehiclemor.codegen.object_cache import load_module
 from vehiclemor.codegen.link import kernels_source, loops_source
 from vehiclemor.simulation import run_loops, system_loops
 
@@ -120,7 +121,7 @@ def test_all_dynamic_models_run_in_the_same_loops(standard) -> None:
     for solver in SOLVERS:
         other.simulate(quiet, solver=solver, tolerance=1)
     x.flags.writeable = False
-    space = full_space(len(vehicle.coordinates))
+    space = whole_space(2 * len(vehicle.coordinates))
     vehicle.integrate(
         component("maneuver", "straight_ahead"), x, space, "ros34pw2", 1e-3, longest_step=1
     )
@@ -141,14 +142,14 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking: str) 
     whole = standard()
     shapes = {k: v for k, v in whole.equations.shapes.items() if k != lacking}
     model = replace(whole, equations=replace(whole.equations, shapes=shapes))
-    settings = {"rank": 1, "snapshots": 2, "formulation": "state", "inner_product": "range"}
+    settings = DynamicPodSettings(rank=1, snapshots=2, formulation="state", inner_product="range")
     check_subspace(model, settings)
     for wrong in ({"formulation": "coordinates"}, {"inner_product": "energy"}):
         with pytest.raises(InputError, match=f"has no {lacking}"):
-            check_subspace(model, settings | wrong)
+            check_subspace(model, settings.model_copy(update=wrong))
     nothing = np.zeros((1, 1, 4))
     edges, rank = np.array([0.0, 9.0]), np.array([2])
-    spaces = Spaces(COORDINATES, edges, np.zeros((1, 4)), nothing, nothing, rank)
+    spaces = ProjectionWindows(COORDINATES, edges, np.zeros((1, 4)), nothing, nothing, rank)
     quiet = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
     with pytest.raises(InputError, match=f"has no {lacking}"):
         model.integrate(quiet, model.start(), spaces, "explicit", 1e-3)

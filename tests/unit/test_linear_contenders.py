@@ -155,7 +155,7 @@ def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method
     outputs = dict(zip(model.outputs, trajectory.outputs.T, strict=True))
     assert np.abs(outputs["lateral_position"]).max() < 1e-8
     assert outputs["longitudinal_position"][-1] == pytest.approx(22.0 * trajectory.time[-1])
-    assert reduced.growth_rate == 0.0
+    assert reduced.spectral_abscissa == 0.0
     assert reduced.offline.evaluations == 2 * (len(shape.kept) + len(model.inputs))
 
 

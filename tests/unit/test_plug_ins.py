@@ -29,7 +29,7 @@ def plug_in(tmp_path, monkeypatch):
         ("def fit(:", "SyntaxError"),
         ("raise RuntimeError('at import')", "RuntimeError: at import"),
         ("import no_such_package", "no_such_package"),
-        ("SUMMARY = 'half'", "has no REFERENCE"),
+        ("summary = 'half'", "has no reference"),
     ],
 )
 def test_a_broken_plug_in_is_named_and_harmless(plug_in, text, words):
@@ -46,4 +46,4 @@ def test_no_plug_in_takes_a_built_in_name(monkeypatch):
     real = registry.entry_points(group=registry.GROUPS["method"])
     monkeypatch.setattr(registry, "entry_points", lambda **_: [*real, thief])
     found = registry._entries.__wrapped__("method")
-    assert found["pod"].value == "vehiclemor.reduction.methods.pod"
+    assert found["pod"].value == "vehiclemor.reduction.methods.pod:METHOD"

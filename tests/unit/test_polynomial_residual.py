@@ -161,14 +161,14 @@ def test_run_without_a_solution_is_recorded(model: AlgebraicModel, nominal: Mane
 def test_model_with_inputs_that_are_not_linear_is_refused(
     model: AlgebraicModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert polynomial_residual.accepts(model) == (True, "")
+    assert polynomial_residual.METHOD.accepts(model) == (True, "")
     real = AlgebraicModel.residual
 
     def bent(self, q, u):
         return real(self, q, u) + 0.01 * np.asarray(u)[1] ** 2
 
     monkeypatch.setattr(AlgebraicModel, "residual", bent)
-    accepted, reason = polynomial_residual.accepts(model)
+    accepted, reason = polynomial_residual.METHOD.accepts(model)
     assert not accepted
     assert "linearly" in reason
 

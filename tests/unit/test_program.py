@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from tests.unit.programs import inlined, precise, random_program, run
-from vehiclemor.codegen.emit import operation_counts, reference_source
+from vehiclemor.codegen.kernel_text import operation_counts, reference_source
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 

@@ -20,11 +20,11 @@ from vehiclemor.reduction.methods import (
     quasi_steady_wheels,
     softened_slip,
 )
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.linearisation import reduced_jacobian
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.steering_maneuvers import rack_step_steer, step_steer
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -32,15 +32,15 @@ TIGHT = 1e-8
 
 
 def fitted(method, model, training=(), **settings):
-    complete = validated(method.__name__, method.settings(model.kind), settings)
-    method.check(model, complete)
+    complete = validated(method.METHOD, model.kind, settings)
+    method.METHOD.check(model, complete)
     return method.fit(model, training, complete)
 
 
 def jacobian(model, reduced):
     """Of the reduced equations at straight running."""
     start = model.start()
-    y = reduced.spaces.drops[0] @ (start - reduced.spaces.means[0])
+    y = reduced.spaces.test_basis[0] @ (start - reduced.spaces.means[0])
     return reduced_jacobian(model, reduced.spaces, 0, y)
 
 
@@ -87,7 +87,7 @@ def test_softening_lowers_the_fastest_eigenvalue_by_its_factor(name):
     model = vm.model(name)
     fastest = [
         np.abs(np.linalg.eigvals(VehicleShape(m).linearised.a)).max()
-        for m in (model, fitted(softened_slip, model, factor=2.0).softened)
+        for m in (model, softened_slip.softened(model, 2.0))
     ]
     assert fastest[0] / fastest[1] == pytest.approx(2.0, rel=0.05)
 
@@ -151,7 +151,7 @@ def test_slaved_spins_keep_straight_runs_at_every_speed(vehicle, speed):
 
 def test_equations_in_the_heading_frame_are_the_vehicle_s(detailed):
     shape = VehicleShape(detailed)
-    space = full_space(len(detailed.coordinates))
+    space = whole_space(2 * len(detailed.coordinates))
     maneuver, times = rack_step_steer.perturbed(1.0, 1.5), np.linspace(0.0, 5.0, 6)
     reduced = fitted(quasi_steady_wheels, detailed)
     full = detailed.simulate(maneuver, times=times, tolerance=TIGHT)
@@ -179,7 +179,7 @@ def test_straight_runs_of_the_detailed_vehicle_head_anywhere(detailed):
 
 def test_balanced_modes_are_biorthogonal_and_ordered(vehicle, training):
     reduced = fitted(balanced_pod, vehicle, training, rank=8)
-    lift, drop = reduced.spaces.lifts[0], reduced.spaces.drops[0]
+    lift, drop = reduced.spaces.trial_basis[0], reduced.spaces.test_basis[0]
     assert reduced.effective_rank == 8 + 1
     # And 7 quadratures.
     assert len(lift) == 8 + 1 + 7
@@ -266,7 +266,7 @@ def test_all_modes_of_the_coordinates_are_the_full_model(vehicle, training):
 
 def test_global_modes_are_orthonormal_in_energy_beside_place_and_heading(vehicle, training):
     reduced = fitted(global_pod, vehicle, training)
-    lift, drop = reduced.spaces.lifts[0, :12, :14], reduced.spaces.drops[0, :12, :14]
+    lift, drop = reduced.spaces.trial_basis[0, :12, :14], reduced.spaces.test_basis[0, :12, :14]
     np.testing.assert_allclose(drop @ lift.T, np.eye(12), rtol=0, atol=1e-12)
     mass = vehicle.mass_matrix(vehicle.start())
     np.testing.assert_allclose(lift[4:] @ mass @ lift[4:].T, np.eye(8), rtol=0, atol=1e-12)
@@ -298,6 +298,6 @@ def test_ranks_beyond_the_states_are_refused(vehicle):
     ids=lambda m: m.__name__.rpartition(".")[2],
 )
 def test_a_model_that_is_no_vehicle_is_refused(method):
-    accepted, reason = method.accepts(SimpleNamespace(name="box", kind="ode", planar=()))
+    accepted, reason = method.METHOD.accepts(SimpleNamespace(name="box", kind="ode", planar=()))
     assert not accepted
     assert "no vehicle" in reason

@@ -47,7 +47,7 @@ def test_nearest_names_come_best_first() -> None:
 @pytest.fixture
 def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     found = {
-        ("vehiclemor.methods", "mine"): "vehiclemor.reduction.methods.replay",
+        ("vehiclemor.methods", "mine"): "vehiclemor.reduction.methods.replay:METHOD",
         ("vehiclemor.methods", "empty"): "json",
         ("vehiclemor.methods", "gone"): "no_such_package.method",
         ("vehiclemor.maneuvers", "nothing"): "json:no_such_object",
@@ -66,12 +66,12 @@ def test_plugins_register_as_built_ins_do() -> None:
     from vehiclemor.reduction.methods import replay
 
     assert names("method") == ["empty", "gone", "mine"]
-    assert component("method", "mine") is replay
+    assert component("method", "mine") is replay.METHOD
 
 
 @pytest.mark.usefixtures("plugins")
 def test_plugin_that_is_no_method_is_one_line() -> None:
-    with pytest.raises(InputError, match=r"method 'empty' \(json\) has no SUMMARY"):
+    with pytest.raises(InputError, match=r"method 'empty' \(json\) has no summary"):
         component("method", "empty")
 
 

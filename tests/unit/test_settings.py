@@ -1,26 +1,39 @@
 """Settings of methods are checked at the border: kind, bounds, choices, names."""
 
+from typing import Annotated, Literal
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.settings import Setting, parsed, validated
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import Settings, one_of
+from vehiclemor.reduction.validation import parsed, validated
 
-DECLARED = {
-    "rank": Setting("integer", 3, "how many", minimum=1),
-    "period": Setting("number", 5.0, "how long", minimum=0.0, above=True),
-    "mode": Setting("text", "fast", "how", choices=("fast", "slow")),
-    "label": Setting("text", "", "any text"),
-}
+
+class Declared(Settings):
+    rank: int = Field(3, ge=1, description="how many")
+    period: float = Field(5.0, gt=0.0, description="how long")
+    mode: Literal["fast", "slow"] = Field("fast", description="how")
+    label: str = Field("", description="any text")
+    order: Annotated[str, one_of(("up", "down"))] = "up"
+    share: float = Field(0.5, ge=0.0, le=1.0)
+
+
+def declared(**presets: dict) -> Method:
+    return Method("m", "", {"ode": Declared}, fit=lambda *_: None, presets={"ode": presets})
 
 
 def test_defaults_then_preset_then_given() -> None:
-    assert validated("m", DECLARED, {}) == {"rank": 3, "period": 5.0, "mode": "fast", "label": ""}
-    preset = {"rank": 4, "mode": "slow"}
-    settings = validated("m", DECLARED, {"rank": 5}, preset)
-    assert settings == {"rank": 5, "period": 5.0, "mode": "slow", "label": ""}
+    others = {"label": "", "order": "up", "share": 0.5}
+    plain = validated(declared(), "ode", {}).model_dump()
+    assert plain == {"rank": 3, "period": 5.0, "mode": "fast", **others}
+    method = declared(mine={"rank": 4, "mode": "slow"})
+    settings = validated(method, "ode", {"rank": 5}, "mine").model_dump()
+    assert settings == {"rank": 5, "period": 5.0, "mode": "slow", **others}
 
 
 @pytest.mark.parametrize(
@@ -39,28 +52,32 @@ def test_defaults_then_preset_then_given() -> None:
         ("mode", "quick", "m: mode is 'quick'; allowed: fast, slow"),
         ("mode", 1, "m: mode is 1; allowed: fast, slow"),
         ("label", 1, "m: label is 1; allowed: text"),
+        ("order", "{left}", "m: order is '{left}'; allowed: up, down"),
+        ("share", 2, "m: share is 2; it must be at most 1"),
         ("rang", 3, "unknown setting of m 'rang'; did you mean rank?"),
     ],
 )
 def test_wrong_setting_is_one_line(name: str, value: object, message: str) -> None:
     with pytest.raises(InputError) as error:
-        validated("m", DECLARED, {name: value})
+        validated(declared(), "ode", {name: value})
     assert str(error.value) == message
 
 
 def test_wrong_preset_is_caught_too() -> None:
     with pytest.raises(InputError, match="rank is 0"):
-        validated("m", DECLARED, {}, {"rank": 0})
+        validated(declared(mine={"rank": 0}), "ode", {}, "mine")
+    with pytest.raises(InputError, match="unknown preset of m 'mime'; did you mean mine"):
+        validated(declared(mine={}), "ode", {}, "mime")
 
 
 @given(rank=st.integers(1, 10**9), period=st.floats(1e-9, 1e9))
 def test_allowed_numbers_pass_with_their_declared_type(rank: int, period: float) -> None:
-    settings = validated("m", DECLARED, {"rank": float(rank), "period": period})
-    assert settings["rank"] == rank
-    assert type(settings["rank"]) is int
-    assert settings["period"] == period
-    assert type(settings["period"]) is float
-    assert type(validated("m", DECLARED, {"period": 2})["period"]) is float
+    settings = validated(declared(), "ode", {"rank": float(rank), "period": period})
+    assert settings.rank == rank
+    assert type(settings.rank) is int
+    assert settings.period == period
+    assert type(settings.period) is float
+    assert type(validated(declared(), "ode", {"period": 2}).period) is float
 
 
 @pytest.mark.parametrize(
@@ -74,8 +91,8 @@ def test_text_of_the_command_line_gets_its_kind(text: str, value: object) -> Non
 
 def test_integer_beyond_all_floats_is_one_line() -> None:
     with pytest.raises(InputError):
-        validated("m", {"rank": Setting("integer", 3, "how many", minimum=1)}, {"rank": -(10**400)})
+        validated(declared(), "ode", {"rank": -(10**400)})
 
 
 def test_numpy_integers_are_integers() -> None:
-    assert validated("m", DECLARED, {"rank": np.int64(4)})["rank"] == 4
+    assert validated(declared(), "ode", {"rank": np.int64(4)}).rank == 4

@@ -8,8 +8,8 @@ import pytest
 
 from vehiclemor.maneuvers import lane_change, rack_lane_change, straight_ahead
 from vehiclemor.reduction.methods import slow_manifold
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -17,7 +17,7 @@ from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.spaces import whole_space
+from vehiclemor.simulation.projection_windows import whole_space
 
 LANE_CHANGES = {
     "independent_suspension_vehicle": lane_change,
@@ -37,7 +37,7 @@ def vehicle() -> Any:
 
 
 def fitted(model: DynamicModel, **settings: object) -> ReducedVehicle:
-    complete = validated("slow_manifold", slow_manifold.settings(model.kind), settings)
+    complete = validated(slow_manifold.METHOD, model.kind, settings)
     runs = [TrainingRun(model, lane_change.perturbed(f, a), "equilibrium") for f, a in TRAINED_ON]
     return slow_manifold.fit(model, runs, complete)
 
@@ -155,7 +155,7 @@ def test_without_steering_the_reduced_car_drives_straight(
 
 
 def test_a_mirrored_input_is_answered_by_the_mirrored_path(reduced: ReducedVehicle) -> None:
-    left, right = (reduced.path(lane_change.perturbed(1.0, a), "equilibrium")[0] for a in (1, -1))
+    left, right = (reduced.path(lane_change.perturbed(1.0, a), "equilibrium") for a in (1, -1))
     lateral = [0, 1, 2, 3, 5, 7]
     np.testing.assert_allclose(right[:, lateral], -left[:, lateral], rtol=0, atol=1e-8)
     np.testing.assert_allclose(right[:, [4, 6]], left[:, [4, 6]], rtol=0, atol=1e-7)
@@ -200,13 +200,13 @@ def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
     goal = targets(reduced, [run], [run.at(lane_change.times)])[0]
     term, k = 16, reduced.features.states
     free = [([term], 0), ([term], k)]
-    path, _ = reduced.path(lane_change, "equilibrium")
+    path = reduced.path(lane_change, "equilibrium")
     found = _sensitivities(reduced, goal, path, free)
     for place, (_, column) in enumerate(free):
         changed = reduced.coefficients.copy()
         width = 1e-3 * np.abs(changed[:, column]).max()
         changed[term, column] += width
-        other, _ = replace(reduced, coefficients=changed).path(lane_change, "equilibrium")
+        other = replace(reduced, coefficients=changed).path(lane_change, "equilibrium")
         difference = (other - path)[::5] / width
         size = np.abs(difference).max(axis=0)
         wrong = np.abs(found[:, :, place] - difference).max(axis=0)
@@ -222,7 +222,7 @@ def test_sweeps_bring_reduced_runs_nearer_to_the_training_runs(vehicle: Any) -> 
     better = improved(rough, goals, [(rough.features.blocks[0][0], k)], 2)
 
     def heading_error(vehicle: ReducedVehicle) -> float:
-        paths = [vehicle.path(g.run.maneuver, g.run.start)[0] for g in goals]
+        paths = [vehicle.path(g.run.maneuver, g.run.start) for g in goals]
         return max(
             float(np.abs(p[:, k] - g.states[:, k]).max()) for p, g in zip(paths, goals, strict=True)
         )

@@ -13,7 +13,7 @@ from numba.core.errors import TypingError
 
 from tests.unit.programs import run
 from vehiclemor.codegen import arctangent, exponential, sincos
-from vehiclemor.codegen.emit import kernel_source, work_size
+from vehiclemor.codegen.kernel_text import kernel_source, work_size
 from vehiclemor.codegen.link import linked_source
 from vehiclemor.codegen.straight_line import (
     call_machine,

@@ -6,8 +6,8 @@ import pytest
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import POLICIES, training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
@@ -50,7 +50,7 @@ def test_snapshots_of_several_runs_are_put_side_by_side(
     model: AlgebraicModel, nominal: Maneuver
 ) -> None:
     method, start = component("method", "pod"), model.starts[0]
-    settings = validated("pod", method.settings(model.kind), {"rank": 3})
+    settings = validated(method, model.kind, {"rank": 3})
     pairs = [(1.0, 1.0), (1.0, 0.5)]
     together = method.fit(model, training_runs(model, nominal, start, "set", pairs), settings)
     means = [

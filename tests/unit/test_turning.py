@@ -60,10 +60,10 @@ def test_a_vehicle_that_heads_elsewhere_moves_alike(model, angle):
     x = model.initial["dropped"].copy()
     x[26:48] += np.linspace(-0.5, 0.5, 22)
     u = np.array([0.01, 0.05, -0.2])
-    elsewhere = turned(x, angle, model.turning)
-    elsewhere[model.turning[0]] += angle
+    elsewhere = turned(x, angle, model.rotating)
+    elsewhere[model.rotating[0]] += angle
     expected = model.derivative(x, u)
     # The derivative has the rates of the pairs in the same places.
-    expected = turned(expected, angle, model.turning)
+    expected = turned(expected, angle, model.rotating)
     found = model.derivative(elsewhere, u)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())

@@ -27,7 +27,7 @@ INTRINSICS = {name: getattr(loop_intrinsics, name) for name in ("vector", "matri
 @global_compiler_lock
 def compiled_module(module: ir.Module, libraries: Sequence[Any] = ()) -> bytes:
     """Object code of an LLVM module; functions of the libraries are linked into it."""
-    context = cpu_target.target_context
+    context: Any = cpu_target.target_context
     library = context.codegen().create_library(module.name)
     library.enable_object_caching()
     module.triple = context.codegen().magic_tuple()[0]
@@ -95,7 +95,7 @@ def _numba_type(declared: Any) -> Any:
 
 def _export(module: ir.Module, name: str, described: Any) -> None:
     """A C function that takes the arguments of a compiled one from an array of words."""
-    context = cpu_target.target_context
+    context: Any = cpu_target.target_context
     kind = context.call_conv.get_function_type(described.restype, described.argtypes)
     inner = ir.Function(module, kind, described.llvm_func_name)
     outer = ir.Function(module, ir.FunctionType(WORD, [WORD.as_pointer()]), name)
@@ -106,7 +106,7 @@ def _export(module: ir.Module, name: str, described: Any) -> None:
         return builder.load(builder.gep(outer.args[0], [WORD(next(place))]))
 
     def taken(wanted: Any) -> Any:
-        if isinstance(wanted, types.BaseTuple):
+        if hasattr(wanted, "types"):
             return context.make_tuple(builder, wanted, [taken(kind) for kind in wanted.types])
         if isinstance(wanted, types.Array):
             return _array(context, builder, wanted, word)

@@ -104,10 +104,7 @@ def _read(content: bytes) -> Derivation:
         written[key] = tuple(Quantity(**entry) for entry in written[key])
     written["shapes"] = {key: tuple(shape) for key, shape in written["shapes"].items()}
     written["joints"] = tuple(written["joints"])
-    written["sources"] = {
-        name: KernelSource(
-            **{key: tuple(v) if isinstance(v, list) else v for key, v in kernel.items()}
-        )
-        for name, kernel in written["sources"].items()
-    }
+    for kernel in written["sources"].values():
+        kernel |= {key: tuple(kernel[key]) for key in ("arguments", "sizes")}
+    written["sources"] = {key: KernelSource(**kernel) for key, kernel in written["sources"].items()}
     return Derivation(**{field.name: written[field.name] for field in fields(Derivation)})

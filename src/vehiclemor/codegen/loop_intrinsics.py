@@ -97,7 +97,8 @@ def inlined_kernel(text: str) -> Any:
             emit(kernel, builder, dict(zip(kernel.pointers, pointers, strict=True)))
             return context.get_dummy_value()
 
-        return types.void(types.StarArgTuple.from_types(arrays)), generate
+        void: Any = types.void
+        return void(types.StarArgTuple.from_types(arrays)), generate
 
     return execute
 

@@ -1,22 +1,24 @@
-"""The interface that every reduction method implements.
+"""What every reduction method declares, and what its fit gives.
 
-A method is a module (or any object) with the attributes of `Method`; its entry point in the group
-`vehiclemor.methods` gives it a name.
+The entry point of a method, in the group `vehiclemor.methods`, names a `Method`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
+
+Presets = Mapping[str, Mapping[str, Value]]
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,20 @@ class Offline:
 
     seconds: float = 0.0
     evaluations: int = 0
+
+
+def offline_cost(
+    began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0
+) -> Offline:
+    """Cost since `began` (`time.perf_counter()`), with the evaluations of training runs.
+
+    Parameters
+    ----------
+    further
+        Evaluations of the full model's equations besides those of the runs.
+    """
+    evaluations = sum(run.counts[model.evaluations] for run in runs) + further
+    return Offline(time.perf_counter() - began, evaluations)
 
 
 class ReducedModel(Protocol):
@@ -57,33 +73,61 @@ class ReducedModel(Protocol):
         ...
 
 
-class Method(Protocol):
-    """A reduction method."""
+def never_refused(model: Any) -> str:  # noqa: ARG001
+    """Every model of a kind that the method has settings for can be reduced."""
+    return ""
 
-    SUMMARY: str
-    REFERENCE: str
 
-    def settings(self, kind: str) -> Mapping[str, Setting]:
-        """Settings for models of that kind; none for a kind that it doesn't accept."""
-        ...
+def fits_all(model: Model, settings: Any) -> None:
+    """All validated settings fit every model."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A reduction method.
+
+    Attributes
+    ----------
+    name
+        As registered.
+    summary
+        One line.
+    settings
+        Kind of model -> class of its settings.  A kind that the method can't reduce has none.
+    fit
+        (model, training runs, settings) -> reduced model.
+    reference
+        DOI of the publication, if there is one.
+    refusal
+        Model of such a kind -> why the method can't reduce it all the same; empty if it can.
+    check
+        (model, settings): raises `InputError` if valid settings don't fit the model or each other.
+    presets
+        Kind of model -> name of a preset -> values that differ from the defaults.  The preset
+        `recommended` is the defaults where it isn't named.
+    """
+
+    name: str
+    summary: str
+    settings: Mapping[str, type[Settings]]
+    fit: Callable[[Any, Sequence[TrainingRun], Any], ReducedModel]
+    reference: str = ""
+    refusal: Callable[[Any], str] = never_refused
+    check: Callable[[Any, Any], None] = fits_all
+    presets: Mapping[str, Presets] = field(default_factory=dict)
 
     def accepts(self, model: Model) -> tuple[bool, str]:
-        """Whether the method can reduce the model, and why not."""
-        ...
+        """Whether the method can reduce a model, and why not."""
+        if model.kind not in self.settings:
+            kinds = " or ".join(self.settings)
+            return False, f"{self.name} reduces kind {kinds}; {model.name} is of kind {model.kind}"
+        reason = self.refusal(model)
+        return not reason, reason
 
-    def presets(self, model: Model) -> Mapping[str, Mapping[str, Value]]:
-        """Preset name -> settings that differ from the declared defaults."""
-        ...
+    def presets_of(self, kind: str) -> Presets:
+        """Presets for models of a kind: name -> values that differ from the defaults."""
+        return {"recommended": {}, **self.presets.get(kind, {})}
 
-    def check(self, model: Model, settings: Mapping[str, Value]) -> None:
-        """Raise `InputError` if the settings don't fit the model."""
-        ...
-
-    def fit(
-        self,
-        model: Model,
-        training: Sequence[TrainingRun],
-        settings: Mapping[str, Value],
-    ) -> ReducedModel:
-        """Make a reduced model from training runs."""
-        ...
+    def names_of(self, kind: str) -> tuple[str, ...]:
+        """Names of the settings for models of a kind."""
+        return tuple(self.settings[kind].model_fields) if kind in self.settings else ()

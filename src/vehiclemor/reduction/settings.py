@@ -1,103 +1,77 @@
-"""Settings of methods: declared with kind, default and bounds, validated at the border."""
+"""What the settings of all methods share: one pydantic class by method and kind of model."""
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from __future__ import annotations
+
+from typing import Annotated
 
 import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
-from vehiclemor.errors import InputError
-from vehiclemor.registry import unknown
+from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
 
 Value = int | float | str
 LARGEST_NUMBER = 1e300
 
 
-@dataclass(frozen=True)
-class Setting:
-    """One named setting of a method.
+class Settings(BaseModel):
+    """Settings of a method: a subclass declares each with its type, default, bounds and meaning."""
 
-    Attributes
-    ----------
-    kind
-        `integer`, `number`, or `text` (one of `choices`, any text if there are none).
-    default
-        Value where the user names none.
-    doc
-        One line: meaning and unit.
-    minimum
-        Smallest allowed number; `above` if it is itself not allowed.
-    """
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    kind: Literal["integer", "number", "text"]
-    default: Value
-    doc: str
-    minimum: float | None = None
-    above: bool = False
-    choices: tuple[str, ...] = ()
-
-
-def validated(
-    method: str,
-    declared: Mapping[str, Setting],
-    given: Mapping[str, object],
-    defaults: Mapping[str, Value] | None = None,
-) -> dict[str, Value]:
-    """All settings of a method: given values checked, the others at their defaults.
-
-    Raises
-    ------
-    InputError
-        If a name is not declared, or a value has the wrong kind or is out of bounds.
-    """
-    for name in given:
-        if name not in declared:
-            raise unknown(f"setting of {method}", name, declared)
-    settings: dict[str, Value] = {}
-    for name, setting in declared.items():
-        start = (defaults or {}).get(name, setting.default)
-        settings[name] = _checked(f"{method}: {name}", setting, given.get(name, start))
-    return settings
-
-
-def parsed(text: str) -> object:
-    """A value from the command line: an integer, a number or text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
-
-
-def _checked(where: str, setting: Setting, value: object) -> Value:
-    if setting.kind == "text":
-        if not isinstance(value, str) or (setting.choices and value not in setting.choices):
-            allowed = ", ".join(setting.choices) or "text"
-            raise InputError(f"{where} is {value!r}; allowed: {allowed}")
+    @field_validator("*", mode="before")
+    @classmethod
+    def _plain_number(cls, value: object) -> object:
+        """NumPy's numbers as Python's, and 3.0 as 3: the field's own type decides what it is."""
+        if isinstance(value, np.integer | np.floating):
+            value = value.item()
+        if isinstance(value, int | float) and LARGEST_NUMBER < abs(value) < np.inf:
+            raise ValueError(f"is beyond +-{LARGEST_NUMBER:g}")
+        if isinstance(value, float):
+            if not np.isfinite(value):
+                raise ValueError(f"is {value}, not finite")
+            return int(value) if value.is_integer() else value
         return value
-    if isinstance(value, np.integer | np.floating):
-        value = value.item()
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{where} is {value!r}, not {_a(setting.kind)}")
-    if abs(value) > LARGEST_NUMBER and abs(value) != math.inf:
-        raise InputError(f"{where} is beyond +-{LARGEST_NUMBER:g}")
-    if not math.isfinite(value):
-        raise InputError(f"{where} is {value}, not finite")
-    if setting.kind == "integer":
-        if value != int(value):
-            raise InputError(f"{where} is {value!r}, not an integer")
-        value = int(value)
-    else:
-        value = float(value)
-    if setting.minimum is not None and (
-        value < setting.minimum or (setting.above and value == setting.minimum)
-    ):
-        bound = "above" if setting.above else "at least"
-        raise InputError(f"{where} is {value:g}; it must be {bound} {setting.minimum:g}")
-    return value
 
 
-def _a(kind: str) -> str:
-    return "an integer" if kind == "integer" else "a number"
+def one_of(choices: tuple[str, ...]) -> AfterValidator:
+    """Validator of a text that is one of the choices, where these stand in another place."""
+
+    def check(value: str) -> str:
+        value = ALIASES.get(value, value)
+        if value not in choices:
+            raise ValueError(f"is {value!r}; allowed: {', '.join(choices)}")
+        return value
+
+    return AfterValidator(check)
+
+
+# How a reduced system is integrated: the same two settings of all methods that have one.
+Solver = Annotated[
+    str,
+    one_of(tuple(INTEGRATORS)),
+    Field(description="as of full_order; ros34pw2 and etdrk4 freeze the Jacobian"),
+]
+# Projected systems have no Jacobian to freeze.
+ProjectedSolver = Annotated[
+    str,
+    one_of(("dopri5", "rodas4")),
+    Field(description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4"),
+]
+Tolerance = Annotated[
+    float,
+    Field(ge=1e-13, description="largest local error of a state relative to its typical size"),
+]
+
+
+class OnlineSettings(Settings):
+    """How a reduced system is integrated."""
+
+    solver: Solver = "ros34pw2"
+    tolerance: Tolerance = 1e-3
+
+
+class ProjectedSettings(Settings):
+    """How a projected system is integrated."""
+
+    solver: ProjectedSolver = "dopri5"
+    tolerance: Tolerance = 1e-4

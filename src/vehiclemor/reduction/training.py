@@ -30,6 +30,14 @@ class TrainingRun:
         """Full-order trajectory, solved exactly at the given increasing times (samples,) in s."""
         return self.model.simulate(self.maneuver, self.start, times)
 
+    def recorded(self) -> Trajectory:
+        """Full-order trajectory at the maneuver's output times."""
+        return self.at(self.maneuver.times)
+
+    def snapshots(self, count: int) -> Trajectory:
+        """Full-order trajectory at so many equidistant times, both ends included."""
+        return self.at(np.linspace(0.0, self.maneuver.duration, count))
+
 
 def training_runs(
     model: Model,

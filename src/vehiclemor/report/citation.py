@@ -31,6 +31,6 @@ def citations() -> str:
         f"  doi     = {{{paper.doi}}},",
         "}",
     ]
-    references = {name: component("method", name).REFERENCE for name in names("method")}
+    references = {name: component("method", name).reference for name in names("method")}
     lines += ["", *(f"method {name}: doi:{doi}" for name, doi in references.items() if doi)]
     return "\n".join(lines)

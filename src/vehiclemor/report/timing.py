@@ -16,8 +16,8 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.contestants import RACES, Contestant
 from vehiclemor.simulation.build import build
@@ -75,15 +75,13 @@ def measure(model: Model, contestants: tuple[Contestant, ...], start: str) -> xr
     tolerances: list[float] = []
     for index, contestant in enumerate(contestants):
         method: Method = component("method", contestant.method)
-        preset = method.presets(model)[contestant.preset]
-        declared = method.settings(model.kind)
-        settings = validated(contestant.method, declared, contestant.settings, preset)
+        settings = validated(method, model.kind, contestant.settings, contestant.preset)
         runs = training_runs(model, maneuver, start, "nominal")
         # The first fit loads machine code and is not counted.
         candidates = [method.fit(model, runs, settings) for _ in range(FIT_ROUNDS + 1)]
         fits[index] = [candidate.offline.seconds for candidate in candidates[1:]]
         reduced.append(candidates[-1])
-        tolerances.append(float(settings.get("tolerance", np.nan)))
+        tolerances.append(float(settings.model_dump().get("tolerance", np.nan)))
     seconds = np.empty((ROUNDS + 1, len(contestants)))
     counts: list[dict[str, int]] = [{} for _ in contestants]
     status = [""] * len(contestants)

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.simulation.checks import checked_array, loop_array
-from vehiclemor.simulation.spaces import Spaces
+from vehiclemor.simulation.checks import checked_array
+from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.integrators.structures import Signal
+from vehiclemor.simulation.projection_windows import ProjectionWindows
 
 if TYPE_CHECKING:
     from vehiclemor.simulation.dynamic import DynamicModel
@@ -20,12 +22,16 @@ def jacobian(model: DynamicModel, x: Any, u: Any) -> np.ndarray:
     return model.system.jacobian(x, u)
 
 
-def reduced_jacobian(model: DynamicModel, spaces: Spaces, window: int, y: np.ndarray) -> np.ndarray:
+def reduced_jacobian(
+    model: DynamicModel, windows: ProjectionWindows, window: int, y: np.ndarray
+) -> np.ndarray:
     """Jacobian of one window's reduced system at y (dim,), all inputs zero."""
-    dim = len(y)
+    dim, n = len(y), 2 * len(model.coordinates)
     nothing = np.zeros((1, len(model.inputs), 6))
-    signal = (np.array([0.0, 1.0]), np.array([0, 1]), nothing)
-    space = tuple(loop_array(part[window]) for part in spaces.arrays[:3])
+    signal = Signal(np.array([0.0, 1.0]), np.array([0, 1]), nothing)
+    loop = catalogue.rhs_loop(windows.formulation)
+    equations = model.system.called(windows.formulation, "")
+    buffer = np.empty(catalogue.problem_size(n, len(model.inputs)))
     columns = []
     for j in range(dim):
         step = 1e-6 * max(1.0, abs(y[j]))
@@ -33,9 +39,7 @@ def reduced_jacobian(model: DynamicModel, spaces: Spaces, window: int, y: np.nda
         for sign in (1.0, -1.0):
             shifted, image = y.copy(), np.empty(dim)
             shifted[j] += sign * step
-            model.loops.reduced_slope(
-                spaces.form, 0.0, 0, shifted, dim, signal, *space, model.machine, image
-            )
+            loop(shifted, equations, signal, windows.subspaces, window, buffer, image)
             sides.append(image)
         columns.append((sides[0] - sides[1]) / (2.0 * step))
     return np.column_stack(columns)

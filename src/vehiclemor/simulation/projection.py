@@ -17,7 +17,7 @@ from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
-from vehiclemor.simulation.spaces import full_space
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Trajectory
 
 GAINS = ("baumgarte_a", "baumgarte_b")
@@ -98,7 +98,7 @@ def simulate_projected(
     times, inputs = maneuver.times, maneuver.at(maneuver.times)
     x = projected_state(free, model.start(start), inputs[0])
     path, counts = [x], np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-    space = full_space(len(model.coordinates))
+    space = whole_space(2 * len(model.coordinates))
     for (a, b), u in zip(pairwise(times), inputs[1:], strict=True):
         part = free.integrate(_later(maneuver, a, b), x, space, "explicit", tolerance)
         if part.status != "ok":

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.loops import Loop, Ready, ready
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
 from vehiclemor.simulation.input_splines import signal_of
@@ -238,6 +238,4 @@ class System:
             np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, bool(fused))),
             np.empty(dim + 4, dtype=np.int64),
         )
-        modules = catalogue.loop_modules(chosen, windows.formulation, bool(fused))
-        return loops(modules, ("integrate",))["integrate"], arguments
-
+        return catalogue.time_loop(chosen, windows.formulation, bool(fused)), arguments

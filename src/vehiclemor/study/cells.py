@@ -3,7 +3,6 @@
 import hashlib
 import itertools
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,8 +12,9 @@ import numpy as np
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Setting, Value, validated
+from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import POLICIES
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -120,15 +120,12 @@ def make_cell(
     accepted, _ = method.accepts(model)
     # A refusal is a result: what was set for a model of another kind can't be judged here.
     if accepted:
-        presets = method.presets(model)
-        if preset not in presets:
-            raise unknown(f"preset of {method_name}", preset, presets)
-        complete = validated(method_name, method.settings(model.kind), settings, presets[preset])
+        complete = validated(method, model.kind, settings, preset).model_dump()
     model.start(start)
     if training not in POLICIES:
         raise unknown("training policy", training, POLICIES)
     if accepted and must_fit:
-        method.check(model, complete)
+        method.check(model, validated(method, model.kind, complete))
     for pair in training_set:
         maneuver.perturbed(*pair)
     if (training == "set") != bool(training_set):
@@ -188,8 +185,8 @@ def _expand(name: str, study: StudyFile) -> Grid:
     dimensions["start"] = list(study.start or [model.starts[0]])
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
-    declared: dict[str, Mapping[str, Setting]] = {
-        label: component("method", entry.method).settings(model.kind)
+    declared: dict[str, tuple[str, ...]] = {
+        label: component("method", entry.method).names_of(model.kind)
         for label, entry in methods.items()
     }
     known_settings = set().union(*declared.values())
@@ -241,7 +238,7 @@ def _some_fits(model: Model, cells: list[Cell]) -> None:
         if not method.accepts(model)[0]:
             return
         try:
-            method.check(model, cell.settings)
+            method.check(model, validated(method, model.kind, cell.settings))
         except InputError as error:
             first = first or error
         else:

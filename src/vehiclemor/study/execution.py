@@ -13,6 +13,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import largest, rms, signal_range
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -53,7 +54,8 @@ def compute_cell(
     if not accepted:
         return _failed(model, maneuver, cell, "rejected", reason)
     try:
-        method.check(model, cell.settings)
+        settings = validated(method, model.kind, cell.settings)
+        method.check(model, settings)
     except InputError as error:
         return _failed(model, maneuver, cell, "rejected", str(error))
     whose = "the full-order reference: "
@@ -61,7 +63,7 @@ def compute_cell(
         reference = model.simulate(maneuver, cell.start)
         whose = ""
         runs = training_runs(model, maneuver, cell.start, cell.training, cell.training_set)
-        reduced = method.fit(model, runs, cell.settings)
+        reduced = method.fit(model, runs, settings)
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(maneuver, cell.start)
         trajectory = reduced.simulate(maneuver, cell.start)
@@ -82,7 +84,7 @@ def compute_cell(
         approximation,
         reduced.offline,
         reduced.effective_rank,
-        float(getattr(reduced, "growth_rate", np.nan)),
+        float(getattr(reduced, "spectral_abscissa", np.nan)),
     )
 
 

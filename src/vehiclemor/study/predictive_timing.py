@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.simulation.clock import repeated
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.run_timer import repeated
 from vehiclemor.study.choice import Row
 from vehiclemor.study.executor import results_folder
 from vehiclemor.study.protocol import Protocol

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.reduction.settings import Value
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
@@ -154,11 +155,7 @@ def _contestant(
         complete: Settings = {}
         # A refused model is a result: settings for a model of another kind can't be judged here.
         if method.accepts(model)[0]:
-            presets = method.presets(model)
-            if preset not in presets:
-                raise unknown(f"preset of {entry.method}", preset, presets)
-            defaults = presets[str(preset)]
-            complete = validated(entry.method, method.settings(model.kind), settings, defaults)
+            complete = validated(method, model.kind, settings, str(preset)).model_dump()
         if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)

@@ -13,6 +13,7 @@ import numpy as np
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, VehiclemorError
 from vehiclemor.metrics import largest, rms
 from vehiclemor.reduction.interface import Method, Offline, ReducedModel
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -50,7 +51,7 @@ def fit(model: Model, trial: Trial) -> Fit:
     """Fit a candidate on its training scenarios, and on nothing else; kept for its next trial."""
     method: Method = component("method", trial.method)
     online = {name: value for name, value in trial.settings.items() if name in ONLINE}
-    declared = method.settings(model.kind)
+    declared = method.settings[model.kind].model_fields if online else {}
     common = trial.settings | {name: declared[name].default for name in online}
     fitted = _kept(trial.model, trial.method, json.dumps(common, sort_keys=True), trial.training)
     if fitted.reduced is None:
@@ -75,9 +76,10 @@ def fresh_fit(
     if not accepted:
         return Fit(None, "rejected", reason)
     try:
-        method.check(model, settings)
+        chosen = validated(method, model.kind, settings)
+        method.check(model, chosen)
         runs = [training_run(model, scenario) for scenario in training]
-        return Fit(method.fit(model, runs, settings))
+        return Fit(method.fit(model, runs, chosen))
     except Exception as error:  # noqa: BLE001 - a failure is a result, not the end of the study
         return Fit(None, *_failure(error))
 

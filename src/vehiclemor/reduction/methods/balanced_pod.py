@@ -17,85 +17,63 @@ of the full model: no faster than the best full-order integrator.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
+from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.methods.balanced_truncation import balancing, gramian_factor
-from vehiclemor.reduction.projection.dynamic import MOST_SNAPSHOTS
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.interface import Method, offline_cost
+from vehiclemor.reduction.projection.balancing import balancing, gramian_factor
+from vehiclemor.reduction.projection.bases import check_snapshots
+from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.heading_frame import heading_frame
-from vehiclemor.reduction.vehicle.projected_vehicle import (
-    PROJECTED_SETTINGS,
-    ProjectedVehicle,
-    one_window,
-)
-from vehiclemor.reduction.vehicle.shape import VehicleShape, is_vehicle
+from vehiclemor.reduction.vehicle.acceptance import lacking, no_vehicle
+from vehiclemor.reduction.vehicle.mirror import with_mirrored
+from vehiclemor.reduction.vehicle.projected_vehicle import one_window, projected_vehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 
-SUMMARY = "balanced POD: one Petrov-Galerkin basis, heading and place as quadratures"
-REFERENCE = "10.1142/S0218127405012429"
 OUTPUTS = (
     *("lateral_speed", "yaw_rate", "roll", "pitch"),
     *("longitudinal_speed", "vertical_speed"),
 )
 # Balanced directions below this share of the first one are rounding.
 SMALLEST = 1e-12
-_SETTINGS = {
+
+
+class BalancedPodSettings(ProjectedSettings):
+    """Settings for a vehicle."""
+
     # With 6 a slow lateral pair of the 14-DOF vehicle is off: half of the modes are symmetric ones.
-    "rank": Setting("integer", 8, "number of balanced modes, the speed not counted", minimum=1),
-    "snapshots": Setting("integer", 500, "snapshots in each training run", minimum=2),
-    **PROJECTED_SETTINGS,
-}
+    rank: int = Field(8, ge=1, description="number of balanced modes, the speed not counted")
+    snapshots: int = Field(500, ge=2, description="snapshots in each training run")
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return _SETTINGS if kind in ("ode", "dae") else {}
+def refusal(model: Model) -> str:
+    """Vehicles with the outputs that modes are weighed by are accepted."""
+    return no_vehicle(model) or lacking(model, OUTPUTS)
 
 
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return {"recommended": {}}
-
-
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles with the outputs that modes are weighed by."""
-    accepted, reason = is_vehicle(model)
-    if not accepted:
-        return accepted, reason
-    missing = [name for name in OUTPUTS if name not in model.outputs]
-    return not missing, f"{model.name} has no output {', '.join(missing)}"
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
+def check(model: DynamicModel, settings: BalancedPodSettings) -> None:
     """Raise `InputError` if the settings don't fit the model."""
-    assert isinstance(model, DynamicModel)
-    rank, snapshots = int(settings["rank"]), int(settings["snapshots"])
     most = len(VehicleShape(model).kept) - 1
-    if rank > most:
-        raise InputError(f"rank {rank} is above the {most} states of {model.name} that decay")
-    if snapshots > MOST_SNAPSHOTS:
-        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
+    if settings.rank > most:
+        raise InputError(
+            f"rank {settings.rank} is above the {most} states of {model.name} that decay"
+        )
+    check_snapshots(settings.snapshots)
 
 
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
-) -> ProjectedVehicle:
+    model: DynamicModel, training: Sequence[TrainingRun], settings: BalancedPodSettings
+) -> ReducedSystem:
     """Balance the gramians of the training runs and of the linearisation."""
-    assert isinstance(model, DynamicModel)
     began = time.perf_counter()
-    shape, count = VehicleShape(model), int(settings["snapshots"])
-    runs = [
-        run.at(np.linspace(0.0, run.maneuver.duration, count)) for run in with_mirrored(training)
-    ]
+    shape, count = VehicleShape(model), settings.snapshots
+    runs = [run.snapshots(count) for run in with_mirrored(training)]
     # Gramians are integrals in time: a snapshot counts for as long as it stands for.
     parts = [
         (shape.of(run.states) - shape.reference) * np.sqrt(run.time[-1] / count) for run in runs
@@ -105,47 +83,28 @@ def fit(
     weights = 1.0 / np.where(ranges > 0.0, ranges, 1.0)
     linear = shape.linearised
     speed = speed_mode(linear.a)
-    lift, drop, _ = balanced(
+    modes, projection, _ = balanced(
         linear.a,
         speed,
         np.concatenate(parts).T,
         weights[:, None] * linear.output_a[places],
-        int(settings["rank"]),
+        settings.rank,
     )
     n = len(model.coordinates)
     outside = np.setdiff1d(np.arange(2 * n), shape.kept)
-    rows = len(outside) + 1 + len(lift)
-    lifts, drops, mean = np.zeros((rows, 2 * n)), np.zeros((rows, 2 * n)), np.zeros(2 * n)
+    rows = len(outside) + 1 + len(modes)
+    trial_basis, test_basis = np.zeros((rows, 2 * n)), np.zeros((rows, 2 * n))
+    mean = np.zeros(2 * n)
     mean[shape.kept] = shape.reference
-    for bases, of_speed, of_others in ((lifts, speed[0], lift), (drops, speed[1], drop)):
+    both = ((trial_basis, speed[0], modes), (test_basis, speed[1], projection))
+    for basis, of_speed, of_others in both:
         # Quadratures: what the shape does not feel is integrated as it is.
-        bases[:, outside] = np.eye(rows)[:, : len(outside)]
-        bases[len(outside) :, shape.kept] = np.vstack([of_speed, of_others])
-    system = heading_frame(shape)
-    evaluations = sum(run.counts[model.evaluations] for run in runs)
-    return ProjectedVehicle(
-        shape,
-        system,
-        one_window(mean, lifts, drops),
-        # Quadratures are no modes.
-        len(lift) + 1,
-        Offline(time.perf_counter() - began, evaluations),
-        str(settings["solver"]),
-        float(settings["tolerance"]),
-    )
-
-
-def with_mirrored(training: Sequence[TrainingRun]) -> list[TrainingRun]:
-    """Training runs, and the same with steering to the other side.
-
-    The vehicle is its own mirror image.  Without these runs modes mix what is symmetric with what
-    is lateral, and a car that is dropped leaves its lane.
-    """
-    others = []
-    for run in training:
-        factors = run.maneuver.frequency_factor, -run.maneuver.amplitude_factor
-        others.append(replace(run, maneuver=run.maneuver.perturbed(*factors)))
-    return [*training, *others]
+        basis[:, outside] = np.eye(rows)[:, : len(outside)]
+        basis[len(outside) :, shape.kept] = np.vstack([of_speed, of_others])
+    spaces = one_window(mean, trial_basis, test_basis)
+    # Quadratures are no modes.
+    rank = len(modes) + 1
+    return projected_vehicle(shape, spaces, rank, offline_cost(began, model, runs), settings)
 
 
 def speed_mode(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -179,6 +138,8 @@ def balanced(
         Modes by rows (r, n), their projection (r, n), all Hankel-like values, decreasing; r is
         smaller than `rank` where further values are rounding.
     """
+    from scipy.linalg import solve_continuous_lyapunov
+
     right, left = still
     apart = np.eye(len(a)) - np.outer(right, left)
     # The mode that is left out decays at any rate: the outputs don't see it.
@@ -189,3 +150,14 @@ def balanced(
         apart @ snapshots, gramian_factor(observability), rank, SMALLEST
     )
     return right.T, left @ apart, hankel
+
+
+METHOD = Method(
+    name="balanced_pod",
+    summary="balanced POD: one Petrov-Galerkin basis, heading and place as quadratures",
+    reference="10.1142/S0218127405012429",
+    settings=dict.fromkeys(("ode", "dae"), BalancedPodSettings),
+    refusal=refusal,
+    check=check,
+    fit=fit,
+)

@@ -21,15 +21,15 @@ single-track car.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from vehiclemor.reduction.methods.slow_manifold import accepts
-from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.linear_vehicle import (
     CORNERING,
@@ -43,11 +43,7 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
 
-__all__ = ["REFERENCE", "SUMMARY", "accepts", "check", "fit", "presets", "settings"]
-SUMMARY = "linear single-track car with the model's own effective stiffnesses"
-REFERENCE = "10.1007/BF02086921"
 # Lateral speed (m/s) of a typical maneuver.
 SIDEWARD = 0.5
 
@@ -95,28 +91,12 @@ def single_track(shape: VehicleShape) -> SingleTrack:
     return SingleTrack(a, b, a - turning, rows, whole[:, :2], whole[:, 2])
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return ONLINE_SETTINGS if kind in ("ode", "dae") else {}
-
-
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return {"recommended": {}}
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
-    """All validated settings fit every vehicle."""
-    del model, settings
-
-
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: DynamicModel,
+    training: Sequence[TrainingRun],  # noqa: ARG001
+    settings: OnlineSettings,
 ) -> ReducedVehicle:
     """Linearise and condense; no training run is looked at."""
-    del training
-    assert isinstance(model, DynamicModel)
     began = time.perf_counter()
     shape = VehicleShape(model)
     car, modes = single_track(shape), slow_modes(shape, np.inf)
@@ -143,6 +123,16 @@ def fit(
         np.zeros((3, inputs)),
         np.array([MARGIN * SIDEWARD, MARGIN * turn, SPEED, HEADING, PLACE, PLACE]),
         linearisation_cost(shape, began),
-        str(settings["solver"]),
-        float(settings["tolerance"]),
+        settings.solver,
+        settings.tolerance,
     )
+
+
+METHOD = Method(
+    name="linear_single_track",
+    summary="linear single-track car with the model's own effective stiffnesses",
+    reference="10.1007/BF02086921",
+    settings=dict.fromkeys(("ode", "dae"), OnlineSettings),
+    refusal=no_steered_vehicle,
+    fit=fit,
+)

@@ -13,33 +13,30 @@ See `linear_vehicle` for inputs that contain derivatives of the steering.  Nothi
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.methods.slow_manifold import accepts
-from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
 
-__all__ = ["REFERENCE", "SUMMARY", "accepts", "check", "fit", "presets", "settings"]
-SUMMARY = "slow lateral modes of the linearised vehicle, the others static"
-REFERENCE = "10.1109/TAC.1966.1098264"
-_SETTINGS = {
-    "fastest": Setting(
-        "number", 45.0, "modes of up to this |lambda| in 1/s are kept", minimum=0.0, above=True
-    ),
-    "static_correction": Setting(
-        "text", "yes", "dropped modes follow the steering without delay", choices=("yes", "no")
-    ),
-    **ONLINE_SETTINGS,
-}
+
+class ModalTruncationSettings(OnlineSettings):
+    """Settings for a vehicle."""
+
+    fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
+    static_correction: Literal["yes", "no"] = Field(
+        "yes", description="dropped modes follow the steering without delay"
+    )
 
 
 def truncated(lateral: Lateral, fastest: float, static: bool) -> Lateral:
@@ -62,31 +59,30 @@ def truncated(lateral: Lateral, fastest: float, static: bool) -> Lateral:
     )
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return _SETTINGS if kind in ("ode", "dae") else {}
-
-
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return {"recommended": {}}
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
+def check(model: DynamicModel, settings: ModalTruncationSettings) -> None:
     """At least one mode must be kept."""
-    assert isinstance(model, DynamicModel)
-    truncated(lateral_modes(VehicleShape(model)), float(settings["fastest"]), False)
+    truncated(lateral_modes(VehicleShape(model)), settings.fastest, static=False)
 
 
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: DynamicModel,
+    training: Sequence[TrainingRun],  # noqa: ARG001
+    settings: ModalTruncationSettings,
 ) -> ReducedVehicle:
     """Linearise and truncate; no training run is looked at."""
-    del training
-    assert isinstance(model, DynamicModel)
     began = time.perf_counter()
     shape = VehicleShape(model)
-    static = settings["static_correction"] == "yes"
-    lateral = truncated(lateral_modes(shape), float(settings["fastest"]), static)
+    static = settings.static_correction == "yes"
+    lateral = truncated(lateral_modes(shape), settings.fastest, static)
     return linear_vehicle(shape, lateral, settings, began)
+
+
+METHOD = Method(
+    name="modal_truncation",
+    summary="slow lateral modes of the linearised vehicle, the others static",
+    reference="10.1109/TAC.1966.1098264",
+    settings=dict.fromkeys(("ode", "dae"), ModalTruncationSettings),
+    refusal=no_steered_vehicle,
+    check=check,
+    fit=fit,
+)

@@ -8,39 +8,42 @@ Approximation Theory and Approximation Practice, 2013, chapter 8).  No equation 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_module
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_loop
+from vehiclemor.reduction.polynomials.map_loops import BLOCK
+from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
-SUMMARY = "the coordinates as polynomials in the wheel travel: no equation is solved"
-REFERENCE = "10.1137/1.9781611975949"
 # Beyond it powers of the travel lose digits to rounding.
 HIGHEST_DEGREE = 20
 # What counts as inside of the range of training, relative to the range of the travel.
 SLACK = 1e-9
-SETTINGS = {
-    "degree": Setting("integer", 10, "degree of the polynomials in the travel", minimum=1),
-    "outside": Setting(
-        "text",
+
+
+class PathMapSettings(Settings):
+    """Settings for a kinematic model."""
+
+    degree: int = Field(10, ge=1, description="degree of the polynomials in the travel")
+    outside: Literal["stop", "extrapolate"] = Field(
         "stop",
-        "stop: a run that leaves the inputs of training has diverged; extrapolate: it goes on",
-        choices=("stop", "extrapolate"),
-    ),
-}
+        description="stop: a run that leaves the inputs of training has diverged; extrapolate: it "
+        "goes on",
+    )
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ class PathMapModel:
         """The travel is the only coordinate."""
         return 1
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Polynomials at the maneuver's output times.
 
         Raises
@@ -85,22 +88,18 @@ class PathMapModel:
         model.start(start)
         inputs = checked_inputs(model, maneuver)
         degree, n = len(self.coefficients) - 1, len(model.coordinates)
-        path = np.full((len(times), n), np.nan)
         (low, high), slack = self.travel, SLACK * (self.travel[1] - self.travel[0])
         limits = np.array([low - slack, high + slack, self.rack - slack, self.rack + slack])
         if not self.stops:
             limits = np.array([-np.inf, np.inf, -np.inf, np.inf])
-        run = map_module(n, degree).map_path
-        fixed = (self.centre, self.scale, limits, self.coefficients, path)
-        # Compile, or load machine code, outside of the time that is measured.
-        run(inputs[:0], *fixed)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
-        (status, sample), seconds = timed(lambda: run(inputs, *fixed), counts)
-        trajectory = model.trajectory(times, inputs, path, counts, seconds)
-        if status == 0:
-            return trajectory
-        message = self._outside(float(times[sample]), *inputs[sample].tolist())
-        return replace(trajectory, status="diverged", message=message)
+        loop, buffer = map_loop(n, degree), np.zeros(BLOCK * (n + 1))
+        fixed = (inputs, self.centre, self.scale, limits, self.coefficients)
+        found, sample = solved_path(
+            model, times, inputs, lambda to: loop.prepared(*fixed, to, buffer)
+        )
+        if found.status == "ok":
+            return found
+        return replace(found, message=self._outside(float(times[sample]), *inputs[sample].tolist()))
 
     def _outside(self, moment: float, travel: float, rack: float) -> str:
         low, high = self.travel
@@ -114,32 +113,14 @@ class PathMapModel:
         del states
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return SETTINGS if kind == "ae" else {}
-
-
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; none for a model that isn't accepted."""
-    return {"recommended": {}} if model.kind == "ae" else {}
-
-
-def accepts(model: Model) -> tuple[bool, str]:
-    """Whether the model is one of a mechanism whose inputs move all of its coordinates."""
-    if isinstance(model, AlgebraicModel):
-        return True, ""
-    return False, f"path_map is for kinematic models: {model.name} is of kind {model.kind}"
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
+def check(model: Model, settings: PathMapSettings) -> None:  # noqa: ARG001
     """Raise `InputError` if the degree is too high for powers of the travel."""
-    del model
-    if int(settings["degree"]) > HIGHEST_DEGREE:
-        raise InputError(f"degree {settings['degree']} is above {HIGHEST_DEGREE}")
+    if settings.degree > HIGHEST_DEGREE:
+        raise InputError(f"degree {settings.degree} is above {HIGHEST_DEGREE}")
 
 
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: AlgebraicModel, training: Sequence[TrainingRun], settings: PathMapSettings
 ) -> PathMapModel:
     """Least squares over all output times of the training runs.
 
@@ -148,10 +129,9 @@ def fit(
     InputError
         If the rack moves in training, or the travel takes too few values for the degree.
     """
-    assert isinstance(model, AlgebraicModel)
     began = time.perf_counter()
-    degree = int(settings["degree"])
-    runs = [run.at(run.maneuver.times) for run in training]
+    degree = settings.degree
+    runs = [run.recorded() for run in training]
     inputs = np.concatenate([run.inputs for run in runs])
     travel, racks = inputs[:, 0], inputs[:, 1]
     low, high = float(travel.min()), float(travel.max())
@@ -173,7 +153,6 @@ def fit(
     for i, column in enumerate(series.T):
         power = chebyshev.cheb2poly(column)
         powers[: len(power), i] = power
-    evaluations = sum(run.counts[model.evaluations] for run in runs)
     return PathMapModel(
         model,
         centre,
@@ -181,6 +160,16 @@ def fit(
         loop_array(powers[::-1]),
         (low, high),
         float(racks[0]),
-        settings["outside"] == "stop",
-        Offline(time.perf_counter() - began, evaluations),
+        settings.outside == "stop",
+        offline_cost(began, model, runs),
     )
+
+
+METHOD = Method(
+    name="path_map",
+    summary="the coordinates as polynomials in the wheel travel: no equation is solved",
+    reference="10.1137/1.9781611975949",
+    settings={"ae": PathMapSettings},
+    check=check,
+    fit=fit,
+)

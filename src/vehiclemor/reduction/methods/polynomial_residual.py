@@ -10,33 +10,33 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
+from vehiclemor.codegen.loops import Loop
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import (
     checked_inputs,
     derivatives,
     monomials,
-    residual_module,
+    residual_loop,
 )
-from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT, MOST_SNAPSHOTS
-from vehiclemor.reduction.projection.bases import Basis, pod_basis, project
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.polynomials.residual_loops import Polynomials
+from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
+from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
+from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.clock import timed
-from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
-SUMMARY = "POD with a fixed test space; the reduced equations are fitted polynomials"
-REFERENCE = ""
 # Every monomial is a line of machine code in each equation.
 MOST_MONOMIALS = 150
 HIGHEST_DEGREE = 8
@@ -48,25 +48,22 @@ RANK_TOLERANCE = 1e-10
 # Random points at which the part of the inputs is checked, and its largest difference (rad or m).
 LINEARITY_CHECKS = 3
 LINEARITY_TOLERANCE = 1e-12
-SETTINGS = {
-    "rank": Setting("integer", 3, "number of reduced coordinates", minimum=1),
-    "degree": Setting("integer", 3, "total degree of the polynomials", minimum=1),
-    "snapshots": Setting("integer", 101, "snapshots in each training run", minimum=2),
-    "solver": Setting(
-        "text",
+
+
+class PolynomialResidualSettings(Settings):
+    """Settings for a kinematic model."""
+
+    rank: int = Field(3, ge=1, description="number of reduced coordinates")
+    degree: int = Field(3, ge=1, description="total degree of the polynomials")
+    snapshots: int = Field(101, ge=2, description="snapshots in each training run")
+    solver: Literal["chord", "newton"] = Field(
         "chord",
-        "chord: constant reduced Jacobian; newton: a fresh one in each iteration",
-        choices=("chord", "newton"),
-    ),
-    "tolerance": Setting(
-        "number",
-        1e-6,
-        "largest step of the last iteration (reduced coordinates)",
-        minimum=0.0,
-        above=True,
-    ),
-    "seed": Setting("integer", 0, "seed of the points beside the training path", minimum=0),
-}
+        description="chord: constant reduced Jacobian; newton: a fresh one in each iteration",
+    )
+    tolerance: float = Field(
+        1e-6, gt=0.0, description="largest step of the last iteration (reduced coordinates)"
+    )
+    seed: int = Field(0, ge=0, description="seed of the points beside the training path")
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ class PolynomialResidualModel:
         """Number of reduced coordinates."""
         return self.basis.rank
 
-    def simulate(self, maneuver: Maneuver, start: str) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the polynomial equations at the maneuver's output times.
 
         Raises
@@ -121,27 +118,18 @@ class PolynomialResidualModel:
         model, times = self.model, maneuver.times
         began_at = self.reduced(model.start(start)[None, :])[0]
         inputs = checked_inputs(model, maneuver)
-        path = np.full((len(times), len(model.coordinates)), np.nan)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
-        arguments = (
-            loop_array(began_at),
+        rank = self.basis.rank
+        polynomials = Polynomials(
             np.concatenate([self.mean_inputs, self.basis.mean]),
             loop_array((self.basis.vectors * self.scales).T),
             loop_array(self.response),
             loop_array(self.coefficients),
-            derivatives(self.coefficients, self.basis.rank, self.degree),
-            self.newton,
+            derivatives(self.coefficients, rank, self.degree),
             self.tolerance / self.scales,
-            ITERATION_LIMIT,
-            path,
-            counts,
         )
-        run = self._loops().reduced_path
-        # Compile, or load machine code, outside of the time that is measured.
-        run(inputs[:0], *arguments)
-        (status, sample), seconds = timed(lambda: run(inputs, *arguments), counts)
-        failure = None if status == 0 else (status, sample)
-        return model.trajectory(times, inputs, path, counts, seconds, failure)
+        given = (inputs, loop_array(began_at), polynomials, int(self.newton), ITERATION_LIMIT)
+        loop, buffer = self._loop("reduced_path"), np.empty(6 * rank + rank * (rank + 1))
+        return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]
 
     def reduced(self, states: np.ndarray) -> np.ndarray:
         """Scaled reduced coordinates (samples, r) of states (samples, n)."""
@@ -151,32 +139,20 @@ class PolynomialResidualModel:
         """Fitted W^T Phi (samples, r) at scaled reduced coordinates (samples, r) and inputs."""
         loads = loop_array((inputs - self.mean_inputs) @ self.response)
         result = np.empty(loads.shape)
-        self._loops().terms_path(loop_array(points), loads, loop_array(self.coefficients), result)
+        coefficients = loop_array(self.coefficients)
+        self._loop("terms_path")(loop_array(points), loads, coefficients, result)
         return result
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples, n) onto the subspace."""
         return project(states, self.basis)
 
-    def _loops(self) -> ModuleType:
-        return residual_module(len(self.model.inputs), self.basis.rank, self.degree)
+    def _loop(self, name: str) -> Loop:
+        return residual_loop(name, len(self.model.inputs), self.basis.rank, self.degree)
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return SETTINGS if kind == "ae" else {}
-
-
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; none for a model that isn't accepted."""
-    return {"recommended": {}} if model.kind == "ae" else {}
-
-
-def accepts(model: Model) -> tuple[bool, str]:
-    """Whether the model is kinematic, and its inputs enter the equations linearly."""
-    name = "polynomial_residual"
-    if not isinstance(model, AlgebraicModel):
-        return False, f"{name} is for kinematic models: {model.name} is of kind {model.kind}"
+def refusal(model: AlgebraicModel) -> str:
+    """Models whose inputs enter the equations linearly are accepted."""
     response = _response(model, model.design)
     generator = np.random.default_rng(0)
     for _ in range(LINEARITY_CHECKS):
@@ -184,20 +160,17 @@ def accepts(model: Model) -> tuple[bool, str]:
         u = generator.uniform(-0.1, 0.1, len(model.inputs))
         change = model.residual(q, u) - model.residual(q, np.zeros(len(u)))
         if np.abs(change - response @ u).max() > LINEARITY_TOLERANCE:
-            return False, f"{name} needs inputs that enter the equations of {model.name} linearly"
-    return True, ""
+            return (
+                "polynomial_residual needs inputs that enter the equations of "
+                f"{model.name} linearly"
+            )
+    return ""
 
 
-def check(model: Model, settings: Mapping[str, Value]) -> None:
+def check(model: AlgebraicModel, settings: PolynomialResidualSettings) -> None:
     """Raise `InputError` if rank, degree or snapshots don't fit the model or each other."""
-    rank, degree = int(settings["rank"]), int(settings["degree"])
-    snapshots, states = int(settings["snapshots"]), len(model.coordinates)
-    if rank > states:
-        raise InputError(f"rank {rank} is above the {states} coordinates of {model.name}")
-    if snapshots > MOST_SNAPSHOTS:
-        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
-    if rank > snapshots:
-        raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+    rank, degree = settings.rank, settings.degree
+    check_pod(rank, settings.snapshots, len(model.coordinates), f"coordinates of {model.name}")
     if degree > HIGHEST_DEGREE:
         raise InputError(f"degree {degree} is above {HIGHEST_DEGREE}")
     count = math.comb(rank + degree, rank)
@@ -208,7 +181,7 @@ def check(model: Model, settings: Mapping[str, Value]) -> None:
 
 
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: AlgebraicModel, training: Sequence[TrainingRun], settings: PolynomialResidualSettings
 ) -> PolynomialResidualModel:
     """POD of equidistant snapshots, and polynomials through residuals along and beside their path.
 
@@ -217,18 +190,17 @@ def fit(
     InputError
         If the mechanism doesn't move in training.
     """
-    assert isinstance(model, AlgebraicModel)
     began = time.perf_counter()
-    count, degree = int(settings["snapshots"]), int(settings["degree"])
-    runs = [run.at(np.linspace(0.0, run.maneuver.duration, count)) for run in training]
+    count, degree = settings.snapshots, settings.degree
+    runs = [run.snapshots(count) for run in training]
     states = np.concatenate([run.coordinates for run in runs])
     mean_inputs = np.concatenate([run.inputs for run in runs]).mean(axis=0)
     if np.ptp(states, axis=0).max() == 0.0:
         raise InputError("polynomial_residual: the mechanism doesn't move in training")
-    basis = pod_basis(states.T, int(settings["rank"]), RANK_TOLERANCE)
+    basis = pod_basis(states.T, settings.rank, RANK_TOLERANCE)
     scaled = (states - basis.mean) @ basis.vectors
     scales = np.abs(scaled).max(axis=0)
-    points = _points(scaled / scales, int(settings["seed"]))
+    points = _points(scaled / scales, settings.seed)
     test = model.jacobian(basis.mean, mean_inputs) @ basis.vectors
     lifted = basis.mean + (points * scales) @ basis.vectors.T
     values = model.residual_at(lifted, np.tile(mean_inputs, (len(points), 1))) @ test
@@ -239,7 +211,6 @@ def fit(
     # Multiplied by the inverse of the Jacobian at x = 0, whose rows are the linear terms.
     inverse = np.linalg.inv(coefficients[1 : basis.rank + 1])
     test, coefficients = test @ inverse, coefficients @ inverse
-    evaluations = sum(run.counts[model.evaluations] for run in runs) + len(points)
     return PolynomialResidualModel(
         model,
         basis,
@@ -249,9 +220,9 @@ def fit(
         mean_inputs,
         -(test.T @ _response(model, basis.mean)).T,
         coefficients,
-        settings["solver"] == "newton",
-        float(settings["tolerance"]),
-        Offline(time.perf_counter() - began, evaluations),
+        settings.solver == "newton",
+        settings.tolerance,
+        offline_cost(began, model, runs, len(points)),
     )
 
 
@@ -273,3 +244,13 @@ def _points(path: np.ndarray, seed: int) -> np.ndarray:
     shape = (NEIGHBOURS, *path.shape)
     beside = path + generator.uniform(-SPREAD, SPREAD, shape)
     return np.concatenate([path, beside.reshape(-1, path.shape[1])])
+
+
+METHOD = Method(
+    name="polynomial_residual",
+    summary="POD with a fixed test space; the reduced equations are fitted polynomials",
+    settings={"ae": PolynomialResidualSettings},
+    refusal=refusal,
+    check=check,
+    fit=fit,
+)

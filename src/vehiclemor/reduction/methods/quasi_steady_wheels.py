@@ -18,57 +18,32 @@ already a force.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.interface import Method, offline_cost
+from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.heading_frame import heading_frame
-from vehiclemor.reduction.vehicle.projected_vehicle import (
-    PROJECTED_SETTINGS,
-    ProjectedVehicle,
-    one_window,
-)
-from vehiclemor.reduction.vehicle.shape import VehicleShape, is_vehicle, spin_angles
+from vehiclemor.reduction.vehicle.acceptance import no_vehicle
+from vehiclemor.reduction.vehicle.projected_vehicle import one_window, projected_vehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape, spin_angles
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
-
-SUMMARY = "spins of the wheels slaved to the other states (singular perturbation)"
-REFERENCE = "10.1137/1.9781611971118"
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return PROJECTED_SETTINGS if kind in ("ode", "dae") else {}
-
-
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return {"recommended": {}}
-
-
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles whose wheels spin."""
-    accepted, reason = is_vehicle(model)
-    if accepted and isinstance(model, DynamicModel) and not len(spin_angles(model)):
-        return False, f"{model.name} has no wheels that spin"
-    return accepted, reason
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
-    """All validated settings fit every vehicle."""
-    del model, settings
+def refusal(model: DynamicModel) -> str:
+    """Vehicles whose wheels spin are accepted."""
+    reason = no_vehicle(model)
+    return reason or ("" if len(spin_angles(model)) else f"{model.name} has no wheels that spin")
 
 
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
-) -> ProjectedVehicle:
+    model: DynamicModel,
+    training: Sequence[TrainingRun],  # noqa: ARG001
+    settings: ProjectedSettings,
+) -> ReducedSystem:
     """Slave the spins by the linearisation; no training run is looked at."""
-    del training
-    assert isinstance(model, DynamicModel)
     began = time.perf_counter()
     shape, n = VehicleShape(model), len(model.coordinates)
     spins = spin_angles(model) + n
@@ -76,20 +51,24 @@ def fit(
     a = shape.linearised.a
     slaved = -np.linalg.solve(a[np.ix_(fast, fast)], a[np.ix_(fast, slow)])
     left = np.setdiff1d(np.arange(2 * n), spins)
-    lift, drop, mean = np.eye(2 * n)[left], np.eye(2 * n)[left], np.zeros(2 * n)
+    trial_basis, test_basis = np.eye(2 * n)[left], np.eye(2 * n)[left]
     rows = np.searchsorted(left, shape.kept[slow])
-    lift[np.ix_(rows, shape.kept[fast])] = slaved.T
+    trial_basis[np.ix_(rows, shape.kept[fast])] = slaved.T
     # Reduced coordinates are the states themselves: only the spins have a constant part.
+    mean = np.zeros(2 * n)
     mean[shape.kept[fast]] = shape.reference[fast] - slaved @ shape.reference[slow]
-    system = heading_frame(shape)
-    evaluations = 2 * (len(shape.kept) + len(model.inputs))
-    return ProjectedVehicle(
-        shape,
-        system,
-        one_window(mean, lift, drop),
-        # The wheels' coordinates stay; their speeds are no states.
-        n,
-        Offline(time.perf_counter() - began, evaluations),
-        str(settings["solver"]),
-        float(settings["tolerance"]),
-    )
+    spaces = one_window(mean, trial_basis, test_basis)
+    further = 2 * (len(shape.kept) + len(model.inputs))
+    # The wheels' coordinates stay, so the rank is n; their speeds are no states.
+    cost = offline_cost(began, model, further=further)
+    return projected_vehicle(shape, spaces, n, cost, settings)
+
+
+METHOD = Method(
+    name="quasi_steady_wheels",
+    summary="spins of the wheels slaved to the other states (singular perturbation)",
+    reference="10.1137/1.9781611971118",
+    settings=dict.fromkeys(("ode", "dae"), ProjectedSettings),
+    refusal=refusal,
+    fit=fit,
+)

@@ -7,21 +7,18 @@ that it was not trained on has learned nothing about the model.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.models.definition import KINDS
+from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
-
-SUMMARY = "returns the training trajectory, whatever the input: the null hypothesis"
-REFERENCE = ""
-PRESETS: dict[str, dict[str, Value]] = {"recommended": {}}
 
 
 @dataclass(frozen=True)
@@ -84,35 +81,20 @@ def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.
     return np.array(columns).reshape(len(columns), len(times)).T
 
 
-def settings(kind: str) -> dict[str, Setting]:
-    """There are no settings."""
-    del kind
-    return {}
-
-
-def presets(model: Model) -> dict[str, dict[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return PRESETS
-
-
-def accepts(model: Model) -> tuple[bool, str]:
-    """Every model is accepted."""
-    del model
-    return True, ""
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
-    """There are no settings."""
-    del model, settings
-
-
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: Model,
+    training: Sequence[TrainingRun],
+    settings: Settings,  # noqa: ARG001
 ) -> ReplayModel:
     """Record the training runs at the output times."""
-    del settings
     began = time.perf_counter()
-    recorded = tuple(run.at(run.maneuver.times) for run in training)
-    evaluations = sum(run.counts[model.evaluations] for run in recorded)
-    return ReplayModel(model, recorded, Offline(time.perf_counter() - began, evaluations))
+    recorded = tuple(run.recorded() for run in training)
+    return ReplayModel(model, recorded, offline_cost(began, model, recorded))
+
+
+METHOD = Method(
+    name="replay",
+    summary="returns the training trajectory, whatever the input: the null hypothesis",
+    settings=dict.fromkeys(KINDS, Settings),
+    fit=fit,
+)

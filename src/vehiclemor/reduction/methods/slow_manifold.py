@@ -18,136 +18,157 @@ position that is off.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.online_settings import online_settings
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
-from vehiclemor.reduction.vehicle.shape import VehicleShape, is_vehicle
-from vehiclemor.reduction.vehicle.slow_features import OUTPUTS, feature_table
-from vehiclemor.reduction.vehicle.slow_modes import slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import finishes, improved, targets
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.slow_features import FeatureTable, feature_table
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.trajectory_fit import Target, finishes, improved, targets
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
-SUMMARY = "slow modes with a right-hand side fitted on training runs, fast motion slaved"
-REFERENCE = "10.1137/1.9781611971118"
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
 REFIT_RIDGE = 1e-9
-_SETTINGS = {
-    "fastest": Setting(
-        "number", 45.0, "modes of up to this |lambda| in 1/s are kept", minimum=0.0, above=True
-    ),
-    "nonlinearity": Setting(
-        "text",
+
+
+class SlowManifoldSettings(OnlineSettings):
+    """Settings for a vehicle."""
+
+    fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
+    nonlinearity: Literal["cubic", "quintic", "sliding", "rich"] = Field(
         "quintic",
-        "of the lateral terms: cubic; quintic in slip angles too; sliding: and |slip| slip terms; "
-        "rich: and cubic terms that change with the speed",
-        choices=("cubic", "quintic", "sliding", "rich"),
-    ),
-    "ridge": Setting("number", 1e-10, "weight of the coefficients' size in the fit", minimum=0.0),
-    "refits": Setting("integer", 2, "how often the heading is fitted on reduced runs", minimum=0),
-    "sweeps": Setting(
-        "integer", 4, "Gauss-Newton steps of all coefficients on whole training runs", minimum=0
-    ),
-    "terms": Setting(
-        "integer",
+        description="of the lateral terms: cubic; quintic in slip angles too; sliding: and |slip| "
+        "slip terms; rich: and cubic terms that change with the speed",
+    )
+    ridge: float = Field(1e-10, ge=0.0, description="weight of the coefficients' size in the fit")
+    refits: int = Field(2, ge=0, description="how often the heading is fitted on reduced runs")
+    sweeps: int = Field(
+        4, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
+    )
+    terms: int = Field(
         20,
-        "lateral nonlinear terms that the equations keep, those that whole runs need most, and a "
-        "quarter as many symmetric ones; 0: all; only with sweeps, which are done again after it",
-        minimum=0,
-    ),
-    "hull": Setting(
-        "number",
+        ge=0,
+        description="lateral nonlinear terms that the equations keep, those that whole runs need "
+        "most, and a quarter as many symmetric ones; 0: all; only with sweeps, which are done "
+        "again after it",
+    )
+    hull: float = Field(
         1.1,
-        "arguments of nonlinear terms are held beyond this multiple of their training range",
-        minimum=0.0,
-        above=True,
-    ),
-    **online_settings("etdrk4", 2e-3),
-}
+        gt=0.0,
+        description="arguments of nonlinear terms are held beyond this multiple of their training "
+        "range",
+    )
+    solver: Solver = "etdrk4"
+    tolerance: Tolerance = 2e-3
 
 
-def settings(kind: str) -> Mapping[str, Setting]:
-    """Settings for models of that kind."""
-    return _SETTINGS if kind in ("ode", "dae") else {}
+class Samples(NamedTuple):
+    """Training runs, sample by sample.
 
+    Attributes
+    ----------
+    inputs, deviations
+        Inputs (samples, inputs), deviations of the shape from straight running (samples, n).
+    rates, motion
+        Rates of the shape (samples, n), and psi', U, V (samples, 3).
+    slow, speed
+        Slow coordinates (samples, k) and deviations of the speed (samples,).
+    """
 
-def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
-    """Presets; the same for every model."""
-    del model
-    return {"recommended": {}}
-
-
-def accepts(model: Model) -> tuple[bool, str]:
-    """Vehicles whose inputs are the steering and its derivatives."""
-    accepted, reason = is_vehicle(model)
-    if not accepted:
-        return accepted, reason
-    missing = [name for name in OUTPUTS if name not in model.outputs]
-    if missing:
-        return False, f"{model.name} has no output {missing[0]}"
-    first, *others = model.inputs
-    if others != [f"{first}_dot", f"{first}_ddot"][: len(others)]:
-        return False, f"the inputs of {model.name} are not a steering and its derivatives"
-    return True, ""
-
-
-def check(model: Model, settings: Mapping[str, Value]) -> None:
-    """All validated settings fit every vehicle."""
-    del model, settings
+    inputs: np.ndarray
+    deviations: np.ndarray
+    rates: np.ndarray
+    motion: np.ndarray
+    slow: np.ndarray
+    speed: np.ndarray
 
 
 def fit(
-    model: Model, training: Sequence[TrainingRun], settings: Mapping[str, Value]
+    model: DynamicModel, training: Sequence[TrainingRun], settings: SlowManifoldSettings
 ) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
-    assert isinstance(model, DynamicModel)
     began = time.perf_counter()
-    runs = [run.at(run.maneuver.times) for run in training]
+    runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
-    modes = slow_modes(shape, float(settings["fastest"]))
-    u = np.concatenate([run.inputs for run in runs])
+    modes = slow_modes(shape, settings.fastest)
+    samples = _samples(shape, modes, runs)
+    table = feature_table(
+        shape,
+        modes,
+        samples.slow,
+        samples.speed,
+        samples.inputs,
+        settings.hull,
+        settings.nonlinearity,
+    )
+    reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
+    for _ in range(settings.refits):
+        reduced = _with_heading(reduced, training, runs, table.odd, len(modes.rates) + 1)
+    if settings.sweeps:
+        goals = targets(reduced, training, runs)
+        reduced = _fitted_on_runs(reduced, table, samples, goals, settings)
+    return replace(
+        reduced,
+        offline=offline_cost(began, model, runs, len(samples.inputs)),
+        solver=settings.solver,
+        tolerance=settings.tolerance,
+    )
+
+
+def _samples(shape: VehicleShape, modes: SlowModes, runs: Sequence[Trajectory]) -> Samples:
+    inputs = np.concatenate([run.inputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])
-    rates, motion = shape.motion(shapes, u)
+    rates, motion = shape.motion(shapes, inputs)
     deviations = shapes - shape.reference
-    z, speed = modes.coordinates(deviations, u)
-    table = feature_table(shape, modes, z, speed, u, settings)
-    features, odd, even, curved = table.features, table.odd, table.even, table.curved
+    return Samples(inputs, deviations, rates, motion, *modes.coordinates(deviations, inputs))
+
+
+def _fitted_on_rates(
+    shape: VehicleShape, modes: SlowModes, table: FeatureTable, samples: Samples, ridge: float
+) -> ReducedVehicle:
+    """Equations fitted on the rates of the training runs, exact at straight running."""
+    u, z, motion = samples.inputs, samples.slow, samples.motion
     k, inputs = len(modes.rates), u.shape[1]
-    columns = features.at(np.column_stack([z, speed]), u, table.parameters)
-    ridge = float(settings["ridge"])
-    slow_rates = rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
+    odd, even = table.odd, table.even
+    odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
+    columns = table.features.at(np.column_stack([z, samples.speed]), u, table.parameters)
+    slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
     linear = z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
-    c = np.zeros((len(features.terms), k + 1 + PLANAR))
-    c[curved, :k] = ridge_fit(columns[:, curved], slow_rates - linear, ridge)
+    c = np.zeros((len(table.features.terms), k + 1 + PLANAR))
+    c[odd_nonlinear, :k] = ridge_fit(columns[:, odd_nonlinear], slow_rates - linear, ridge)
     # Linear terms are scaled by the ranges of the training runs.
     c[odd[:k], :k] = modes.rates.T * largest(z)[:, None]
     c[odd[k], :k] = modes.drive * largest(u)[0]
     # Straight running at any speed goes on for ever: the speed changes by what is even alone.
-    bent = table.bent
-    c[bent, k] = ridge_fit(columns[:, bent], rates @ modes.speed_left, ridge)
+    even_columns = columns[:, even_nonlinear]
+    c[even_nonlinear, k] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
     c[odd, k + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
     c[even[0], k + 2], c[even[1], k + 2] = shape.speed, 1.0
-    c[bent, k + 2] = ridge_fit(columns[:, bent], motion[:, 1] - shape.speed - speed, ridge)
+    c[even_nonlinear, k + 2] = ridge_fit(
+        even_columns, motion[:, 1] - shape.speed - samples.speed, ridge
+    )
     c[odd, k + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
-    reduced = ReducedVehicle(
-        model,
+    return ReducedVehicle(
+        shape.model,
         shape,
-        features,
+        table.features,
         table.parameters,
         c,
-        ridge_fit(columns, deviations, ridge),
+        ridge_fit(columns, samples.deviations, ridge),
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
         np.concatenate([3.0 * largest(z), [10.0, 1.0, 10.0, 10.0]]),
@@ -156,27 +177,24 @@ def fit(
         REFIT_TOLERANCE,
         modes.symmetric,
     )
-    for _ in range(int(settings["refits"])):
-        reduced = _with_heading(reduced, training, runs, odd, k + 1)
-    sweeps, kept = int(settings["sweeps"]), int(settings["terms"])
-    if sweeps:
-        goals = targets(reduced, training, runs)
-        reduced = improved(reduced, goals, table.free, sweeps)
-        if kept and finishes(reduced, goals):
-            slow = np.column_stack([z, speed])
-            fewer, kept_table = pruned(reduced, table, goals, slow, u, kept)
-            fewer = improved(fewer, goals, kept_table.free, sweeps)
-            # With too few terms a training run may fail.
-            if finishes(fewer, goals):
-                reduced = fewer
-    evaluations = sum(run.counts[model.evaluations] for run in runs) + len(u)
-    offline = Offline(time.perf_counter() - began, evaluations)
-    return replace(
-        reduced,
-        offline=offline,
-        solver=str(settings["solver"]),
-        tolerance=float(settings["tolerance"]),
-    )
+
+
+def _fitted_on_runs(
+    reduced: ReducedVehicle,
+    table: FeatureTable,
+    samples: Samples,
+    goals: Sequence[Target],
+    settings: SlowManifoldSettings,
+) -> ReducedVehicle:
+    """Coefficients improved on whole runs; then with as few terms as the settings allow."""
+    reduced = improved(reduced, goals, table.free, settings.sweeps)
+    if not settings.terms or not finishes(reduced, goals):
+        return reduced
+    slow = np.column_stack([samples.slow, samples.speed])
+    fewer, kept = pruned(reduced, table, goals, slow, samples.inputs, settings.terms)
+    fewer = improved(fewer, goals, kept.free, settings.sweeps)
+    # With too few terms a training run may fail.
+    return fewer if finishes(fewer, goals) else reduced
 
 
 def _with_heading(
@@ -190,8 +208,8 @@ def _with_heading(
     integrals, headings = [], []
     k, heading = reduced.features.states, reduced.model.planar[2]
     for run, true in zip(training, runs, strict=True):
-        path, failure = reduced.path(run.maneuver, run.start)
-        if failure or not np.isfinite(path).all():
+        path = reduced.path(run.maneuver, run.start)
+        if path is None:
             continue
         columns = reduced.features.at(path[:, :k], true.inputs, reduced.parameters)[:, odd]
         steps = np.diff(true.time)[:, None]
@@ -205,3 +223,13 @@ def _with_heading(
     coefficients = reduced.coefficients.copy()
     coefficients[odd, column] += ridge_fit(along, gap, REFIT_RIDGE)
     return replace(reduced, coefficients=coefficients)
+
+
+METHOD = Method(
+    name="slow_manifold",
+    summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
+    reference="10.1137/1.9781611971118",
+    settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
+    refusal=no_steered_vehicle,
+    fit=fit,
+)

@@ -1,31 +1,17 @@
 """Compiled polynomials: loops with sizes that the compiler knows, one module for each size."""
 
-from functools import cache
 from itertools import combinations_with_replacement
-from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vehiclemor.codegen.cache import load_module
-from vehiclemor.codegen.link import linked_source
+from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import check_inputs, loop_array
 
-# Names that the loops find in the linked module; see codegen/stubs.py.
-DEGREE = 0
-
-
-def terms(x: NDArray, load: NDArray, coefficients: NDArray, result: NDArray) -> None:
-    """Polynomials at x (N,), less a load (N,), into result (N,)."""
-    raise NotImplementedError("runs only in a linked module")
-
-
-def slopes(x: NDArray, derivatives: NDArray, result: NDArray) -> None:
-    """Jacobian of the polynomials at x (N,) into result[:, :N]; result is (N, N + 1)."""
-    raise NotImplementedError("runs only in a linked module")
+# Where small solves are.
+NEWTON = ("simulation.newton_loops",)
 
 
 def monomials(rank: int, degree: int) -> tuple[tuple[int, ...], ...]:
@@ -50,31 +36,40 @@ def derivatives(coefficients: np.ndarray, rank: int, degree: int) -> np.ndarray:
     return result
 
 
-def polynomial_source(rank: int, degree: int) -> str:
-    """Source text of `terms` and `slopes` for `rank` polynomials in as many variables.
+def polynomial_kernels(rank: int, degree: int) -> dict[str, str]:
+    """Text of the kernels `terms` and `slopes` for `rank` polynomials in as many variables.
 
     All monomials stand in one nested sum, by Horner's scheme; results are stored at the end, since
     a store could change what is still to be read.
     """
     every = range(rank)
-    variables = [f"    x{j} = x[{j}]" for j in every]
-    lines = ["def terms(x, load, coefficients, result):", *variables]
-    lines += [f"    g{k} = {_nested('coefficients[', k, rank, degree)} - load[{k}]" for k in every]
-    lines += [f"    result[{k}] = g{k}" for k in every]
-    lines += ["", "def slopes(x, derivatives, result):", *variables]
-    pairs = [(k, j) for k in every for j in every]
-    lines += [
-        f"    s{k}_{j} = {_nested(f'derivatives[{j}, ', k, rank, degree - 1)}" for k, j in pairs
-    ]
-    lines += [f"    result[{k}, {j}] = s{k}_{j}" for k, j in pairs]
-    return "\n".join(lines) + "\n"
+    variables = [f"x{j} = _x[{j}]" for j in every]
+    values = [f"g{k} = {_nested('_coefficients', 0, k, rank, degree)} - _load[{k}]" for k in every]
+    stored = [f"_result[{k}] = g{k}" for k in every]
+    slopes, entries = [], []
+    count = len(monomials(rank, degree - 1))
+    for k in every:
+        for j in every:
+            nested = _nested("_derivatives", j * count, k, rank, degree - 1)
+            slopes.append(f"s{k}_{j} = {nested}")
+            # Rows are one longer than the Jacobian's: the load's column is the loop's.
+            entries.append(f"_result[{k * (rank + 1) + j}] = s{k}_{j}")
+    heads = {
+        "terms": "def terms(_x, _load, _coefficients, _result):",
+        "slopes": "def slopes(_x, _derivatives, _result):",
+    }
+    bodies = {
+        "terms": [*variables, *values, *stored],
+        "slopes": [*variables, *slopes, *entries],
+    }
+    return {name: "\n    ".join([heads[name], *bodies[name]]) + "\n" for name in heads}
 
 
-def _nested(array: str, row: int, rank: int, degree: int) -> str:
+def _nested(array: str, first: int, row: int, rank: int, degree: int) -> str:
     places = {term: place for place, term in enumerate(monomials(rank, degree))}
 
     def part(term: tuple[int, ...]) -> str:
-        text = f"{array}{places[term]}, {row}]"
+        text = f"{array}[{(first + places[term]) * rank + row}]"
         if len(term) < degree:
             # The first variable's part takes longest: it is added last.
             for j in reversed(range(term[-1] if term else 0, rank)):
@@ -84,26 +79,20 @@ def _nested(array: str, row: int, rank: int, degree: int) -> str:
     return part(())
 
 
-@cache
-def map_module(states: int, degree: int) -> ModuleType:
+def map_loop(states: int, degree: int) -> Loop:
     """Compiled loop of `states` polynomials of that degree in one variable."""
-    from vehiclemor.reduction.polynomials import map_loops
-
     sizes = {"N": states, "DEGREE": degree}
-    return load_module("map_loops", linked_source("", [map_loops], sizes, "the path map"))
+    return loops((*NEWTON, "reduction.polynomials.map_loops"), ("map_path",), sizes=sizes)[
+        "map_path"
+    ]
 
 
-@cache
-def residual_module(inputs: int, rank: int, degree: int) -> ModuleType:
-    """Compiled loops of `rank` polynomial equations with so many inputs."""
-    from vehiclemor.reduction.polynomials import residual_loops as polynomial_residual_loops
-    from vehiclemor.simulation import newton_loops
-
+def residual_loop(name: str, inputs: int, rank: int, degree: int) -> Loop:
+    """Compiled loop of `rank` polynomial equations with so many inputs."""
     # The shared small solve is one of N equations: here these are the reduced ones.
     sizes = {"N": rank, "INPUTS": inputs}
-    loops = [newton_loops, polynomial_residual_loops]
-    source = linked_source(polynomial_source(rank, degree), loops, sizes, "polynomial residuals")
-    return load_module("polynomial_residual_loops", source)
+    modules = (*NEWTON, "reduction.polynomials.residual_loops")
+    return loops(modules, (name,), polynomial_kernels(rank, degree), sizes)[name]
 
 
 def checked_inputs(model: AlgebraicModel, maneuver: Maneuver) -> np.ndarray:

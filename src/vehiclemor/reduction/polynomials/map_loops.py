@@ -4,15 +4,24 @@ Samples are taken in blocks.  The number of powers is known to the compiler: the
 what is left is a loop over a block, which becomes vector code.
 """
 
-import numpy as np
-
-from vehiclemor.codegen.stubs import N
-from vehiclemor.reduction.polynomials.kernels import DEGREE
+from vehiclemor.codegen.loop_types import Float, Int, Matrix, Vector, matrix, vector
+from vehiclemor.simulation.newton_loops import CONVERGED, SAMPLE, Solution
 
 BLOCK = 64
+OUTSIDE = 1
+# Sizes that the compiler knows: coordinates, degree.
+N, DEGREE = 0, 0
 
 
-def map_path(inputs, centre, scale, limits, coefficients, path):
+def map_path(
+    inputs: Matrix,
+    centre: Float,
+    scale: Float,
+    limits: Vector,
+    coefficients: Matrix,
+    solution: Solution,
+    buffer: Vector,
+) -> Int:
     """Polynomials at every sample, by Horner's scheme; stops where an input is outside the limits.
 
     Parameters
@@ -25,16 +34,12 @@ def map_path(inputs, centre, scale, limits, coefficients, path):
         Lowest and highest travel, lowest and highest rack displacement (4,) in m.
     coefficients
         Those of the highest power first (DEGREE + 1, N).
-    path
-        Takes the coordinates (samples, N).
-
-    Returns
-    -------
-    tuple
-        0 and the number of samples, or 1 and the sample that is outside.
+    buffer
+        Scratch space (BLOCK (N + 1),), zero at first.
     """
+    path, counts = solution.path, solution.counts
     low, high, left, right = limits[0], limits[1], limits[2], limits[3]
-    arguments, results = np.zeros(BLOCK), np.zeros((N, BLOCK))
+    arguments, results = vector(buffer, 0, BLOCK), matrix(buffer, BLOCK, N, BLOCK)
     samples, first = inputs.shape[0], 0
     while first < samples:
         count = 0
@@ -56,5 +61,6 @@ def map_path(inputs, centre, scale, limits, coefficients, path):
                 path[first + place, i] = results[i, place]
         first += count
         if count < BLOCK and first < samples:
-            return 1, first
-    return 0, samples
+            counts[SAMPLE] = first
+            return OUTSIDE
+    return CONVERGED

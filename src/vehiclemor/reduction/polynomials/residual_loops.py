@@ -3,30 +3,68 @@
 The equations g(x) - response (u - u_mean) = 0 come multiplied by the inverse of their Jacobian at
 x = 0.  So the step of the chord method is the residual itself, and the matrix of Newton's method is
 near the unit matrix.  `terms` and `slopes` are written for the rank and the degree by
-`map_kernels.py`.
+`kernels.py`.
 """
 
-import numpy as np
+from typing import NamedTuple
 
-from vehiclemor.codegen.stubs import INPUTS, N
-from vehiclemor.reduction.polynomials.kernels import slopes, terms
-from vehiclemor.simulation.newton_loops import failure, small_solve
+from vehiclemor.codegen.loop_types import Cube, Int, Matrix, Vector, matrix, vector
+from vehiclemor.simulation.newton_loops import (
+    CONVERGED,
+    INPUTS,
+    JACOBIANS,
+    SAMPLE,
+    SINGULAR,
+    N,
+    Solution,
+    failure,
+    small_solve,
+)
+
+
+class Polynomials(NamedTuple):
+    """Reduced equations.
+
+    Attributes
+    ----------
+    means
+        Mean inputs, then mean coordinates (INPUTS + states,).
+    basis
+        Coordinates of each unit of a scaled reduced coordinate, by rows (N, states).
+    response
+        Change of g for each unit of an input (INPUTS, N).
+    coefficients, derivatives
+        Of each monomial in each equation (monomials, N), and of the derivatives by variable
+        (N, monomials of one degree less, N).
+    tolerances
+        Largest components (N,) of the last step (scaled reduced coordinates).
+    """
+
+    means: Vector
+    basis: Matrix
+    response: Matrix
+    coefficients: Matrix
+    derivatives: Cube
+    tolerances: Vector
+
+
+def terms(x: Vector, load: Vector, coefficients: Matrix, result: Vector) -> None:
+    """Polynomials at x (N,), less a load (N,), into result (N,): a kernel inside of the loop."""
+
+
+def slopes(x: Vector, derivatives: Cube, result: Matrix) -> None:
+    """Jacobian of the polynomials at x (N,) into result[:, :N]; result is (N, N + 1)."""
 
 
 def reduced_path(
-    inputs,
-    x_start,
-    means,
-    basis,
-    response,
-    coefficients,
-    derivatives,
-    newton,
-    tolerances,
-    limit,
-    path,
-    counts,
-):
+    inputs: Matrix,
+    x_start: Vector,
+    polynomials: Polynomials,
+    newton: Int,
+    limit: Int,
+    solution: Solution,
+    buffer: Vector,
+) -> Int:
     """Solve the reduced equations sample by sample.
 
     The iteration starts at a quadratic extrapolation of the last three samples, the first ones at
@@ -38,35 +76,26 @@ def reduced_path(
         Inputs (samples, INPUTS), SI units.
     x_start
         Scaled reduced coordinates (N,) of the first iteration's start.
-    means
-        Mean inputs, then mean coordinates (INPUTS + states,).
-    basis
-        Coordinates of each unit of a scaled reduced coordinate, by rows (N, states).
-    response
-        Change of g for each unit of an input (INPUTS, N).
-    coefficients, derivatives
-        Of each monomial in each equation (monomials, N), and of the derivatives by variable
-        (N, monomials of one degree less, N).
     newton
         Whether each iteration has a fresh Jacobian.
-    tolerances
-        Largest components (N,) of the last step (scaled reduced coordinates).
     limit
         Most iterations for a sample.
-    path
-        Takes the coordinates (samples, states).
-    counts
-        Takes the counts in the order of `ALGEBRAIC_COUNTS`.
-
-    Returns
-    -------
-    tuple
-        Status and sample, as the full-order loops do.
     """
-    x, first, second, third = x_start.copy(), np.empty(N), np.empty(N), np.empty(N)
-    load, step, matrix = np.empty(N), np.empty(N), np.empty((N, N + 1))
+    means, basis, response, coefficients, derivatives, tolerances = polynomials
+    path, counts = solution.path, solution.counts
+    x, first, second, third = (
+        vector(buffer, 0, N),
+        vector(buffer, N, N),
+        vector(buffer, 2 * N, N),
+        vector(buffer, 3 * N, N),
+    )
+    load, step = vector(buffer, 4 * N, N), vector(buffer, 5 * N, N)
+    matrix_of = matrix(buffer, 6 * N, N, N + 1)
+    for k in range(N):
+        x[k] = x_start[k]
     iterations = 0
     for sample in range(inputs.shape[0]):
+        counts[SAMPLE] = sample
         for k in range(N):
             total = 0.0
             for i in range(INPUTS):
@@ -80,13 +109,13 @@ def reduced_path(
             terms(x, load, coefficients, step)
             iterations += 1
             if newton:
-                slopes(x, derivatives, matrix)
+                slopes(x, derivatives, matrix_of)
                 for k in range(N):
-                    matrix[k, N] = step[k]
-                if not small_solve(matrix, N):
-                    return 3, sample
+                    matrix_of[k, N] = step[k]
+                if not small_solve(matrix_of, N):
+                    return SINGULAR
                 for k in range(N):
-                    step[k] = matrix[k, N]
+                    step[k] = matrix_of[k, N]
             converged = True
             for k in range(N):
                 x[k] -= step[k]
@@ -94,7 +123,7 @@ def reduced_path(
             if converged:
                 break
         if not converged:
-            return failure(x), sample
+            return failure(x)
         for k in range(N):
             third[k] = second[k]
             second[k] = first[k]
@@ -107,11 +136,12 @@ def reduced_path(
     for kind in range(4):
         counts[kind] = iterations
     if not newton:
-        counts[2] = 0
-    return 0, inputs.shape[0]
+        counts[JACOBIANS] = 0
+    return CONVERGED
 
 
-def terms_path(points, loads, coefficients, result):
+def terms_path(points: Matrix, loads: Matrix, coefficients: Matrix, result: Matrix) -> Int:
     """Values (samples, N) of the polynomials, less loads (samples, N), at points."""
     for sample in range(points.shape[0]):
         terms(points[sample], loads[sample], coefficients, result[sample])
+    return CONVERGED

@@ -11,58 +11,19 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.projection.bases import Basis, pod_basis, project
+from vehiclemor.reduction.interface import Offline, offline_cost
+from vehiclemor.reduction.projection.algebraic_loops import Windows
+from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
+from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
 from vehiclemor.reduction.projection.windows import first_samples
-from vehiclemor.reduction.settings import Setting, Value
+from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.newton_loops import Iteration
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 ITERATION_LIMIT = 50
-
-MOST_SNAPSHOTS = 100_000
-# Settings that every method on POD subspaces of algebraic equations shares.
-SUBSPACE_SETTINGS = {
-    "rank": Setting("integer", 3, "number of reduced coordinates", minimum=1),
-    "snapshots": Setting("integer", 10, "snapshots in each window and training run", minimum=2),
-    "rank_tolerance": Setting(
-        "number",
-        1e-10,
-        "modes with a singular value below it times the first are dropped; 0 keeps all",
-        minimum=0.0,
-    ),
-    "test_space": Setting(
-        "text",
-        "least_squares",
-        "least_squares: Gauss-Newton on the residual; galerkin: U^T Phi = 0 (paper, step 6)",
-        choices=("least_squares", "galerkin"),
-    ),
-    "equation_seed": Setting(
-        "integer",
-        0,
-        "galerkin: seed of a random order and signs of the equations; 0: natural",
-        minimum=0,
-    ),
-    "reversed_coordinates": Setting(
-        "text", "", "galerkin: coordinates counted the other way round, separated by commas"
-    ),
-    "tolerance": Setting(
-        "number", 1e-12, "largest step of the last iteration", minimum=0.0, above=True
-    ),
-    "rounding_seed": Setting(
-        "integer", 0, "seed of a relative noise of 2^-52 on the snapshots; 0: none", minimum=0
-    ),
-}
-# `literal` is the paper's words.  `recommended` is the default: least squares does not depend on
-# the order and signs in which the equations are written (galerkin does, by orders of magnitude),
-# and the rank cut keeps directions out that rounding chooses.
-SUBSPACE_PRESETS: dict[str, dict[str, Value]] = {
-    "recommended": {},
-    "literal": {"test_space": "galerkin", "rank_tolerance": 0.0},
-}
 
 
 @dataclass(frozen=True)
@@ -100,32 +61,22 @@ class ProjectedModel:
         n, windows = len(model.coordinates), len(self.bases)
         bases, tests = np.zeros((windows, n, n)), np.zeros((windows, n, n))
         for k, basis in enumerate(self.bases):
-            bases[k, :, : basis.rank] = basis.vectors
+            bases[k, : basis.rank] = basis.vectors.T
             if self.tests is not None:
-                tests[k, :, : basis.rank] = self.tests[k]
-        means = np.array([basis.mean for basis in self.bases])
-        ranks = np.array([basis.rank for basis in self.bases])
-        path = np.full((len(times), n), np.nan)
-        counts = np.zeros(len(ALGEBRAIC_COUNTS), dtype=np.int64)
-        arguments = (
-            model.start(start),
+                tests[k, : basis.rank] = self.tests[k].T
+        subspaces = Windows(
             first_samples(times, self.edges),
-            means,
+            np.array([basis.mean for basis in self.bases]),
             bases,
             tests,
-            ranks,
-            self.tests is None,
-            inputs,
-            model.constants,
-            self.tolerance,
-            ITERATION_LIMIT,
-            path,
-            counts,
+            np.array([basis.rank for basis in self.bases]),
         )
-        loop = model.kernels.projected_path
-        (status, sample), seconds = timed(lambda: loop(*arguments), counts)
-        failure = None if status == 0 else (status, sample)
-        return model.trajectory(times, inputs, path, counts, seconds, failure)
+        iteration = Iteration(self.tolerance, ITERATION_LIMIT, np.inf)
+        least_squares = int(self.tests is None)
+        given = (model.start(start), subspaces, least_squares, inputs, model.constants, iteration)
+        loop = model.loop("projected_path", "reduction.projection.algebraic_loops")
+        buffer = np.empty(4 * n + len(model.inputs) + n * n + 2 * n * (n + 1))
+        return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""
@@ -141,7 +92,7 @@ def fit_windows(
     model: AlgebraicModel,
     training: Sequence[TrainingRun],
     edges: np.ndarray,
-    settings: dict[str, Value],
+    settings: AlgebraicPodSettings,
 ) -> ProjectedModel:
     """POD subspaces of equidistant snapshots (both ends included) in each window.
 
@@ -151,43 +102,34 @@ def fit_windows(
         Runs whose snapshots are put side by side.
     edges
         Window edges (windows + 1,) in s.
-    settings
-        Validated `SUBSPACE_SETTINGS`.
     """
     began = time.perf_counter()
-    count, rank = int(settings["snapshots"]), int(settings["rank"])
+    count, rank = settings.snapshots, settings.rank
     moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]
     histories = [run.at(np.concatenate(moments)) for run in training]
     bases = []
     for k in range(len(moments)):
         part = slice(k * count, (k + 1) * count)
         snapshots = np.concatenate([history.coordinates[part] for history in histories]).T
-        snapshots = _rounded(snapshots, int(settings["rounding_seed"]))
-        bases.append(pod_basis(snapshots, rank, float(settings["rank_tolerance"])))
+        snapshots = _rounded(snapshots, settings.rounding_seed)
+        bases.append(pod_basis(snapshots, rank, settings.rank_tolerance))
     tests = None
-    if settings["test_space"] == "galerkin":
+    if settings.test_space == "galerkin":
         pairing = _pairing(model, settings)
         tests = tuple(pairing @ basis.vectors for basis in bases)
-    evaluations = sum(history.counts[model.evaluations] for history in histories)
-    offline = Offline(time.perf_counter() - began, evaluations)
-    return ProjectedModel(model, edges, tuple(bases), tests, offline, float(settings["tolerance"]))
+    offline = offline_cost(began, model, histories)
+    return ProjectedModel(model, edges, tuple(bases), tests, offline, settings.tolerance)
 
 
-def check_subspace(model: Model, settings: dict[str, Value]) -> None:
+def check_subspace(model: Model, settings: AlgebraicPodSettings) -> None:
     """Raise `InputError` if rank, snapshots or coordinate names don't fit the model."""
-    rank, snapshots = int(settings["rank"]), int(settings["snapshots"])
-    states = len(model.coordinates)
-    if rank > states:
-        raise InputError(f"rank {rank} is above the {states} coordinates of {model.name}")
-    if snapshots > MOST_SNAPSHOTS:
-        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
-    if rank > snapshots:
-        raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+    whose = f"coordinates of {model.name}"
+    check_pod(settings.rank, settings.snapshots, len(model.coordinates), whose)
     _reversed(model, settings)
 
 
-def _reversed(model: Model, settings: dict[str, Value]) -> list[int]:
-    names = [name for name in str(settings["reversed_coordinates"]).split(",") if name]
+def _reversed(model: Model, settings: AlgebraicPodSettings) -> list[int]:
+    names = [name for name in settings.reversed_coordinates.split(",") if name]
     for name in names:
         if name not in model.coordinates:
             known = ", ".join(model.coordinates)
@@ -195,7 +137,7 @@ def _reversed(model: Model, settings: dict[str, Value]) -> list[int]:
     return [model.coordinates.index(name) for name in names]
 
 
-def _pairing(model: AlgebraicModel, settings: dict[str, Value]) -> np.ndarray:
+def _pairing(model: AlgebraicModel, settings: AlgebraicPodSettings) -> np.ndarray:
     """Matrix P such that the Galerkin test basis is P U.
 
     Equations reordered and with other signs are D Phi with a signed permutation D, so that
@@ -204,7 +146,7 @@ def _pairing(model: AlgebraicModel, settings: dict[str, Value]) -> np.ndarray:
     """
     n = len(model.coordinates)
     pairing = np.eye(n)
-    seed = int(settings["equation_seed"])
+    seed = settings.equation_seed
     if seed:
         generator = np.random.default_rng(seed)
         order = generator.permutation(n)

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vehiclemor.errors import InputError
+
+MOST_SNAPSHOTS = 100_000
+
 
 @dataclass(frozen=True)
 class Basis:
@@ -64,3 +68,18 @@ def project(coordinates: np.ndarray, basis: Basis) -> np.ndarray:
     """Best approximation (samples, n) of coordinates (samples, n) in the affine subspace."""
     centred = coordinates - basis.mean
     return basis.mean + (centred @ basis.vectors) @ basis.vectors.T
+
+
+def check_snapshots(snapshots: int, rank: int = 0) -> None:
+    """Raise `InputError` if there are too many snapshots, or fewer than the rank."""
+    if snapshots > MOST_SNAPSHOTS:
+        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
+    if rank > snapshots:
+        raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+
+
+def check_pod(rank: int, snapshots: int, states: int, whose: str) -> None:
+    """Raise `InputError` if a rank is above the number of states or of snapshots."""
+    if rank > states:
+        raise InputError(f"rank {rank} is above the {states} {whose}")
+    check_snapshots(snapshots, rank)

@@ -8,8 +8,8 @@ compared.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -17,68 +17,16 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.online_settings import (
-    PROJECTED_SOLVERS,
-    PROJECTED_TEXT,
-    online_settings,
-)
-from vehiclemor.reduction.projection.bases import Basis, pod_basis
-from vehiclemor.reduction.projection.inner_products import (
-    INNER_PRODUCTS,
-    coordinate_weight,
-    state_weight,
-)
+from vehiclemor.reduction.interface import Offline, offline_cost
+from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
+from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
+from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.reduction.projection.windows import first_samples
-from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.spaces import Spaces
-from vehiclemor.simulation.system_loops import COORDINATES, STATE
+from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.trajectory import Start, Trajectory
-
-FORMULATIONS = ("coordinates", "state", "paired")
-MOST_SNAPSHOTS = 100_000
-DYNAMIC_SETTINGS = {
-    "rank": Setting("integer", 3, "number of basis vectors in each window", minimum=1),
-    "snapshots": Setting("integer", 10, "snapshots in each window and training run", minimum=2),
-    "rank_tolerance": Setting(
-        "number",
-        1e-6,
-        "modes with a singular value below it times the first are dropped; 0 keeps all",
-        minimum=0.0,
-    ),
-    "formulation": Setting(
-        "text",
-        "coordinates",
-        "coordinates: V^T M V qh'' = V^T F; state: all states in one basis (the paper's words); "
-        "paired: first order, the coordinates' basis for speeds too",
-        choices=FORMULATIONS,
-    ),
-    "inner_product": Setting(
-        "text",
-        "energy",
-        "of the snapshots: euclidean, energy (mass matrix), range (each state by its range)",
-        choices=INNER_PRODUCTS,
-    ),
-    **online_settings("explicit", 1e-6, PROJECTED_TEXT, PROJECTED_SOLVERS),
-}
-# `literal` is the paper's words.  `recommended` is the default by measurement: it alone keeps the
-# published errors from both starts, and its projected equations keep the model's energy.
-DYNAMIC_PRESETS: dict[str, dict[str, Value]] = {
-    "recommended": {},
-    "literal": {"formulation": "state", "inner_product": "euclidean", "rank_tolerance": 0.0},
-}
-
-# With constraints: the paper's rank and snapshots.  One mode of the states holds position and speed
-# together, so that one coordinate can follow a maneuver; weighed by energy it keeps the published
-# errors from both starts, and no rank makes the reduced equations unstable.
-CONSTRAINED_DEFAULTS: dict[str, Value] = {"rank": 1, "snapshots": 5, "formulation": "state"}
-CONSTRAINED_SETTINGS = {
-    name: replace(setting, default=CONSTRAINED_DEFAULTS.get(name, setting.default))
-    for name, setting in DYNAMIC_SETTINGS.items()
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +36,7 @@ class ReducedDynamicModel:
     Attributes
     ----------
     formulation
-        One of `FORMULATIONS`.
+        Which equations are projected, see `pod_settings`.
     bases
         Basis of each window, orthonormal in its inner product: of the states for `state`, else of
         the coordinates.
@@ -101,7 +49,7 @@ class ReducedDynamicModel:
     model: DynamicModel
     formulation: str
     bases: tuple[Basis, ...]
-    spaces: Spaces
+    spaces: ProjectionWindows
     offline: Offline
     solver: str
     tolerance: float
@@ -127,26 +75,25 @@ class ReducedDynamicModel:
     def _project(self, states: np.ndarray, window: int) -> np.ndarray:
         spaces, n = self.spaces, len(self.model.coordinates)
         mean, rank = spaces.means[window], spaces.ranks[window]
-        lift, drop = spaces.lifts[window], spaces.drops[window]
-        if spaces.form == STATE:
-            lift, drop = lift[:rank], drop[:rank]
-            return mean + (states - mean) @ drop.T @ lift
-        lift, drop = lift[: rank // 2, :n], drop[: rank // 2, :n]
+        trial, test = spaces.trial_basis[window], spaces.test_basis[window]
+        if spaces.formulation == "state":
+            return mean + (states - mean) @ test[:rank].T @ trial[:rank]
+        trial, test = trial[: rank // 2, :n], test[: rank // 2, :n]
         inputs = np.zeros((len(states), len(self.model.inputs)))
         rates = self.model.derivatives_at(states, inputs)[:, :n]
         result = np.empty_like(states)
-        result[:, :n] = mean[:n] + (states[:, :n] - mean[:n]) @ drop.T @ lift
-        result[:, n:] = rates @ drop.T @ lift
+        result[:, :n] = mean[:n] + (states[:, :n] - mean[:n]) @ test.T @ trial
+        result[:, n:] = rates @ test.T @ trial
         for row in result:
             row[n:] = self.model.speeds_of_rates(row)
         return result
 
     @cached_property
-    def growth_rates(self) -> np.ndarray:
+    def spectral_abscissas(self) -> np.ndarray:
         """Largest real part of an eigenvalue of each window's reduced Jacobian (windows,), 1/s.
 
-        At the mean of the window's snapshots, without steering.  A rate far above those of the
-        full model says that the projection has made the system unstable.
+        At the mean of the window's snapshots, without steering.  One far above that of the full
+        model says that the projection has made the system unstable.
         """
         model, spaces = self.model, self.spaces
         rates = np.empty(len(self.bases))
@@ -160,9 +107,9 @@ class ReducedDynamicModel:
     def _at_mean(self, window: int) -> np.ndarray:
         """Reduced coordinates of the mean; rates too, where these are coordinates of their own."""
         y = np.zeros(self.spaces.ranks.max())
-        if self.spaces.form == COORDINATES:
+        if self.spaces.formulation == "coordinates":
             rank = self.spaces.ranks[window] // 2
-            y[rank : 2 * rank] = self.spaces.drops[window, :rank, :] @ self._mean_rates[window]
+            y[rank : 2 * rank] = self.spaces.test_basis[window, :rank, :] @ self._mean_rates[window]
         return y
 
     @cached_property
@@ -174,16 +121,16 @@ class ReducedDynamicModel:
         return rates
 
     @property
-    def growth_rate(self) -> float:
-        """Largest growth rate in any window, 1/s."""
-        return float(self.growth_rates.max())
+    def spectral_abscissa(self) -> float:
+        """Largest spectral abscissa in any window, 1/s."""
+        return float(self.spectral_abscissas.max())
 
 
 def fit_windows(
     model: DynamicModel,
     training: Sequence[TrainingRun],
     edges: np.ndarray,
-    settings: Mapping[str, Value],
+    settings: DynamicPodSettings,
 ) -> ReducedDynamicModel:
     """POD subspaces of equidistant snapshots (both ends included) in each window.
 
@@ -193,8 +140,6 @@ def fit_windows(
         Runs whose snapshots are put side by side.
     edges
         Window edges (windows + 1,) in s.
-    settings
-        Validated `DYNAMIC_SETTINGS`.
 
     Raises
     ------
@@ -206,19 +151,12 @@ def fit_windows(
         lengths = ", ".join(f"{duration:g}" for duration in durations)
         raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
     began = time.perf_counter()
-    count, formulation = int(settings["snapshots"]), str(settings["formulation"])
+    count, formulation = settings.snapshots, settings.formulation
     moments = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
     # The same time twice, at inner edges, needs one sample.
     unique, places = np.unique(moments, return_inverse=True)
     histories = [run.at(unique) for run in training]
-    n = len(model.coordinates)
-    everything = np.concatenate([history.states for history in histories])
-    inner_product = str(settings["inner_product"])
-    if formulation == "state":
-        period = float(edges[1] - edges[0])
-        weight, width = state_weight(model, inner_product, everything, period), 2 * n
-    else:
-        weight, width = coordinate_weight(model, inner_product, everything[:, :n]), n
+    weight = _weight(model, settings, histories, float(edges[1] - edges[0]))
     root = np.linalg.cholesky(weight)
     bases, means = [], []
     for k in range(len(edges) - 1):
@@ -227,24 +165,35 @@ def fit_windows(
         means.append(snapshots.mean(axis=0))
         # In the coordinates root^T x the inner product is the Euclidean one.
         scaled = pod_basis(
-            (snapshots[:, :width] @ root).T,
-            int(settings["rank"]),
-            float(settings["rank_tolerance"]),
+            (snapshots[:, : len(weight)] @ root).T, settings.rank, settings.rank_tolerance
         )
         vectors = np.linalg.solve(root.T, scaled.vectors)
-        bases.append(Basis(means[-1][:width], vectors, scaled.singular_values))
+        bases.append(Basis(means[-1][: len(weight)], vectors, scaled.singular_values))
     spaces = _spaces(model, formulation, edges, np.array(means), bases, weight)
-    evaluations = sum(history.counts[model.evaluations] for history in histories)
-    offline = Offline(time.perf_counter() - began, evaluations)
+    offline = offline_cost(began, model, histories)
     return ReducedDynamicModel(
         model,
         formulation,
         tuple(bases),
         spaces,
         offline,
-        str(settings["solver"]),
-        float(settings["tolerance"]),
+        settings.solver,
+        settings.tolerance,
     )
+
+
+def _weight(
+    model: DynamicModel,
+    settings: DynamicPodSettings,
+    histories: Sequence[Trajectory],
+    period: float,
+) -> np.ndarray:
+    """Weight of the inner product: of all states (2 n, 2 n) or of the coordinates (n, n)."""
+    states = np.concatenate([history.states for history in histories])
+    if settings.formulation == "state":
+        return state_weight(model, settings.inner_product, states, period)
+    coordinates = states[:, : len(model.coordinates)]
+    return coordinate_weight(model, settings.inner_product, coordinates)
 
 
 def _spaces(
@@ -254,10 +203,10 @@ def _spaces(
     means: np.ndarray,
     bases: Sequence[Basis],
     weight: np.ndarray,
-) -> Spaces:
+) -> ProjectionWindows:
     n, windows = len(model.coordinates), len(bases)
     rows = max(basis.rank for basis in bases) * (2 if formulation == "paired" else 1)
-    lifts, drops = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
+    trial, test = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
     ranks = np.empty(windows, dtype=np.int64)
     # The speeds that go with rates of the coordinates, where angles are small.
     turn = (
@@ -269,27 +218,22 @@ def _spaces(
     for k, basis in enumerate(bases):
         r, width = basis.rank, len(basis.mean)
         up, down = basis.vectors.T, basis.vectors.T @ weight
-        lifts[k, :r, :width], drops[k, :r, :width] = up, down
+        trial[k, :r, :width], test[k, :r, :width] = up, down
         if formulation == "paired":
-            lifts[k, r : 2 * r, n:], drops[k, r : 2 * r, n:] = up @ turn.T, down @ back
+            trial[k, r : 2 * r, n:], test[k, r : 2 * r, n:] = up @ turn.T, down @ back
         ranks[k] = r if formulation == "state" else 2 * r
-    form = COORDINATES if formulation == "coordinates" else STATE
-    return Spaces(form, edges, means, lifts, drops, ranks)
+    form = "coordinates" if formulation == "coordinates" else "state"
+    return ProjectionWindows(form, edges, means, trial, test, ranks)
 
 
-def check_subspace(model: DynamicModel, settings: Mapping[str, Value]) -> None:
+def check_subspace(model: DynamicModel, settings: DynamicPodSettings) -> None:
     """Raise `InputError` if the settings don't fit the model."""
-    formulation, energy = settings["formulation"], settings["inner_product"] == "energy"
+    formulation, energy = settings.formulation, settings.inner_product == "energy"
     if formulation == "coordinates" or energy:
         model.require("second_order")
     if formulation != "state" or energy:
         model.require("speeds")
-    rank, snapshots = int(settings["rank"]), int(settings["snapshots"])
-    states = len(model.coordinates) * (2 if settings["formulation"] == "state" else 1)
-    if rank > states:
-        kind = "states" if settings["formulation"] == "state" else "coordinates"
-        raise InputError(f"rank {rank} is above the {states} {kind} of {model.name}")
-    if snapshots > MOST_SNAPSHOTS:
-        raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
-    if rank > snapshots:
-        raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+    states, kind = len(model.coordinates), "coordinates"
+    if formulation == "state":
+        states, kind = 2 * states, "states"
+    check_pod(settings.rank, settings.snapshots, states, f"{kind} of {model.name}")

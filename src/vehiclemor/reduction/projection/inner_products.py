@@ -5,7 +5,6 @@ import numpy as np
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 
-INNER_PRODUCTS = ("euclidean", "energy", "range")
 # A state whose range is below this share of the largest one is noise, not motion.
 SMALLEST_RANGE = 1e-6
 

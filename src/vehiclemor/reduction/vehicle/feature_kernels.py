@@ -1,9 +1,9 @@
 """Text of the kernels of a reduced vehicle: its right-hand side, and whole steps of two methods.
 
 With a handful of states the loops of a general integrator take longer than the right-hand side, so
-a step is straight-line code of its own: of the W-method, see `simulation/stepped_loops`, and, where
-the Jacobian has small diagonal blocks, of the exponential method, see
-`simulation/modal_loops`.
+a step is straight-line code of its own: of the W-method, see `integrators/fused_ros34pw2`, and,
+where the Jacobian has small diagonal blocks, of the exponential method, see
+`integrators/fused_etdrk4`.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.simulation.exponential_functions import TABLES
-from vehiclemor.simulation.exponential_loops import ERROR_SHARE
-from vehiclemor.simulation.rosenbrock_methods import ROS34PW2
+from vehiclemor.simulation.integrators import ros34pw2, tableaus
+from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
+from vehiclemor.simulation.integrators.exponential_functions import TABLES
 
 if TYPE_CHECKING:
     from vehiclemor.reduction.vehicle.features import Features
@@ -53,6 +53,14 @@ def kernel_text(features: Features, parameters: int) -> str:
     return "\n".join(kernels)
 
 
+def columns_text(features: Features) -> str:
+    """Source of the kernel that evaluates the features; its constants are their parameters."""
+    lines = [f"z{i} = _x[{i}]" for i in range(features.states)] + _inputs_at(features, 0)
+    lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
+    lines += [f"_result[{i}] = {_constants(text)}" for i, text in enumerate(features.terms)]
+    return _function("columns", lines)
+
+
 def _inputs_at(features: Features, first: int) -> list[str]:
     return [f"u{i} = _u[{first + i}]" for i in range(features.inputs)]
 
@@ -81,23 +89,23 @@ def _rates(features: Features, state: str, mark: str, parameters: int) -> list[s
 
 
 def _w_step(features: Features, parameters: int) -> str:
-    """A whole step of the W-method without a loop, see `stepped_loops`."""
-    dim, method = features.states + PLANAR, ROS34PW2
+    """A whole step of the W-method without a loop, see `fused_ros34pw2`."""
+    dim, tableau = features.states + PLANAR, tableaus.ros34pw2()
+    a, gamma_c = tableau[:4], tableau[4:8]
+    m, e = tableau[ros34pw2.M], tableau[ros34pw2.E]
     active = dim - 2
     lines = [f"y{i} = _x[{i}]" for i in range(dim)]
     lines += [f"rate0_{i} = _x[{dim + i}]" for i in range(dim)]
-    lines += [f"h = _x[{2 * dim}]", f"scale = {float(method.gamma)!r} * h"]
+    lines += [f"h = _x[{2 * dim}]", f"scale = {ros34pw2.GAMMA!r} * h"]
     for stage in range(4):
         if stage:
             for i in range(dim):
-                parts = [f"{float(method.a[stage, j])!r} * s{j}_{i}" for j in range(stage)]
+                parts = [f"{float(a[stage, j])!r} * s{j}_{i}" for j in range(stage)]
                 lines.append(f"m{i} = y{i} + {' + '.join(parts)}")
             lines += _inputs_at(features, (stage - 1) * features.inputs)
             lines += _rates(features, "m", str(stage), parameters)
         for i in range(dim):
-            parts = [
-                f"{float(method.gamma * method.c[stage, j])!r} * s{j}_{i}" for j in range(stage)
-            ]
+            parts = [f"{float(gamma_c[stage, j])!r} * s{j}_{i}" for j in range(stage)]
             lines.append(f"b{i} = " + " + ".join([f"scale * rate{stage}_{i}", *parts]))
         names = ", ".join(f"v{i}" for i in range(dim))
         factors = ", ".join(f"b{i}" for i in range(active))
@@ -106,22 +114,22 @@ def _w_step(features: Features, parameters: int) -> str:
         lines += [f"s{stage}_{i} = v{i}" for i in range(active)]
         lines += [f"s{stage}_{i} = v{i} + b{i}" for i in range(active, dim)]
     for i in range(dim):
-        new = " + ".join(f"{float(method.m[j])!r} * s{j}_{i}" for j in range(4))
-        error = " + ".join(f"{float(method.e[j])!r} * s{j}_{i}" for j in range(4))
+        new = " + ".join(f"{float(m[j])!r} * s{j}_{i}" for j in range(4))
+        error = " + ".join(f"{float(e[j])!r} * s{j}_{i}" for j in range(4))
         lines += [f"n{i} = y{i} + {new}", f"_result[{i}] = n{i}"]
         lines.append(f"_result[{dim + i}] = {error}")
     # The third stage was at the end of the step: its inputs serve.
     lines += _rates(features, "n", "", parameters)
     lines += [f"_result[{2 * dim + i}] = rate_{i}" for i in range(dim)]
-    return _function("w_step", lines)
+    return _function("ros34pw2_step", lines)
 
 
 def _exponential_step(features: Features, parameters: int) -> str:
-    """A whole step of the exponential method without a loop, see `modal_loops`."""
+    """A whole step of the exponential method without a loop, see `fused_etdrk4`."""
     dim = features.states + PLANAR
     blocks = diagonal_blocks(features.diagonal)
     entries = sum(len(block) ** 2 for block in blocks)
-    place, first = {}, 5 * dim + 4
+    place, first = {}, 4 * dim + 4
     for block in blocks:
         for i in block:
             for j in block:
@@ -144,11 +152,11 @@ def _exponential_step(features: Features, parameters: int) -> str:
             lines.append(f"d{number}_{i} = {change}{linear}")
         return lines
 
-    names = ("y", "f", "y_before", "f_before", "typical")
+    names = ("y", "f", "y_before", "f_before")
     every = range(dim)
     lines = [f"{name}{i} = _x[{n * dim + i}]" for n, name in enumerate(names) for i in every]
     scalars = ("h", "at_past", "at_half", "at_end")
-    lines += [f"{name} = _x[{5 * dim + n}]" for n, name in enumerate(scalars)]
+    lines += [f"{name} = _x[{4 * dim + n}]" for n, name in enumerate(scalars)]
     lines += [f"half{i} = h * {product(HALF_FIRST, 'f', i)}" for i in every]
     lines += [f"whole{i} = h * {product(FIRST, 'f', i)}" for i in every]
     lines += [f"moved{i} = half{i}" for i in every] + [f"m{i} = y{i} + moved{i}" for i in every]
@@ -184,17 +192,8 @@ def _exponential_step(features: Features, parameters: int) -> str:
         # What the cubic between the ends of a step misses of linear motion.
         defect = f"half{i} - 0.5 * whole{i} + 0.125 * h * {product(JACOBIAN, 'whole', i)}"
         missed = f" + abs({defect})" if (i, i) in place else ""
-        size = f"(abs({product(LAST, 'q', i)}){missed})"
-        lines.append(f"e{i} = {size} / (typical{i} + abs(n{i}))")
-    # The larger of two, by arithmetic that keeps what is not a number.
-    left = [f"e{i}" for i in every]
-    while len(left) > 1:
-        a, b = left.pop(0), left.pop(0)
-        name = f"larger{len(left)}"
-        lines.append(f"{name} = 0.5 * ({a} + {b} + abs({a} - {b}))")
-        left.append(name)
-    lines.append(f"_result[{5 * dim}] = {left[0]}")
-    return _function("exponential_step", lines)
+        lines.append(f"_result[{5 * dim + i}] = abs({product(LAST, 'q', i)}){missed}")
+    return _function("etdrk4_step", lines)
 
 
 def _function(name: str, lines: Sequence[str]) -> str:

@@ -17,10 +17,15 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from vehiclemor.codegen.cache import load_module
-from vehiclemor.codegen.link import kernels_source
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.vehicle.feature_kernels import PLANAR, diagonal_blocks, kernel_text
+from vehiclemor.reduction.vehicle.feature_kernels import (
+    PLANAR,
+    columns_text,
+    diagonal_blocks,
+    kernel_text,
+)
+from vehiclemor.simulation.paths import along
 from vehiclemor.simulation.system import System
 
 
@@ -57,22 +62,17 @@ class Features:
         everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
         return self.groups or (everything,)
 
-    # What is evaluated is text of this package, not of a user.
     def at(self, z: np.ndarray, u: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""
-        values: dict[str, object] = {"abs": np.abs, "p": parameters}
-        values |= {f"z{i}": z[:, i] for i in range(self.states)}
-        values |= {f"u{i}": u[:, i] for i in range(self.inputs)}
-        for name, expression in self.lines:
-            values[name] = eval(expression, {"__builtins__": {}}, values)  # noqa: S307
-        columns = [eval(term, {"__builtins__": {}}, values) for term in self.terms]  # noqa: S307
-        return np.column_stack([np.broadcast_to(column, len(z)) for column in columns])
+        kernels = Kernels(kernel_sources(columns_text(self)))
+        sizes = self.states, self.inputs, len(self.terms)
+        return along(kernels, "columns", parameters, (z, u), sizes)
 
     def system(
         self,
         parameters: np.ndarray,
         coefficients: np.ndarray,
-        typical: np.ndarray,
+        error_scale: np.ndarray,
         reference: np.ndarray,
     ) -> System:
         """The reduced vehicle as the compiled loops take it.
@@ -83,7 +83,7 @@ class Features:
             Of the features.
         coefficients
             C (terms, states + 3): columns of z', then of psi', U and V.
-        typical
+        error_scale
             Magnitude of each state (states + 3,) below which errors count absolutely.
         reference
             Reduced coordinates (states,) at which the Jacobian is frozen.
@@ -92,22 +92,17 @@ class Features:
         for block, (terms, columns) in zip(blocks, self.blocks, strict=True):
             block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
         constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
-        sizes = {"WORK": 0, "CONSTANTS": len(constants)}
-        text = kernel_text(self, len(parameters))
-        kernels = load_module("features", kernels_source(text, sizes, "features"))
-        machines = kernels._derivative_machine, kernels._w_step_machine
-        addresses = [machines[0].address, 0, machines[1].address, 0]
-        if self.diagonal:
-            addresses[3] = kernels._exponential_step_machine.address
         dim = self.states + PLANAR
+        fused = {"ros34pw2": "ros34pw2_step"} | ({"etdrk4": "etdrk4_step"} if self.diagonal else {})
         return System(
-            (constants, np.array(addresses, dtype=np.int64)),
+            Kernels(kernel_sources(kernel_text(self, len(parameters)))),
+            constants,
             self.inputs,
             np.concatenate([reference, np.zeros(PLANAR)]),
-            typical,
+            error_scale,
             np.arange(dim - 2),
             np.zeros(0, dtype=np.int64),
-            stepped=True,
+            fused,
             diagonal=diagonal_blocks(self.diagonal),
         )
 

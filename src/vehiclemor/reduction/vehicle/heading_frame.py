@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.codegen.cache import load_module
-from vehiclemor.codegen.link import kernels_source
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.system import System
 
@@ -24,14 +23,10 @@ def heading_frame(shape: VehicleShape) -> System:
     model = shape.model
     if not shape.pairs:
         return model.system
-    text = heading_frame_text(model.kernels._derivative_text, model.planar, shape.pairs)
-    sizes = {"WORK": model.kernels.WORK, "CONSTANTS": model.kernels.CONSTANTS}
-    kernels = load_module(
-        "heading_frame", kernels_source(text, sizes, f"{model.name}, speeds in the heading frame")
-    )
-    addresses = np.array([kernels._derivative_machine.address, 0, 0, 0], dtype=np.int64)
-    nothing = np.zeros(0, dtype=np.int64)
-    return replace(model.system, machine=(model.constants, addresses), turning=nothing)
+    own = model.kernels.sources["derivative"].text
+    text = heading_frame_text(own, model.planar, shape.pairs)
+    kernels = Kernels(kernel_sources(text))
+    return replace(model.system, kernels=kernels, rotating=np.zeros(0, dtype=np.int64))
 
 
 def heading_frame_text(text: str, planar: np.ndarray, pairs: Sequence[tuple[int, int]]) -> str:

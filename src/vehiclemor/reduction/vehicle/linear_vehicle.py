@@ -11,14 +11,12 @@ and the dynamics are those of the model's own speed.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.settings import Value
+from vehiclemor.reduction.interface import Offline, offline_cost
+from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -75,7 +73,7 @@ def lateral_modes(shape: VehicleShape) -> Lateral:
 
 
 def linear_vehicle(
-    shape: VehicleShape, lateral: Lateral, settings: Mapping[str, Value], began: float
+    shape: VehicleShape, lateral: Lateral, settings: OnlineSettings, began: float
 ) -> ReducedVehicle:
     """A reduced vehicle of linear lateral dynamics at the speed of the start.
 
@@ -83,8 +81,6 @@ def linear_vehicle(
     ----------
     shape, lateral
         Shape and what moves it.
-    settings
-        With the solver and its tolerance.
     began
         `time.perf_counter()` when the work began.
     """
@@ -116,8 +112,8 @@ def linear_vehicle(
         np.vstack([lateral.feedthrough, np.zeros(inputs)]),
         np.concatenate([typical(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
         linearisation_cost(shape, began),
-        str(settings["solver"]),
-        float(settings["tolerance"]),
+        settings.solver,
+        settings.tolerance,
         modes.symmetric,
     )
 
@@ -133,4 +129,4 @@ def typical(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
 
 def linearisation_cost(shape: VehicleShape, began: float) -> Offline:
     """Seconds since `began`; two evaluations for every state and input."""
-    return Offline(time.perf_counter() - began, 2 * sum(shape.linearised.b.shape))
+    return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))

@@ -50,25 +50,25 @@ def pruned(
     k = reduced.features.states - 1
     normal = normal_matrix(reduced, goals, table.free)
     c = reduced.coefficients.copy()
-    curved, bent = table.curved, table.bent
+    odd, even = table.odd_nonlinear, table.even_nonlinear
     places = [(i, column) for terms, column in table.free for i in terms]
     rows, columns = np.array(places).T
     numbers = {place: n for n, place in enumerate(places)}
     lateral = sorted({column for _, column in places})
-    groups = [[numbers[i, column] for column in lateral] for i in curved]
+    groups = [[numbers[i, column] for column in lateral] for i in odd]
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
     # The symmetric equations are fitted to rates; each counts by its nonlinear part.
-    values = reduced.features.at(slow, inputs, reduced.parameters)[:, bent]
-    symmetric = c[np.ix_(bent, [k, k + 2])]
+    values = reduced.features.at(slow, inputs, reduced.parameters)[:, even]
+    symmetric = c[np.ix_(even, [k, k + 2])]
     sizes = np.mean((values @ symmetric) ** 2, axis=0)
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     normal = np.kron(np.diag(weights), values.T @ values)
-    groups = [[i, len(bent) + i] for i in range(len(bent))]
-    most = min(len(bent), max(1, round(SYMMETRIC * kept)))
+    groups = [[i, len(even) + i] for i in range(len(even))]
+    most = min(len(even), max(1, round(SYMMETRIC * kept)))
     left_even, changed = surviving(normal, symmetric.T.ravel(), groups, most)
-    c[np.ix_(bent, [k, k + 2])] = changed.reshape(2, -1).T
-    linear = [*table.odd[: table.heads], *table.even[:2]]
-    stay = sorted([*linear, *(curved[i] for i in left), *(bent[i] for i in left_even)])
+    c[np.ix_(even, [k, k + 2])] = changed.reshape(2, -1).T
+    linear = [*table.odd[: table.linear_count], *table.even[:2]]
+    stay = sorted([*linear, *(odd[i] for i in left), *(even[i] for i in left_even)])
     fewer = table.with_only(stay)
     return (
         replace(

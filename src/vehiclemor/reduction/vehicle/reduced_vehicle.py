@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.spaces import whole_space
-from vehiclemor.simulation.system import System
+from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Run, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Step of the reduced coordinates in differences.
@@ -65,7 +65,7 @@ class ReducedVehicle:
         Reduced coordinates per deviation of the shape (states, n).
     feedthrough
         Reduced coordinates per input (states, inputs), to be subtracted at the start.
-    typical
+    error_scale
         Magnitude of each reduced state (states + 3,).
     transient
         What is added to the lifted shapes.
@@ -81,7 +81,7 @@ class ReducedVehicle:
     lifting: np.ndarray
     encoding: np.ndarray
     feedthrough: np.ndarray
-    typical: np.ndarray
+    error_scale: np.ndarray
     offline: Offline
     solver: str
     tolerance: float
@@ -94,7 +94,7 @@ class ReducedVehicle:
         return self.features.states + PLANAR
 
     @cached_property
-    def growth_rate(self) -> float:
+    def spectral_abscissa(self) -> float:
         """Largest real part (1/s) of the eigenvalues at straight running; not of heading, place."""
         k = self.features.states
         steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
@@ -107,11 +107,22 @@ class ReducedVehicle:
     def system(self) -> System:
         """Compiled equations."""
         reference = np.zeros(self.features.states)
-        return self.features.system(self.parameters, self.coefficients, self.typical, reference)
+        return self.features.system(self.parameters, self.coefficients, self.error_scale, reference)
 
-    def with_coefficients(self, coefficients: np.ndarray) -> ReducedVehicle:
-        """The same with other coefficients of the equations."""
-        return replace(self, coefficients=coefficients)
+    @cached_property
+    def equations(self) -> ReducedSystem:
+        """The compiled equations with the ways there and back."""
+        return ReducedSystem(
+            self.model,
+            self.system,
+            whole_space(self.effective_rank),
+            self.encoded,
+            self.lifted,
+            self.effective_rank,
+            self.offline,
+            self.solver,
+            self.tolerance,
+        )
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
@@ -120,33 +131,28 @@ class ReducedVehicle:
         x, y, heading = self.model.planar
         return np.concatenate([z, state[[heading, x, y]]])
 
+    def lifted(self, run: Run, inputs: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Full states (samples, 2 n) of a run from a full state (2 n,)."""
+        k = self.features.states
+        features = self.lifted_features or self.features
+        columns = features.at(run.path[:, :k], inputs, self.parameters)
+        shapes = self.shape.reference + columns @ self.lifting
+        if len(self.transient.rates):
+            deviation = self.shape.of(start[None])[0] - self.shape.reference
+            shapes += self.transient.at(run.times, deviation)
+        return self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+
     def path(
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
-    ) -> tuple[np.ndarray, str]:
-        """Reduced states (samples, states + 3), and why the run has failed, if it has."""
-        run = self._run(maneuver, start, times)
-        return run.path, run.failure
-
-    def _run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None):  # noqa: ANN202
-        check_inputs(maneuver, self.model.name, self.model.inputs)
-        y = self.encoded(self.model.start(start), maneuver.at(np.zeros(1))[0])
-        space = whole_space(len(y))
-        return self.system.run(maneuver, y, space, self.solver, self.tolerance, times)
+    ) -> np.ndarray | None:
+        """Reduced states (samples, states + 3), if the run comes to its end."""
+        run = self.equations.run(maneuver, start, times)
+        return None if run.failure or not np.isfinite(run.path).all() else run.path
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        run = self._run(maneuver, start)
-        inputs = maneuver.at(run.times)
-        k = self.features.states
-        lifted = self.lifted_features or self.features
-        columns = lifted.at(run.path[:, :k], inputs, self.parameters)
-        shapes = self.shape.reference + columns @ self.lifting
-        if len(self.transient.rates):
-            deviation = self.shape.of(self.model.start(start)[None])[0] - self.shape.reference
-            shapes += self.transient.at(run.times, deviation)
-        states = self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
-        return self.model.recorded(maneuver, run, inputs, states)
+        return self.equations.simulate(maneuver, start)
 
-    def best_approximation(self, states: np.ndarray) -> None:
+    def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002
         """Lifted shapes lie on no subspace."""
-        del states
+        return

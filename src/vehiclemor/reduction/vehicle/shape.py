@@ -17,7 +17,6 @@ from functools import cached_property
 import numpy as np
 
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model
 
 STEP = 6e-6
 INPUT_STEP = 1e-5
@@ -72,7 +71,7 @@ class VehicleShape:
     @cached_property
     def pairs(self) -> list[tuple[int, int]]:
         """Numbers of pairs of states, other than the place, that are components in space."""
-        turning, place = self.model.turning, set(self.model.planar)
+        turning, place = self.model.rotating, set(self.model.planar)
         pairs = [(int(a), int(b)) for a, b in zip(turning[1::2], turning[2::2], strict=True)]
         return [pair for pair in pairs if not set(pair) <= place]
 
@@ -88,14 +87,14 @@ class VehicleShape:
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """Shapes (samples, n) of states (samples, 2 n)."""
-        return _turned(states, self.pairs, -states[:, self.model.planar[2]])[:, self.kept]
+        return turned(states, self.pairs, -states[:, self.model.planar[2]])[:, self.kept]
 
     def states(self, shapes: np.ndarray, planar: np.ndarray) -> np.ndarray:
         """States of shapes (samples, n) at places and headings (samples, 3); wheels don't turn."""
         states = np.zeros((len(shapes), 2 * len(self.model.coordinates)))
         states[:, self.kept] = shapes
         states[:, self.model.planar] = planar
-        return _turned(states, self.pairs, planar[:, 2])
+        return turned(states, self.pairs, planar[:, 2])
 
     def motion(self, shapes: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates of the shapes (samples, n), and psi', U, V (samples, 3), by the full equations."""
@@ -136,14 +135,7 @@ class VehicleShape:
         return np.zeros((samples, len(self.model.inputs)))
 
 
-def is_vehicle(model: Model) -> tuple[bool, str]:
-    """Whether a model moves on a road, and why not."""
-    if len(getattr(model, "planar", ())) == 3:
-        return True, ""
-    return False, f"{model.name} is no vehicle with a place and a heading on the road"
-
-
-def _turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray) -> np.ndarray:
+def turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray) -> np.ndarray:
     """States with their pairs of components turned by angles (samples,)."""
     turned = states.copy()
     cosine, sine = np.cos(angles), np.sin(angles)

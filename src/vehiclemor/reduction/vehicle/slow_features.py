@@ -7,19 +7,17 @@ lateral equations and even ones in the others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.vehicle.features import Features, monomials
 from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
-OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in ("FL", "FR", "RL", "RR")))
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
 
 
@@ -27,23 +25,23 @@ VARIABLES = ("front", "rear", "roll", "rolling", "steer")
 class FeatureTable:
     """Features with the numbers of those that are odd and even in the lateral quantities.
 
-    The first odd ones, `heads`, are the slow coordinates and the inputs, the first even ones 1 and
-    the speed.
+    The first odd ones, `linear_count` of them, are the slow coordinates and the inputs, the first
+    two even ones are 1 and the speed.
     """
 
     features: Features
     parameters: np.ndarray
     odd: list[int]
     even: list[int]
-    heads: int
+    linear_count: int
 
     @property
-    def curved(self) -> list[int]:
+    def odd_nonlinear(self) -> list[int]:
         """Odd features that are not linear."""
-        return self.odd[self.heads :]
+        return self.odd[self.linear_count :]
 
     @property
-    def bent(self) -> list[int]:
+    def even_nonlinear(self) -> list[int]:
         """Even features that are not linear."""
         return self.even[2:]
 
@@ -51,7 +49,7 @@ class FeatureTable:
     def free(self) -> list[tuple[list[int], int]]:
         """(features, column of C) of the coefficients that whole runs may change."""
         k = self.features.states - 1
-        lateral = [(self.curved, column) for column in range(k)]
+        lateral = [(self.odd_nonlinear, column) for column in range(k)]
         return [*lateral, (self.odd, k + 1), (self.odd, k + 3)]
 
     def with_only(self, kept: Sequence[int]) -> FeatureTable:
@@ -68,7 +66,7 @@ class FeatureTable:
             self.parameters,
             list(numbers[: len(odd)]),
             list(numbers[len(odd) :]),
-            self.heads,
+            self.linear_count,
         )
 
 
@@ -78,7 +76,8 @@ def feature_table(
     z: np.ndarray,
     speed: np.ndarray,
     u: np.ndarray,
-    settings: Mapping[str, Value],
+    hull: float,
+    nonlinearity: str,
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs: z (samples, k), speed (samples,), u."""
     k, inputs = z.shape[1], u.shape[1]
@@ -87,7 +86,6 @@ def feature_table(
     at_speed = shape.speed / (shape.speed + speed)
     values = np.column_stack([z, u[:, 0]]) @ rows[:, : k + 1].T
     values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    hull = float(settings["hull"])
     reach = hull * float(largest(speed[:, None])[0] or 1.0)
     scales = 1.0 / (hull * largest(values))
     rows[:2] *= scales[:2, None]
@@ -114,16 +112,16 @@ def feature_table(
     v = [f"v{i}" for i in range(len(VARIABLES))]
     straight = [f"p[{first + i}] * z{i}" for i in range(k)]
     straight += [f"p[{first + k + j}] * u{j}" for j in range(inputs)]
-    curved = [*straight[: k + 1]]
-    odd = [*straight, *(f"m * {t}" for t in curved), *(f"m * m * {t}" for t in curved)]
+    scaled = straight[: k + 1]
+    odd = [*straight, *(f"m * {t}" for t in scaled), *(f"m * m * {t}" for t in scaled)]
     odd += monomials(v, 3)
-    if settings["nonlinearity"] != "cubic":
+    if nonlinearity != "cubic":
         odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
-    if settings["nonlinearity"] in {"sliding", "rich"}:
+    if nonlinearity in {"sliding", "rich"}:
         slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
         odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
         odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
-    if settings["nonlinearity"] == "rich":
+    if nonlinearity == "rich":
         odd += [f"m * {term}" for term in monomials(v, 3)]
     even = ["1.0", f"z{k}", *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
     numbers = tuple(range(len(odd) + len(even)))

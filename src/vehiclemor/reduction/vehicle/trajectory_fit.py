@@ -131,8 +131,8 @@ def _compared(reduced: ReducedVehicle, goals: Sequence[Target]) -> tuple[list[np
     paths, total = [], 0.0
     scale = _scale(goals)
     for goal in goals:
-        path, failure = reduced.path(goal.run.maneuver, goal.run.start)
-        if failure or not np.isfinite(path).all():
+        path = reduced.path(goal.run.maneuver, goal.run.start)
+        if path is None:
             return [], np.inf
         paths.append(path)
         total += float(np.sum(((path - goal.states)[::STRIDE] * scale) ** 2))

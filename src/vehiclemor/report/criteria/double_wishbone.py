@@ -10,8 +10,8 @@ from scipy.linalg import subspace_angles
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.algebraic import fit_windows
 from vehiclemor.reduction.projection.windows import window_edges
-from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.criteria.finding import (
     INDISTINGUISHABLE,
@@ -93,7 +93,7 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     model = build("double_wishbone")
     assert isinstance(model, AlgebraicModel)
     maneuver = component("maneuver", component("model", model.name).maneuver)
-    settings = validated("pod", pod.settings(model.kind), {"rank": 3})
+    settings = validated(pod.METHOD, model.kind, {"rank": 3})
     edges = window_edges(maneuver.duration, float(settings["control_period"]))
     bases = {}
     for name, factors in {"nominal": (1, 1), "amplitude": (1, 1.2), "frequency": (1.2, 1)}.items():

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 from vehiclemor.simulation.integrators import exponential_functions, tableaus
@@ -175,24 +175,41 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
     return ready(control)
 
 
-def loop_modules(chosen: Integrator, formulation: str, fused: bool) -> tuple[str, ...]:
-    """Modules that are compiled together with the time loop."""
-    own = chosen.fused_modules if fused else chosen.modules
+def _problem_modules(formulation: str) -> tuple[str, ...]:
     return (
         "simulation.integrators.structures",
         "simulation.formulations.inputs",
         f"simulation.formulations.{formulation}",
+    )
+
+
+def rhs_loop(formulation: str) -> Loop:
+    """Compiled right-hand side of a system at one time, see `loop.rhs_at`."""
+    modules = (*_problem_modules(formulation), "simulation.integrators.loop")
+    return loops(modules, ("rhs_at",))["rhs_at"]
+
+
+def time_loop(chosen: Integrator, formulation: str, fused: bool) -> Loop:
+    """The compiled time loop of an integrator and a formulation."""
+    own = chosen.fused_modules if fused else chosen.modules
+    modules = (
+        *_problem_modules(formulation),
         *(f"simulation.integrators.{name}" for name in own),
         "simulation.integrators.loop",
     )
+    return loops(modules, ("integrate",))["integrate"]
+
+
+def problem_size(n: int, inputs: int) -> int:
+    """Floats of scratch space that `loop.on_span` needs, for n states."""
+    half = n // 2
+    return 3 * n + inputs + 2 * half * (half + 1)
 
 
 def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, fused: bool) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs."""
-    half = n // 2
-    problem = 3 * n + inputs + 2 * half * (half + 1)
     squares = chosen.fused_squares if fused else chosen.squares
-    return problem + chosen.rows * dim + squares * dim * dim + 3 * inputs + 16
+    return problem_size(n, inputs) + chosen.rows * dim + squares * dim * dim + 3 * inputs + 16
 
 
 # All source that a run may be compiled from.

@@ -7,7 +7,7 @@ An integrator gives `work_space`, `begin`, `longest_step`, `step`, `accept`, `pr
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
-from vehiclemor.simulation.formulations.full import error_norm, lift, project
+from vehiclemor.simulation.formulations.full import error_norm, lift, project, rhs
 from vehiclemor.simulation.integrators.dopri5 import (
     accept,
     begin,
@@ -207,3 +207,19 @@ def over_span(problem, t, end, h, method, control, work, samples, sample, path, 
         # A step that was cut at the end of the span says nothing against longer ones.
         tried = h * factor if whole else max(tried, h * factor)
     return FINISHED, t, tried, sample
+
+
+def rhs_at(
+    y: Vector,
+    equations: Equations,
+    signal: Signal,
+    subspaces: Subspaces,
+    window: Int,
+    buffer: Vector,
+    result: Vector,
+) -> Int:
+    """Right-hand side of the projected system of one window at time zero."""
+    sizes = subspaces.means.shape[1], signal.coefficients.shape[1]
+    problem = on_span(equations, signal, subspaces, 0, window, sizes, buffer)
+    rhs(problem, 0.0, y, result)
+    return 0

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import ModuleType
-
 import numpy as np
 
+from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.models.high_fidelity import independent as high_fidelity_independent
 from vehiclemor.registry import component
@@ -13,7 +12,7 @@ from vehiclemor.simulation.build import compiled, hoisted_constants, solved_para
 from vehiclemor.simulation.dynamic import DynamicModel
 
 
-def independent_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
+def independent_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
     """Kernels over the 14 coordinates of `high_fidelity_independent`, and their constants.
 
     Parameters
@@ -21,13 +20,13 @@ def independent_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
     model
         A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
     """
-    _, kernels, _ = compiled("high_fidelity_independent", high_fidelity_independent)
-    return kernels, hoisted_constants(kernels, model.parameters, free_lengths(model))
+    made, _ = compiled("high_fidelity_independent", high_fidelity_independent)
+    return made, hoisted_constants(made, model.parameters, free_lengths(model))
 
 
 def free_lengths(model: DynamicModel) -> list[float]:
     """Free lengths of the springs in m, with which the design position is the equilibrium."""
     definition: ModelDefinition = component("model", model.name)
     values = model.parameters.values()
-    solved = solved_parameters(definition, values, model.parameters, model.kernels)
+    solved = solved_parameters(definition, values, model.parameters, model.equations)
     return [solved[name] for name in definition.solved]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.models.high_fidelity import frozen_inertia as frozen
 from vehiclemor.models.high_fidelity.independent import PLACES
-from vehiclemor.reduction.vehicle.independent import free_lengths, independent_kernels
-from vehiclemor.simulation.build import compiled
+from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
+from vehiclemor.simulation.build import compiled, hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
 
 N = frozen.N
@@ -30,16 +30,14 @@ class _Exact:
     """Calls the exact kernels of a model."""
 
     def __init__(self, model: DynamicModel) -> None:
-        self.kernels, self.constants = independent_kernels(model)
-        self._work = np.zeros(self.kernels.WORK)
+        self.made, self.constants = independent_kernels(model)
 
     def call(self, function: str, x: np.ndarray, u: Any, shape: tuple[int, ...]) -> np.ndarray:
         """Result of a kernel at the state x (28,) and inputs u (3,)."""
         result = np.empty(shape)
         inputs = np.array(u, dtype=float)
-        getattr(self.kernels, function)(
-            np.array(x, dtype=float), inputs, self.constants, self._work, result
-        )
+        state = np.array(x, dtype=float)
+        self.made.kernels.call(function, state, inputs, self.constants, result)
         return result
 
     def suspension(self, place: int, angle: float, rack: float) -> np.ndarray:
@@ -58,7 +56,7 @@ class _Exact:
         return whole[:10, :10] - (coupling / spins) @ coupling.T, spins
 
 
-def frozen_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
+def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
     """Kernels of `high_fidelity_frozen_inertia`, and their constants.
 
     Parameters
@@ -66,13 +64,10 @@ def frozen_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
     model
         A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
     """
-    _, kernels, _ = compiled("high_fidelity_frozen_inertia", frozen)
+    made, _ = compiled("high_fidelity_frozen_inertia", frozen)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
-    flat = np.concatenate([model.parameters.flat(), free_lengths(model), fixed])
-    constants = np.empty(kernels.CONSTANTS)
-    kernels.constants(flat, np.empty(kernels.WORK), constants)
-    return kernels, constants
+    return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
 
 
 def frozen_encoder(model: DynamicModel) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:

@@ -1,0 +1,1 @@
+"""The high-fidelity vehicle in other coordinates than its own: constants and kernels."""

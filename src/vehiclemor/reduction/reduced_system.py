@@ -1,0 +1,70 @@
+"""A dynamic model in other states than its own: encode, integrate, lift."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.simulation.checks import check_inputs
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.system import Run, Solver, System
+from vehiclemor.simulation.trajectory import Start, Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedSystem:
+    """Equations in reduced states, with the ways there and back.
+
+    Attributes
+    ----------
+    model
+        The full-order model.
+    system
+        The equations that are integrated.
+    spaces
+        Their form, and their subspaces if they are projected.
+    encode
+        (full state (2 n,), inputs) -> state (dim,) of the system.
+    lift
+        (run of the system, inputs (samples, inputs), full state at the start) -> full states.
+    effective_rank
+        Number of coordinates or modes that stand for the model's.
+    solver, tolerance
+        Integrator and its tolerance.
+    project
+        Full states (samples, 2 n) -> their best approximation, if there is a subspace.
+    """
+
+    model: DynamicModel
+    system: System
+    spaces: ProjectionWindows
+    encode: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray]
+    effective_rank: int
+    offline: Offline
+    solver: str
+    tolerance: float
+    project: Callable[[np.ndarray], np.ndarray] | None = None
+
+    def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
+        """Path of the reduced states."""
+        check_inputs(maneuver, self.model.name, self.model.inputs)
+        state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
+        how = Solver(self.solver, self.tolerance, times)
+        return self.system.run(maneuver, state, self.spaces, how)
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Integrate, then lift to full states at the maneuver's output times."""
+        run = self.run(maneuver, start)
+        inputs = maneuver.at(run.times)
+        states = self.lift(run, inputs, self.model.start(start))
+        return self.model.recorded(maneuver, run, inputs, states)
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Projection of full states (samples, 2 n), if there is a subspace."""
+        return None if self.project is None else self.project(states)

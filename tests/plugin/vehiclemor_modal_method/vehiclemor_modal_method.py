@@ -1,0 +1,60 @@
+"""Modal basis of any model in ordinary differential equations, linearised at its first start."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+from pydantic import Field
+from scipy.linalg import expm, schur
+
+from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.settings import Settings
+
+
+class ModalSettings(Settings):
+    fastest: float = Field(100.0, gt=0.0, description="modes up to this |lambda| in 1/s are kept")
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Equations z' = a z + b u + c of x = centre + right z, with z = left (x - centre)."""
+
+    model: object
+    centre: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+    equations: tuple[np.ndarray, np.ndarray, np.ndarray]
+    offline: Offline
+    effective_rank: int
+
+    def simulate(self, maneuver, start):
+        (a, b, c), times, inputs = self.equations, maneuver.times, maneuver.at(maneuver.times)
+        began, step, n = perf_counter(), times[1], len(a)
+        # Exact where inputs are linear between the output times.
+        held = np.kron([[0.0, step, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], np.eye(n))
+        held[:n, :n] = step * a
+        free, at_start, change = np.hsplit(expm(held)[:n], 3)
+        z = [self.left @ (self.model.start(start) - self.centre)]
+        for first, second in pairwise(inputs @ b.T + c):
+            z.append(free @ z[-1] + at_start @ first + change @ (second - first))
+        states, seconds = self.centre + np.array(z) @ self.right.T, perf_counter() - began
+        return self.model.trajectory(times, inputs, states, [0] * len(self.model.counts), seconds)
+
+    def best_approximation(self, states):
+        return self.centre + (states - self.centre) @ self.left.T @ self.right.T
+
+
+def fit(model, training, settings):
+    began, x, none = perf_counter(), model.start(), np.zeros(len(model.inputs))
+    a, rate = model.system.jacobian(x, none), model.derivative(x, none)
+    steps = 1e-6 * np.eye(len(none))
+    b = np.array([model.derivative(x, s) - model.derivative(x, -s) for s in steps]).T / 2e-6
+    spaces = (schur(m, sort=lambda re, im: np.hypot(re, im) <= settings.fastest) for m in (a, a.T))
+    right, left = (vectors[:, :kept] for _, vectors, kept in spaces)
+    left = np.linalg.solve(left.T @ right, left.T)
+    cost = offline_cost(began, model, further=1 + 2 * (len(x) + len(none)))
+    return Modal(model, x, left, right, (left @ a @ right, left @ b, left @ rate), cost, len(left))
+
+
+METHOD = Method("modal_basis", "modes of the linearised model", {"ode": ModalSettings}, fit)
