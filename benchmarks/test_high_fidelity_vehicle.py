@@ -14,7 +14,7 @@ from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.input_splines import signal_of
+from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system_loops import FULL as FULL_FORM
 from vehiclemor.symbolic.program import Program

@@ -9,7 +9,7 @@ from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation.input_splines import Signal, signal_of
+from vehiclemor.simulation.input_polynomials import Signal, signal_of
 
 LANE_CHANGE = component("maneuver", "lane_change")
 

@@ -20,7 +20,14 @@ from vehiclemor.codegen import loop_intrinsics
 from vehiclemor.codegen.loop_types import declared_arguments
 
 WORD = ir.IntType(64)
-OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+OPTIONS = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 INTRINSICS = {name: getattr(loop_intrinsics, name) for name in ("vector", "matrix", "call_kernel")}
 
 

@@ -13,7 +13,7 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Ready, ready
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
-from vehiclemor.simulation.input_splines import signal_of
+from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.exponential_functions import block_functions
 from vehiclemor.simulation.integrators.structures import (
