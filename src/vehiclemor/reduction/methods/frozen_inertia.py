@@ -34,7 +34,7 @@ def fit(
 ) -> RewrittenVehicle:
     """Constants from the exact kernels at the design position; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity import frozen_inertia as frozen
+    from vehiclemor.models.high_fidelity import frozen_quantities as frozen
     from vehiclemor.reduction.vehicle.frozen_constants import frozen_encoder, frozen_kernels
 
     del training

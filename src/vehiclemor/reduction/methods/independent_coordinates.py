@@ -53,7 +53,7 @@ def fit(
 ) -> RewrittenVehicle:
     """The exact equations; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity.independent import PLACES
+    from vehiclemor.models.high_fidelity.quantities import PLACES
     from vehiclemor.reduction.vehicle.independent import independent_kernels
 
     del training
