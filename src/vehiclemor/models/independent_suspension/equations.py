@@ -37,7 +37,7 @@ def derive() -> DynamicEquations:
     vehicle = _vehicle(tape, q, nu, delta, p, attitude)
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number) for number in range(4)]
-    mass, force = mechanics.kane(tape, len(SPEEDS), [sprung, *(wheel.body for wheel in wheels)])
+    mass, force = mechanics.kane(tape, len(SPEEDS), [sprung, *(wheel.rigid for wheel in wheels)])
     for number, wheel in enumerate(wheels):
         force[6 + number] = tape.let(force[6 + number] - wheel.spring)
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
@@ -94,7 +94,7 @@ class _Vehicle:
 class _Wheel(NamedTuple):
     """A wheel with what acts on it, and the force of its spring."""
 
-    body: mechanics.Body
+    rigid: mechanics.Body
     spring: sp.Expr
     contact: body.Contact
     load: sp.Expr
@@ -131,8 +131,9 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
         g.vector((xz, 0, tape.let(v.named.yaw_inertia))),
     )
     mass = v.p["sprung_mass"]
+    origin = v.frame.origin(tape)
     rotation = v.frame.rotation(tape, inertia)
-    return mechanics.Body(mass, v.frame.origin(tape), g.scale(mass, v.weight), rotation, inertia)
+    return mechanics.Body(mass, origin, g.scale(mass, v.weight), rotation, inertia)
 
 
 def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
