@@ -3,7 +3,7 @@
 Coordinate partitioning (R. Wehage, E. Haug, J. Mech. Des. 104 (1982), 247-255) with the dependent
 coordinates in closed form: each front corner closes by two equations A cos + B sin = C.  Nothing is
 approximated, and nothing is trained; no constraint is left to be stabilised.  See
-`models/high_fidelity_independent.py`.
+`models/high_fidelity/independent.py`.
 """
 
 from __future__ import annotations
