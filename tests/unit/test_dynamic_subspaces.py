@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
@@ -15,7 +16,6 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 N = 14
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -36,7 +36,9 @@ def whole_space(form, edges, mean=0.0, mixing=None):
     lifts, drops = np.zeros((windows, size, 2 * N)), np.zeros((windows, size, 2 * N))
     lifts[:, :, :size], drops[:, :, :size] = basis, np.linalg.inv(basis).T
     ranks = np.full(windows, 2 * N, dtype=np.int64)
-    return ProjectionWindows(form, np.array(edges), np.full((windows, 2 * N), mean), lifts, drops, ranks)
+    return ProjectionWindows(
+        form, np.array(edges), np.full((windows, 2 * N), mean), lifts, drops, ranks
+    )
 
 
 def fitted(model, start="equilibrium", maneuver=lane_change, **chosen):

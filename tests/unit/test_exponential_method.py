@@ -13,7 +13,10 @@ from hypothesis import strategies as st
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.vehicle.feature_kernels import diagonal_blocks
 from vehiclemor.reduction.vehicle.features import Features
-from vehiclemor.simulation.integrators.exponential_functions import exponential_tables, phi_functions
+from vehiclemor.simulation.integrators.exponential_functions import (
+    exponential_tables,
+    phi_functions,
+)
 from vehiclemor.simulation.projection_windows import whole_space
 
 

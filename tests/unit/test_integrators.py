@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 import pytest
+from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2, Tableau
 
 from tests.unit.standard_problems import (
     ANGLE,
@@ -21,7 +22,6 @@ from tests.unit.standard_problems import (
 )
 from vehiclemor.simulation import explicit_loops as pair
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.rosenbrock_methods import RODAS4, ROS34PW2, Tableau
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
+from vehiclemor.simulation.system_loops import COORDINATES
 
 from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import cache, straight_line
-from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.projection.dynamic import check_subspace
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
@@ -20,7 +21,6 @@ from vehiclemor.registry import component
 from vehiclemor.simulation import build, newton_loops, system_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import SOLVERS
-from vehiclemor.simulation.system_loops import COORDINATES
 
 # Prints hits and misses of every compiled function, the machine code's hits, and a result.
 REPORT = """

@@ -5,9 +5,9 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from vehiclemor.codegen.link import linked_source, loops_source
 
 from vehiclemor.codegen import link
-from vehiclemor.codegen.link import linked_source, loops_source
 from vehiclemor.simulation import explicit_loops, run_loops, system_loops
 
 LOOPS = '''

@@ -1,28 +1,28 @@
 """Models of every kind are built by one function, behind one interface."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.simulation import model as module
+from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 
 
 def test_kinematic_model_is_built_with_file_and_overrides() -> None:
-    moved = module.build("double_wishbone", overrides={"wheel_centre": [0.0, 0.8, -0.12]})
+    moved = build("double_wishbone", overrides={"wheel_centre": [0.0, 0.8, -0.12]})
     assert isinstance(moved, AlgebraicModel)
     assert moved.parameters["wheel_centre"][1] == 0.8
     assert moved.evaluations in moved.counts
 
 
-def test_model_of_an_unknown_kind_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "component", lambda *_: SimpleNamespace(KIND="pde"))
+def test_model_of_an_unknown_kind_is_one_line() -> None:
     with pytest.raises(InputError) as error:
-        module.build("waves")
+        replace(component("model", "double_wishbone"), name="waves", kind="pde")
     assert str(error.value) == "model 'waves' is of kind 'pde'; allowed: ae, ode, dae"
 
 

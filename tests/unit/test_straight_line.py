@@ -10,10 +10,6 @@ from hypothesis import strategies as st
 from llvmlite import ir
 from numba import cfunc, njit
 from numba.core.errors import TypingError
-
-from tests.unit.programs import run
-from vehiclemor.codegen import arctangent, exponential, sincos
-from vehiclemor.codegen.kernel_text import kernel_source, work_size
 from vehiclemor.codegen.link import linked_source
 from vehiclemor.codegen.straight_line import (
     call_machine,
@@ -23,6 +19,10 @@ from vehiclemor.codegen.straight_line import (
     python_kernel,
     straight_line,
 )
+
+from tests.unit.programs import run
+from vehiclemor.codegen import arctangent, exponential, sincos
+from vehiclemor.codegen.kernel_text import kernel_source, work_size
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 

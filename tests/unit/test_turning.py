@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from vehiclemor.simulation.w_method_loops import turn
 
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.w_method_loops import turn
 
 # Place of the heading, then pairs of places.
 TURNING = np.array([2, 0, 1, 6, 4])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from vehiclemor.models.components import body
+from vehiclemor.models.components.tires import tire_outputs
 from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.double_wishbone.points import POINTS
 from vehiclemor.models.high_fidelity import corners
@@ -210,15 +211,14 @@ def outputs(
     """
     q = v.q
     contacts = [corner.contact for corner in parts]
-    tires = [corner.tire for corner in parts]
     return [
         *(q[0], q[1], q[3], q[4], q[5]),
         *(speeds[0], speeds[1], v.rates[2], speeds[5]),
-        *(tire.longitudinal for tire in tires),
-        *(tire.lateral for tire in tires),
-        *(contact.load for contact in contacts),
-        *(tire.aligning for tire in tires),
-        *(contact.slip_ratio for contact in contacts),
-        *(tape.let(sp.atan(contact.tan_slip)) for contact in contacts),
+        *tire_outputs(
+            [corner.tire for corner in parts],
+            [contact.load for contact in contacts],
+            [contact.slip_ratio for contact in contacts],
+            [tape.let(sp.atan(contact.tan_slip)) for contact in contacts],
+        ),
         *(tape.let(sp.atan2(-carrier[0][1], carrier[1][1])) for carrier in carriers),
     ]

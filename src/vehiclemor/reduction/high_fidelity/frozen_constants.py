@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
-from vehiclemor.models.high_fidelity import frozen_inertia as frozen
-from vehiclemor.models.high_fidelity.independent import PLACES
+from vehiclemor.models.high_fidelity import frozen_quantities as frozen
+from vehiclemor.models.high_fidelity.forms import FROZEN_INERTIA
+from vehiclemor.models.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
 from vehiclemor.simulation.build import compiled, hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -57,14 +58,14 @@ class _Exact:
 
 
 def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels of `high_fidelity_frozen_inertia`, and their constants.
+    """Kernels of the vehicle with frozen inertia, and their constants.
 
     Parameters
     ----------
     model
         A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
     """
-    made, _ = compiled("high_fidelity_frozen_inertia", frozen)
+    made, _ = compiled(FROZEN_INERTIA.name, FROZEN_INERTIA)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
     return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
@@ -82,7 +83,7 @@ def frozen_encoder(model: DynamicModel) -> Callable[[np.ndarray, np.ndarray], np
 
 
 def frozen_constants(model: DynamicModel) -> dict[str, float]:
-    """Constants of the frozen vehicle by name, see `high_fidelity_frozen_inertia.CONSTANTS`."""
+    """Constants of the frozen vehicle by name, see `frozen_quantities.CONSTANTS`."""
     exact = _Exact(model)
     mass, _ = exact.mass()
     design = np.zeros(2 * N)

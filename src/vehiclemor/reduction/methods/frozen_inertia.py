@@ -33,7 +33,7 @@ def fit(
 ) -> ReducedSystem:
     """Constants from the exact kernels at the design position; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity import frozen_inertia as frozen
+    from vehiclemor.models.high_fidelity import frozen_quantities as frozen
     from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
 
     began = time.perf_counter()

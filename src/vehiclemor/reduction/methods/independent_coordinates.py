@@ -30,7 +30,7 @@ def fit(
 ) -> ReducedSystem:
     """The exact equations; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity.independent import PLACES
+    from vehiclemor.models.high_fidelity.quantities import PLACES
     from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 
     began = time.perf_counter()
