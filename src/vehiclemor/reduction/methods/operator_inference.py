@@ -37,6 +37,7 @@ from vehiclemor.reduction.vehicle.linear_vehicle import HEADING, MARGIN, PLACE
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
+from vehiclemor.reduction.vehicle.samples import shape_samples
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -84,10 +85,7 @@ def fit(
     began = time.perf_counter()
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
-    u = np.concatenate([run.inputs for run in runs])
-    shapes = np.concatenate([shape.of(run.states) for run in runs])
-    rates, motion = shape.motion(shapes, u)
-    deviations = shapes - shape.reference
+    u, deviations, rates, motion = shape_samples(shape, runs)
     basis = mirror_basis(deviations, mirror(shape), settings.rank)
     k, inputs = len(basis.odd), u.shape[1]
     features = polynomial_features(k, inputs, settings.degree)

@@ -110,7 +110,7 @@ def linear_vehicle(
         lifting,
         np.vstack([lateral.left, modes.speed_left]),
         np.vstack([lateral.feedthrough, np.zeros(inputs)]),
-        np.concatenate([typical(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
+        np.concatenate([error_scale(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
         linearisation_cost(shape, began),
         settings.solver,
         settings.tolerance,
@@ -118,8 +118,8 @@ def linear_vehicle(
     )
 
 
-def typical(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
-    """Typical sizes (k,) of lateral coordinates: a multiple of those in steady cornering."""
+def error_scale(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
+    """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
     steady = -np.linalg.solve(lateral.a, lateral.b)
     turn = shape.linearised.motion_a[0] @ (lateral.right @ steady + lateral.follow[:, 0])
     # A coordinate that steady cornering leaves alone counts as the largest one.

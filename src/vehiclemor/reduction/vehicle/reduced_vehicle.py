@@ -65,8 +65,8 @@ class ReducedVehicle:
         Reduced coordinates per deviation of the shape (states, n).
     feedthrough
         Reduced coordinates per input (states, inputs), to be subtracted at the start.
-    typical
-        Magnitude of each reduced state (states + 3,).
+    error_scale
+        Magnitude of each reduced state (states + 3,) below which its error counts absolutely.
     transient
         What is added to the lifted shapes.
     lifted_features
@@ -81,7 +81,7 @@ class ReducedVehicle:
     lifting: np.ndarray
     encoding: np.ndarray
     feedthrough: np.ndarray
-    typical: np.ndarray
+    error_scale: np.ndarray
     offline: Offline
     solver: str
     tolerance: float
@@ -107,7 +107,7 @@ class ReducedVehicle:
     def system(self) -> System:
         """Compiled equations."""
         reference = np.zeros(self.features.states)
-        return self.features.system(self.parameters, self.coefficients, self.typical, reference)
+        return self.features.system(self.parameters, self.coefficients, self.error_scale, reference)
 
     @cached_property
     def equations(self) -> ReducedSystem:
