@@ -21,7 +21,7 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_snapshots, pod_basis
-from vehiclemor.reduction.projection.dynamic import ReducedDynamicModel
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.projection.inner_products import coordinate_weight
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
@@ -60,7 +60,7 @@ def check(model: DynamicModel, settings: GlobalPodSettings) -> None:
 
 def fit(
     model: DynamicModel, training: Sequence[TrainingRun], settings: GlobalPodSettings
-) -> ReducedDynamicModel:
+) -> DynamicProjection:
     """One POD subspace of all training runs, each over its own duration."""
     from scipy.linalg import null_space
 
@@ -89,7 +89,7 @@ def fit(
     edges = np.array([0.0, max(run.maneuver.duration for run in training)])
     ranks = np.array([2 * r], dtype=np.int64)
     spaces = Spaces(COORDINATES, edges, mean[None], trial_basis, test_basis, ranks)
-    return ReducedDynamicModel(
+    return DynamicProjection(
         model,
         "coordinates",
         (Basis(mean[:n], vectors.T, scaled.singular_values),),

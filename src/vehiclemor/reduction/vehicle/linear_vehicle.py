@@ -20,7 +20,13 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.slow_modes import APART, apart, real_modes, slow_modes
+from vehiclemor.reduction.vehicle.slow_modes import (
+    APART,
+    apart,
+    real_modes,
+    slow_modes,
+    without_derivatives,
+)
 
 # Modes that steering moves by less than this part of the most moved one are symmetric.
 MOVED = 1e-8
@@ -58,10 +64,7 @@ class Lateral:
 def lateral_modes(shape: VehicleShape) -> Lateral:
     """All modes that steering moves, slow ones first, in real form (blocks of two for pairs)."""
     linear = shape.linearised
-    follow = np.zeros_like(linear.b)
-    for j in range(linear.b.shape[1] - 1, 0, -1):
-        follow[:, j - 1] = linear.b[:, j] + linear.a @ follow[:, j]
-    drive = linear.b[:, 0] + linear.a @ follow[:, 0]
+    follow, drive = without_derivatives(linear.a, linear.b)
     values, vectors = np.linalg.eig(linear.a.T)
     w = vectors.T
     v = np.linalg.inv(w)

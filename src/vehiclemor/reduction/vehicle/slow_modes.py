@@ -93,10 +93,7 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     rates = w @ linear.a @ v
     # z' = rates z + sum_j b_j u^(j): with z - h u for z the derivatives of the steering go.
     b = w @ linear.b
-    feedthrough = np.zeros_like(b)
-    for j in range(b.shape[1] - 1, 0, -1):
-        feedthrough[:, j - 1] = b[:, j] + rates @ feedthrough[:, j]
-    drive = b[:, 0] + rates @ feedthrough[:, 0]
+    feedthrough, drive = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.motion_a[1] @ right[:, still].real
     quiet = np.flatnonzero(
@@ -143,6 +140,17 @@ def real_modes(
         else:
             columns.append(np.real(right[:, i]))
     return np.array(rows), np.array(columns).T
+
+
+def without_derivatives(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Feedthrough H (n, inputs) and drive d (n,) of x' = A x + b_0 s + b_1 s' + b_2 s'' ...
+
+    For z = x - H (s, s', ...) the derivatives of s go: z' = A z + d s.
+    """
+    feedthrough = np.zeros_like(b)
+    for j in range(b.shape[1] - 1, 0, -1):
+        feedthrough[:, j - 1] = b[:, j] + a @ feedthrough[:, j]
+    return feedthrough, b[:, 0] + a @ feedthrough[:, 0]
 
 
 def apart(values: np.ndarray) -> np.ndarray:
