@@ -90,7 +90,7 @@ def fit(
     k, inputs = len(basis.odd), u.shape[1]
     features = polynomial_features(k, inputs, settings.degree)
     values = features.at(deviations @ basis.encoding.T, u, np.zeros(0))
-    # Straight running goes on: no constant but U's.
+    # Straight running is an equilibrium: the only constant is that of U.
     goals = np.column_stack([rates @ basis.encoding.T, motion - [0.0, shape.speed, 0.0]])
     c, groups = _inferred(basis.odd, values, goals, inputs, settings)
     c[0, k + 1] = shape.speed

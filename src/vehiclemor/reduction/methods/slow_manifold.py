@@ -119,7 +119,7 @@ def _fitted_on_rates(
     # Linear terms are scaled by the ranges of the training runs.
     c[odd[:k], :k] = modes.rates.T * largest(z)[:, None]
     c[odd[k], :k] = modes.drive * largest(u)[0]
-    # Straight running at any speed goes on for ever: the speed changes by what is even alone.
+    # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
     even_columns = columns[:, even_nonlinear]
     c[even_nonlinear, k] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
     c[odd, k + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)

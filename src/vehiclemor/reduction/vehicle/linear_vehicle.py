@@ -32,7 +32,7 @@ from vehiclemor.reduction.vehicle.slow_modes import (
 MOVED = 1e-8
 # Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
 CORNERING = 4.0
-# How many times that is typical, and the same for speed (m/s), heading (rad), place (m).
+# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
 MARGIN = 3.0
 SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
 
@@ -125,7 +125,7 @@ def error_scale(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
     """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
     steady = -np.linalg.solve(lateral.a, lateral.b)
     turn = shape.linearised.motion_a[0] @ (lateral.right @ steady + lateral.follow[:, 0])
-    # A coordinate that steady cornering leaves alone counts as the largest one.
+    # At least a thousandth of the largest one, for coordinates that steady cornering leaves alone.
     sizes = np.maximum(np.abs(steady), 1e-3 * np.abs(steady).max())
     return MARGIN * CORNERING / shape.speed / abs(turn) * sizes
 

@@ -24,7 +24,7 @@ from vehiclemor.reduction.vehicle.trajectory_fit import Target, normal_matrix
 
 # Of the normal matrix, scaled to a diagonal of ones: nearly dependent features are told apart.
 REGULARISATION = 1e-11
-# So many symmetric terms for each lateral one.
+# Number of symmetric terms for each lateral one.
 SYMMETRIC = 0.25
 
 

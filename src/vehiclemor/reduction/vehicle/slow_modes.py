@@ -18,7 +18,7 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 CONTROLLED = 1e-6
 # Eigenvalues (1/s) nearer to each other belong to the cluster of stabilised constraints.
 APART = 1e-2
-# Below it (1/s) an eigenvalue is zero.
+# Smaller eigenvalues (1/s) count as zero.
 STILL = 1e-6
 
 
@@ -83,7 +83,7 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     values, vectors = np.linalg.eig(linear.a.T)
     left = vectors.T
     right = np.linalg.inv(left)
-    # Stabilised constraints have many equal eigenvalues, but nothing of them is used.
+    # The many equal eigenvalues of stabilised constraints are defective, but not used.
     controlled = np.abs(left @ linear.b[:, 0]) * np.linalg.norm(right, axis=0)
     steers = controlled > CONTROLLED * controlled.max()
     still = int(np.argmin(np.abs(values)))
@@ -91,7 +91,6 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     moving[still] = False
     w, v = real_modes(values, left, right, steers & moving & (np.abs(values) <= fastest))
     rates = w @ linear.a @ v
-    # z' = rates z + sum_j b_j u^(j): with z - h u for z the derivatives of the steering go.
     b = w @ linear.b
     feedthrough, drive = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
