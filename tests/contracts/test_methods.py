@@ -1,6 +1,7 @@
 """What every registered reduction method keeps, on every registered model that it accepts."""
 
 import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -100,6 +101,18 @@ def test_method_describes_itself(name: str) -> None:
     assert isinstance(method.reference, str)
     assert method.settings
     assert set(method.presets) <= set(method.settings) <= set(KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", METHODS)
+def test_kinds_without_settings_are_refused(name: str, kind: str) -> None:
+    method: Method = component("method", name)
+    if kind in method.settings:
+        pytest.skip(f"{name} reduces models of kind {kind}")
+    accepted, reason = method.accepts(SimpleNamespace(name="box", kind=kind))
+    assert not accepted
+    assert reason.endswith(f"box is of kind {kind}")
+    assert "\n" not in reason
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,6 +1,7 @@
 """The runner of protocols: nothing is chosen by what it is tested on."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -120,7 +121,8 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
         return choose(results)
 
     monkeypatch.setattr(AlgebraicModel, "simulate", recorded(AlgebraicModel.simulate))
-    monkeypatch.setattr(fixed_basis, "fit", recorded_fit)
+    changed = replace(fixed_basis.METHOD, fit=recorded_fit)
+    monkeypatch.setattr(fixed_basis, "METHOD", changed)
     monkeypatch.setattr("vehiclemor.study.predictive.choose", recorded_choice)
     monkeypatch.setattr("vehiclemor.study.predictive.timing", no_timing)
     run_studies(study, tmp_path)

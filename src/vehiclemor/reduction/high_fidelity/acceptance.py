@@ -6,8 +6,5 @@ from vehiclemor.simulation.model import Model
 
 def no_closed_forms(model: Model) -> str:
     """Why a model is not the one whose constraints have been solved by hand."""
-    return (
-        ""
-        if model.name == DEFINITION.name
-        else f"closed forms are known for {DEFINITION.name} alone"
-    )
+    known = DEFINITION.name
+    return "" if model.name == known else f"closed forms are known for {known} alone"

@@ -74,7 +74,7 @@ def fit(
     began = time.perf_counter()
     shape, count = VehicleShape(model), settings.snapshots
     runs = [run.snapshots(count) for run in with_mirrored(training)]
-    # Gramians are integrals in time: a snapshot counts for as long as it stands for.
+    # Gramians are integrals in time: each snapshot is weighted by its time step.
     parts = [
         (shape.of(run.states) - shape.reference) * np.sqrt(run.time[-1] / count) for run in runs
     ]
@@ -98,11 +98,11 @@ def fit(
     mean[shape.kept] = shape.reference
     both = ((trial_basis, speed[0], modes), (test_basis, speed[1], projection))
     for basis, of_speed, of_others in both:
-        # Quadratures: what the shape does not feel is integrated as it is.
+        # States that the shape does not depend on are integrated unreduced (quadratures).
         basis[:, outside] = np.eye(rows)[:, : len(outside)]
         basis[len(outside) :, shape.kept] = np.vstack([of_speed, of_others])
     spaces = one_window(mean, trial_basis, test_basis)
-    # Quadratures are no modes.
+    # Quadratures do not count as modes.
     rank = len(modes) + 1
     return projected_vehicle(shape, spaces, rank, offline_cost(began, model, runs), settings)
 
@@ -142,7 +142,7 @@ def balanced(
 
     right, left = still
     apart = np.eye(len(a)) - np.outer(right, left)
-    # The mode that is left out decays at any rate: the outputs don't see it.
+    # The mode that is left out gets the eigenvalue -1: the outputs don't see it.
     stable = a @ apart - np.outer(right, left)
     seen = c @ apart
     observability = solve_continuous_lyapunov(stable.T, -seen.T @ seen)

@@ -21,7 +21,7 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_snapshots, pod_basis
-from vehiclemor.reduction.projection.dynamic import ReducedDynamicModel
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.projection.inner_products import coordinate_weight
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import TrainingRun
@@ -59,7 +59,7 @@ def check(model: DynamicModel, settings: GlobalPodSettings) -> None:
 
 def fit(
     model: DynamicModel, training: Sequence[TrainingRun], settings: GlobalPodSettings
-) -> ReducedDynamicModel:
+) -> DynamicProjection:
     """One POD subspace of all training runs, each over its own duration."""
     from scipy.linalg import null_space
 
@@ -67,15 +67,15 @@ def fit(
     n, count = len(model.coordinates), settings.snapshots
     runs = [run.snapshots(count) for run in with_mirrored(training)]
     start = model.start()
-    # Deviations from straight running, which so lies in the subspace: it stays what it is.
+    # Deviations from straight running, so that straight running lies in the subspace.
     moved = np.concatenate([run.coordinates for run in runs]) - start[:n]
     apart = kept_apart(model)
-    # What is left of a coordinate without the vectors kept apart, in an orthonormal basis.
+    # Orthonormal basis of the complement of the vectors kept apart.
     others = null_space(apart)
     weight = others.T @ coordinate_weight(model, "energy", moved) @ others
     root = np.linalg.cholesky(weight)
     snapshots = (moved @ others @ root).T
-    # Both signs: no mean is subtracted.
+    # With both signs of each snapshot the mean is zero, and none is subtracted.
     scaled = pod_basis(np.hstack([snapshots, -snapshots]), settings.rank)
     modes = np.linalg.solve(root.T, scaled.vectors)
     mean = np.concatenate([others @ (others.T @ start[:n]), start[n:]])
@@ -84,11 +84,11 @@ def fit(
     trial_basis, test_basis = np.zeros((1, 2 * r, 2 * n)), np.zeros((1, 2 * r, 2 * n))
     trial_basis[0, :r, :n] = vectors
     test_basis[0, :r, :n] = np.vstack([apart, modes.T @ weight @ others.T])
-    # The window ends with the longest run, but holds beyond it.
+    # The window ends with the longest run; a longer maneuver stays in it.
     edges = np.array([0.0, max(run.maneuver.duration for run in training)])
     ranks = np.array([2 * r], dtype=np.int64)
     spaces = ProjectionWindows("coordinates", edges, mean[None], trial_basis, test_basis, ranks)
-    return ReducedDynamicModel(
+    return DynamicProjection(
         model,
         "coordinates",
         (Basis(mean[:n], vectors.T, scaled.singular_values),),

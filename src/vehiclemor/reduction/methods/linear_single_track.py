@@ -79,7 +79,7 @@ def single_track(shape: VehicleShape) -> SingleTrack:
     rows = np.eye(len(linear.a))[kept]
     rest = np.setdiff1d(np.arange(len(linear.a)), kept)
     drive = np.column_stack([linear.a[np.ix_(rest, kept)], linear.b[rest, 0]])
-    # The speed is no lateral state: its zero eigenvalue makes the matrix singular, and is cut.
+    # The speed's zero eigenvalue makes the matrix singular: the least-squares solution cuts it.
     condensed = -np.linalg.lstsq(linear.a[np.ix_(rest, rest)], drive, rcond=1e-10)[0]
     whole = np.zeros((len(linear.a), 3))
     whole[rest] = condensed

@@ -37,6 +37,7 @@ from vehiclemor.reduction.vehicle.linear_vehicle import HEADING, MARGIN, PLACE
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
+from vehiclemor.reduction.vehicle.samples import shape_samples
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -84,15 +85,12 @@ def fit(
     began = time.perf_counter()
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
-    u = np.concatenate([run.inputs for run in runs])
-    shapes = np.concatenate([shape.of(run.states) for run in runs])
-    rates, motion = shape.motion(shapes, u)
-    deviations = shapes - shape.reference
+    u, deviations, rates, motion = shape_samples(shape, runs)
     basis = mirror_basis(deviations, mirror(shape), settings.rank)
     k, inputs = len(basis.odd), u.shape[1]
     features = polynomial_features(k, inputs, settings.degree)
     values = features.at(deviations @ basis.encoding.T, u, np.zeros(0))
-    # Straight running goes on: no constant but U's.
+    # Straight running is an equilibrium: the only constant is that of U.
     goals = np.column_stack([rates @ basis.encoding.T, motion - [0.0, shape.speed, 0.0]])
     c, groups = _inferred(basis.odd, values, goals, inputs, settings)
     c[0, k + 1] = shape.speed

@@ -29,9 +29,9 @@ from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
-# Beyond it powers of the travel lose digits to rounding.
+# Above this degree, powers of the travel lose digits to rounding.
 HIGHEST_DEGREE = 20
-# What counts as inside of the range of training, relative to the range of the travel.
+# Tolerance of the range of training, relative to the range of the travel.
 SLACK = 1e-9
 
 
@@ -142,12 +142,12 @@ def fit(
         )
     centre, scale = 0.5 * (low + high), 2.0 / (high - low) if high > low else 0.0
     x = (travel - centre) * scale
-    # Nearer to each other than the slack, two heights are one.
+    # Heights nearer to each other than the tolerance count once.
     heights = len(np.unique(np.round(x / SLACK)))
     if heights <= degree:
         raise InputError(f"degree {degree} needs {degree + 1} heights; training has {heights}")
     samples = np.concatenate([run.coordinates for run in runs])
-    # Powers would lose half of the digits in the fit, not in the evaluation.
+    # The fit is ill-conditioned in powers, their evaluation is not.
     series = np.linalg.lstsq(chebyshev.chebvander(x, degree), samples, rcond=None)[0]
     powers = np.zeros((degree + 1, samples.shape[1]))
     for i, column in enumerate(series.T):

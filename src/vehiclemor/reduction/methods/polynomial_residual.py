@@ -40,12 +40,12 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 # Every monomial is a line of machine code in each equation.
 MOST_MONOMIALS = 150
 HIGHEST_DEGREE = 8
-# Points beside each snapshot, and how far from it they lie at most (scaled reduced coordinates).
+# Points beside each snapshot, and their largest distance from it (scaled reduced coordinates).
 NEIGHBOURS = 10
 SPREAD = 0.05
 # Modes with a singular value below it times the first are rounding.
 RANK_TOLERANCE = 1e-10
-# Random points at which the part of the inputs is checked, and its largest difference (rad or m).
+# Random points at which linearity in the inputs is checked, and the largest deviation (rad or m).
 LINEARITY_CHECKS = 3
 LINEARITY_TOLERANCE = 1e-12
 

@@ -59,7 +59,7 @@ def fit(
     mean[shape.kept[fast]] = shape.reference[fast] - slaved @ shape.reference[slow]
     spaces = one_window(mean, trial_basis, test_basis)
     further = 2 * (len(shape.kept) + len(model.inputs))
-    # The wheels' coordinates stay, so the rank is n; their speeds are no states.
+    # All n coordinates are kept, the wheels' angles among them; only their speeds are eliminated.
     cost = offline_cost(began, model, further=further)
     return projected_vehicle(shape, spaces, n, cost, settings)
 

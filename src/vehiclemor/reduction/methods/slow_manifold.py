@@ -20,7 +20,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -33,6 +33,7 @@ from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
+from vehiclemor.reduction.vehicle.samples import ShapeSamples, shape_samples
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable, feature_table
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
@@ -76,27 +77,6 @@ class SlowManifoldSettings(OnlineSettings):
     tolerance: Tolerance = 2e-3
 
 
-class Samples(NamedTuple):
-    """Training runs, sample by sample.
-
-    Attributes
-    ----------
-    inputs, deviations
-        Inputs (samples, inputs), deviations of the shape from straight running (samples, n).
-    rates, motion
-        Rates of the shape (samples, n), and psi', U, V (samples, 3).
-    slow, speed
-        Slow coordinates (samples, k) and deviations of the speed (samples,).
-    """
-
-    inputs: np.ndarray
-    deviations: np.ndarray
-    rates: np.ndarray
-    motion: np.ndarray
-    slow: np.ndarray
-    speed: np.ndarray
-
-
 def fit(
     model: DynamicModel, training: Sequence[TrainingRun], settings: SlowManifoldSettings
 ) -> ReducedVehicle:
@@ -105,22 +85,15 @@ def fit(
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest)
-    samples = _samples(shape, modes, runs)
-    table = feature_table(
-        shape,
-        modes,
-        samples.slow,
-        samples.speed,
-        samples.inputs,
-        settings.hull,
-        settings.nonlinearity,
-    )
+    samples = shape_samples(shape, runs)
+    table = feature_table(shape, modes, samples, settings.hull, settings.nonlinearity)
     reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
     for _ in range(settings.refits):
         reduced = _with_heading(reduced, training, runs, table.odd, len(modes.rates) + 1)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
-        reduced = _fitted_on_runs(reduced, table, samples, goals, settings)
+        slow = np.column_stack(modes.coordinates(samples.deviations, samples.inputs))
+        reduced = _fitted_on_runs(reduced, table, slow, goals, settings)
     return replace(
         reduced,
         offline=offline_cost(began, model, runs, len(samples.inputs)),
@@ -129,23 +102,16 @@ def fit(
     )
 
 
-def _samples(shape: VehicleShape, modes: SlowModes, runs: Sequence[Trajectory]) -> Samples:
-    inputs = np.concatenate([run.inputs for run in runs])
-    shapes = np.concatenate([shape.of(run.states) for run in runs])
-    rates, motion = shape.motion(shapes, inputs)
-    deviations = shapes - shape.reference
-    return Samples(inputs, deviations, rates, motion, *modes.coordinates(deviations, inputs))
-
-
 def _fitted_on_rates(
-    shape: VehicleShape, modes: SlowModes, table: FeatureTable, samples: Samples, ridge: float
+    shape: VehicleShape, modes: SlowModes, table: FeatureTable, samples: ShapeSamples, ridge: float
 ) -> ReducedVehicle:
     """Equations fitted on the rates of the training runs, exact at straight running."""
-    u, z, motion = samples.inputs, samples.slow, samples.motion
+    u, motion = samples.inputs, samples.motion
+    z, speed = modes.coordinates(samples.deviations, u)
     k, inputs = len(modes.rates), u.shape[1]
     odd, even = table.odd, table.even
     odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
-    columns = table.features.at(np.column_stack([z, samples.speed]), u, table.parameters)
+    columns = table.features.at(np.column_stack([z, speed]), u, table.parameters)
     slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
     linear = z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
     c = np.zeros((len(table.features.terms), k + 1 + PLANAR))
@@ -153,14 +119,13 @@ def _fitted_on_rates(
     # Linear terms are scaled by the ranges of the training runs.
     c[odd[:k], :k] = modes.rates.T * largest(z)[:, None]
     c[odd[k], :k] = modes.drive * largest(u)[0]
-    # Straight running at any speed goes on for ever: the speed changes by what is even alone.
+    # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
     even_columns = columns[:, even_nonlinear]
     c[even_nonlinear, k] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
     c[odd, k + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
     c[even[0], k + 2], c[even[1], k + 2] = shape.speed, 1.0
-    c[even_nonlinear, k + 2] = ridge_fit(
-        even_columns, motion[:, 1] - shape.speed - samples.speed, ridge
-    )
+    forward = motion[:, 1] - shape.speed - speed
+    c[even_nonlinear, k + 2] = ridge_fit(even_columns, forward, ridge)
     c[odd, k + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
     return ReducedVehicle(
         shape.model,
@@ -182,7 +147,7 @@ def _fitted_on_rates(
 def _fitted_on_runs(
     reduced: ReducedVehicle,
     table: FeatureTable,
-    samples: Samples,
+    slow: np.ndarray,
     goals: Sequence[Target],
     settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
@@ -190,8 +155,7 @@ def _fitted_on_runs(
     reduced = improved(reduced, goals, table.free, settings.sweeps)
     if not settings.terms or not finishes(reduced, goals):
         return reduced
-    slow = np.column_stack([samples.slow, samples.speed])
-    fewer, kept = pruned(reduced, table, goals, slow, samples.inputs, settings.terms)
+    fewer, kept = pruned(reduced, table, goals, slow, settings.terms)
     fewer = improved(fewer, goals, kept.free, settings.sweeps)
     # With too few terms a training run may fail.
     return fewer if finishes(fewer, goals) else reduced

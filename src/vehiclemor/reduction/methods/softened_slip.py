@@ -50,7 +50,7 @@ def refusal(model: Model) -> str:
 
 def softened(model: DynamicModel, factor: float) -> DynamicModel:
     """The same model with its slip stiffness divided by a factor."""
-    # All values, not the file's: some may have been overridden.
+    # The model's own values: some may differ from those of the parameter file.
     values = {name: entry.value for name, entry in model.parameters.entries.items()}
     for name, stiffness in _stiffnesses(model).items():
         values[name] = stiffness / factor

@@ -27,7 +27,7 @@ ITERATION_LIMIT = 50
 
 
 @dataclass(frozen=True)
-class ProjectedModel:
+class AlgebraicProjection:
     """Reduced model on affine subspaces, one in each window.
 
     Attributes
@@ -93,7 +93,7 @@ def fit_windows(
     training: Sequence[TrainingRun],
     edges: np.ndarray,
     settings: AlgebraicPodSettings,
-) -> ProjectedModel:
+) -> AlgebraicProjection:
     """POD subspaces of equidistant snapshots (both ends included) in each window.
 
     Parameters
@@ -118,7 +118,7 @@ def fit_windows(
         pairing = _pairing(model, settings)
         tests = tuple(pairing @ basis.vectors for basis in bases)
     offline = offline_cost(began, model, histories)
-    return ProjectedModel(model, edges, tuple(bases), tests, offline, settings.tolerance)
+    return AlgebraicProjection(model, edges, tuple(bases), tests, offline, settings.tolerance)
 
 
 def check_subspace(model: Model, settings: AlgebraicPodSettings) -> None:

@@ -30,7 +30,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedDynamicModel:
+class DynamicProjection:
     """Projected equations of motion on affine subspaces, one in each window.
 
     Attributes
@@ -131,7 +131,7 @@ def fit_windows(
     training: Sequence[TrainingRun],
     edges: np.ndarray,
     settings: DynamicPodSettings,
-) -> ReducedDynamicModel:
+) -> DynamicProjection:
     """POD subspaces of equidistant snapshots (both ends included) in each window.
 
     Parameters
@@ -171,7 +171,7 @@ def fit_windows(
         bases.append(Basis(means[-1][: len(weight)], vectors, scaled.singular_values))
     spaces = _spaces(model, formulation, edges, np.array(means), bases, weight)
     offline = offline_cost(began, model, histories)
-    return ReducedDynamicModel(
+    return DynamicProjection(
         model,
         formulation,
         tuple(bases),

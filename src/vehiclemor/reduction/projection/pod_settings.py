@@ -89,7 +89,7 @@ class ConstrainedPodSettings(DynamicPodSettings):
 
 
 DYNAMIC_LITERAL = {"formulation": "state", "inner_product": "euclidean", "rank_tolerance": 0.0}
-# `literal` is the paper's words.
+# `literal` takes the paper's words literally.
 PRESETS = {
     "ae": {"literal": {"test_space": "galerkin", "rank_tolerance": 0.0}},
     "ode": {"literal": DYNAMIC_LITERAL},

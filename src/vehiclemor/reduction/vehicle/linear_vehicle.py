@@ -20,13 +20,19 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.slow_modes import APART, apart, real_modes, slow_modes
+from vehiclemor.reduction.vehicle.slow_modes import (
+    APART,
+    apart,
+    real_modes,
+    slow_modes,
+    without_derivatives,
+)
 
 # Modes that steering moves by less than this part of the most moved one are symmetric.
 MOVED = 1e-8
 # Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
 CORNERING = 4.0
-# How many times that is typical, and the same for speed (m/s), heading (rad), place (m).
+# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
 MARGIN = 3.0
 SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
 
@@ -58,10 +64,7 @@ class Lateral:
 def lateral_modes(shape: VehicleShape) -> Lateral:
     """All modes that steering moves, slow ones first, in real form (blocks of two for pairs)."""
     linear = shape.linearised
-    follow = np.zeros_like(linear.b)
-    for j in range(linear.b.shape[1] - 1, 0, -1):
-        follow[:, j - 1] = linear.b[:, j] + linear.a @ follow[:, j]
-    drive = linear.b[:, 0] + linear.a @ follow[:, 0]
+    follow, drive = without_derivatives(linear.a, linear.b)
     values, vectors = np.linalg.eig(linear.a.T)
     w = vectors.T
     v = np.linalg.inv(w)
@@ -110,7 +113,7 @@ def linear_vehicle(
         lifting,
         np.vstack([lateral.left, modes.speed_left]),
         np.vstack([lateral.feedthrough, np.zeros(inputs)]),
-        np.concatenate([typical(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
+        np.concatenate([error_scale(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
         linearisation_cost(shape, began),
         settings.solver,
         settings.tolerance,
@@ -118,11 +121,11 @@ def linear_vehicle(
     )
 
 
-def typical(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
-    """Typical sizes (k,) of lateral coordinates: a multiple of those in steady cornering."""
+def error_scale(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
+    """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
     steady = -np.linalg.solve(lateral.a, lateral.b)
     turn = shape.linearised.motion_a[0] @ (lateral.right @ steady + lateral.follow[:, 0])
-    # A coordinate that steady cornering leaves alone counts as the largest one.
+    # At least a thousandth of the largest one, for coordinates that steady cornering leaves alone.
     sizes = np.maximum(np.abs(steady), 1e-3 * np.abs(steady).max())
     return MARGIN * CORNERING / shape.speed / abs(turn) * sizes
 

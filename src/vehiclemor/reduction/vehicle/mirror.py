@@ -15,7 +15,7 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Wheels that the mirror exchanges, as parts of names.
 SWAPPED = {"FL": "FR", "FR": "FL", "RL": "RR", "RR": "RL"}
-# Parts of a state's range below which it counts as not moved.
+# States that move less than this part of their range count as not moved.
 STILL = 1e-6
 
 

@@ -42,7 +42,7 @@ def projected_vehicle(
         return from_heading_frame(run.path)
 
     def project(states: np.ndarray) -> np.ndarray:
-        # Along the equations that are left out.
+        # Oblique projection, along the directions that the test basis does not see.
         mean, basis, test = spaces.means[0], spaces.trial_basis[0], spaces.test_basis[0]
         there = to_heading_frame(states)
         return from_heading_frame(mean + (there - mean) @ test.T @ basis)

@@ -24,7 +24,7 @@ from vehiclemor.reduction.vehicle.trajectory_fit import Target, normal_matrix
 
 # Of the normal matrix, scaled to a diagonal of ones: nearly dependent features are told apart.
 REGULARISATION = 1e-11
-# So many symmetric terms for each lateral one.
+# Number of symmetric terms for each lateral one.
 SYMMETRIC = 0.25
 
 
@@ -33,7 +33,6 @@ def pruned(
     table: FeatureTable,
     goals: Sequence[Target],
     slow: np.ndarray,
-    inputs: np.ndarray,
     kept: int,
 ) -> tuple[ReducedVehicle, FeatureTable]:
     """A reduced vehicle whose equations have fewer terms; the lifting keeps its own.
@@ -42,8 +41,8 @@ def pruned(
     ----------
     goals
         Training runs in reduced states, near which the coefficients are best; all must finish.
-    slow, inputs
-        Slow coordinates and speed (samples, states) and inputs of the training runs.
+    slow
+        Slow coordinates and speed (samples, states) of the training runs.
     kept
         Number of lateral terms beyond the linear ones.
     """
@@ -58,6 +57,7 @@ def pruned(
     groups = [[numbers[i, column] for column in lateral] for i in odd]
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
     # The symmetric equations are fitted to rates; each counts by its nonlinear part.
+    inputs = np.concatenate([goal.inputs for goal in goals])
     values = reduced.features.at(slow, inputs, reduced.parameters)[:, even]
     symmetric = c[np.ix_(even, [k, k + 2])]
     sizes = np.mean((values @ symmetric) ** 2, axis=0)

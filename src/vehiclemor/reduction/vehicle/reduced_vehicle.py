@@ -66,7 +66,7 @@ class ReducedVehicle:
     feedthrough
         Reduced coordinates per input (states, inputs), to be subtracted at the start.
     error_scale
-        Magnitude of each reduced state (states + 3,).
+        Magnitude of each reduced state (states + 3,) below which its error counts absolutely.
     transient
         What is added to the lifted shapes.
     lifted_features

@@ -15,6 +15,7 @@ import numpy as np
 
 from vehiclemor.reduction.vehicle.features import Features, monomials
 from vehiclemor.reduction.vehicle.regression import largest
+from vehiclemor.reduction.vehicle.samples import ShapeSamples
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
@@ -73,13 +74,13 @@ class FeatureTable:
 def feature_table(
     shape: VehicleShape,
     modes: SlowModes,
-    z: np.ndarray,
-    speed: np.ndarray,
-    u: np.ndarray,
+    samples: ShapeSamples,
     hull: float,
     nonlinearity: str,
 ) -> FeatureTable:
-    """Features, scaled by the ranges of training runs: z (samples, k), speed (samples,), u."""
+    """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
+    u = samples.inputs
+    z, speed = modes.coordinates(samples.deviations, u)
     k, inputs = z.shape[1], u.shape[1]
     rows = _variables(shape, modes)
     # The axles' slips go as one over the speed where they come from motion, not from steering.

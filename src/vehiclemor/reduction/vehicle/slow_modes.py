@@ -18,7 +18,7 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 CONTROLLED = 1e-6
 # Eigenvalues (1/s) nearer to each other belong to the cluster of stabilised constraints.
 APART = 1e-2
-# Below it (1/s) an eigenvalue is zero.
+# Smaller eigenvalues (1/s) count as zero.
 STILL = 1e-6
 
 
@@ -83,7 +83,7 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     values, vectors = np.linalg.eig(linear.a.T)
     left = vectors.T
     right = np.linalg.inv(left)
-    # Stabilised constraints have many equal eigenvalues, but nothing of them is used.
+    # The many equal eigenvalues of stabilised constraints are defective, but not used.
     controlled = np.abs(left @ linear.b[:, 0]) * np.linalg.norm(right, axis=0)
     steers = controlled > CONTROLLED * controlled.max()
     still = int(np.argmin(np.abs(values)))
@@ -91,12 +91,8 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     moving[still] = False
     w, v = real_modes(values, left, right, steers & moving & (np.abs(values) <= fastest))
     rates = w @ linear.a @ v
-    # z' = rates z + sum_j b_j u^(j): with z - h u for z the derivatives of the steering go.
     b = w @ linear.b
-    feedthrough = np.zeros_like(b)
-    for j in range(b.shape[1] - 1, 0, -1):
-        feedthrough[:, j - 1] = b[:, j] + rates @ feedthrough[:, j]
-    drive = b[:, 0] + rates @ feedthrough[:, 0]
+    feedthrough, drive = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.motion_a[1] @ right[:, still].real
     quiet = np.flatnonzero(
@@ -143,6 +139,17 @@ def real_modes(
         else:
             columns.append(np.real(right[:, i]))
     return np.array(rows), np.array(columns).T
+
+
+def without_derivatives(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Feedthrough H (n, inputs) and drive d (n,) of x' = A x + b_0 s + b_1 s' + b_2 s'' ...
+
+    For z = x - H (s, s', ...) the derivatives of s go: z' = A z + d s.
+    """
+    feedthrough = np.zeros_like(b)
+    for j in range(b.shape[1] - 1, 0, -1):
+        feedthrough[:, j - 1] = b[:, j] + a @ feedthrough[:, j]
+    return feedthrough, b[:, 0] + a @ feedthrough[:, 0]
 
 
 def apart(values: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 # Errors that count the same: heading in rad, lateral position in m, part of a slow coordinate's
 # range.
 HEADING, POSITION, PART = 1e-4, 0.02, 0.01
-# Every so many output times the runs are compared.
+# Runs are compared at every fifth output time.
 STRIDE = 5
 DIFFERENCE = 1e-6
 DAMPING = 1e-4
@@ -178,7 +178,7 @@ def _sensitivities(
     values = columns @ c
     dim, samples = k + PLANAR, len(path)
     cosine, sine = np.cos(heading), np.sin(heading)
-    # What a change of each column of C z', psi', U, V does to the rates of the states.
+    # Derivatives of the states' rates by the columns z', psi', U and V of C phi.
     spread = np.zeros((samples, dim, dim))
     spread[:, range(k + 1), range(k + 1)] = 1.0
     spread[:, k + 1, k + 1], spread[:, k + 1, k + 2] = cosine, -sine

@@ -101,7 +101,7 @@ def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car
 
 def test_kernels_are_the_features_that_are_fitted(reduced: ReducedVehicle) -> None:
     rng, k = np.random.default_rng(1), reduced.features.states
-    y = rng.normal(size=(20, k + 3)) * reduced.typical / 3.0
+    y = rng.normal(size=(20, k + 3)) * reduced.error_scale / 3.0
     u = rng.normal(size=(20, 1)) * 0.03
     system = reduced.system
     found = np.empty_like(y)

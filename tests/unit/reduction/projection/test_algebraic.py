@@ -8,7 +8,7 @@ import pytest
 from tests.oracles.projection import reduced_path
 from tests.reducing import figure_errors, fitted
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.projection.algebraic import ProjectedModel
+from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.projection.bases import Basis, pod_basis
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
@@ -17,7 +17,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 WINDOWS = (range(500), range(500, 1001))
 
 
-def subspaces(reduced: ProjectedModel) -> list[tuple[np.ndarray, np.ndarray]]:
+def subspaces(reduced: AlgebraicProjection) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(basis.mean, basis.vectors) for basis in reduced.bases]
 
 
@@ -27,7 +27,7 @@ def signed_permutation(rng: np.random.Generator) -> np.ndarray:
 
 def by_numpy(
     model: AlgebraicModel,
-    reduced: ProjectedModel,
+    reduced: AlgebraicProjection,
     inputs: np.ndarray,
     equations: np.ndarray,
     **settings: object,
@@ -46,12 +46,12 @@ def by_numpy(
 
 
 @pytest.fixture(scope="module")
-def least_squares(model: AlgebraicModel, nominal: Maneuver) -> ProjectedModel:
+def least_squares(model: AlgebraicModel, nominal: Maneuver) -> AlgebraicProjection:
     return fitted(model, nominal, "pod", rank=3)
 
 
 @pytest.fixture(scope="module")
-def galerkin(model: AlgebraicModel, nominal: Maneuver) -> ProjectedModel:
+def galerkin(model: AlgebraicModel, nominal: Maneuver) -> AlgebraicProjection:
     return fitted(model, nominal, "pod", rank=3, test_space="galerkin")
 
 
@@ -59,7 +59,7 @@ def test_least_squares_ignores_order_and_signs_of_the_equations(
     model: AlgebraicModel,
     nominal: Maneuver,
     full: Trajectory,
-    least_squares: ProjectedModel,
+    least_squares: AlgebraicProjection,
     rng: np.random.Generator,
 ) -> None:
     found = least_squares.simulate(nominal, model.starts[0]).coordinates
@@ -69,7 +69,7 @@ def test_least_squares_ignores_order_and_signs_of_the_equations(
 
 
 def test_galerkin_depends_on_order_and_signs_of_the_equations(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, galerkin: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, galerkin: AlgebraicProjection
 ) -> None:
     found = galerkin.simulate(nominal, model.starts[0])
     other = by_numpy(model, galerkin, full.inputs, np.eye(8), galerkin=True)
@@ -102,7 +102,7 @@ def test_equation_seed_permutes_and_signs_the_equations(
 
 
 def test_settings_of_galerkin_do_not_touch_least_squares(
-    model: AlgebraicModel, nominal: Maneuver, least_squares: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, least_squares: AlgebraicProjection
 ) -> None:
     plain = least_squares.simulate(nominal, model.starts[0]).coordinates
     other = fitted(model, nominal, "pod", rank=3, equation_seed=3, reversed_coordinates="theta_u")
@@ -149,7 +149,7 @@ def test_the_wide_spread_of_galerkin(
 
 
 def test_each_window_starts_at_the_projection_of_the_last_sample(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
 ) -> None:
     # With a coarse tolerance every sample gets one iteration, and the start decides the result.
     coarse = replace(least_squares, tolerance=1.0).simulate(nominal, model.starts[0])
@@ -161,7 +161,7 @@ def test_each_window_starts_at_the_projection_of_the_last_sample(
 
 
 def test_restart_in_the_same_subspace_changes_nothing(
-    model: AlgebraicModel, nominal: Maneuver, least_squares: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, least_squares: AlgebraicProjection
 ) -> None:
     basis = least_squares.bases[0]
     whole = replace(least_squares, edges=np.array([0.0, 10.0]), bases=(basis,))
@@ -171,7 +171,7 @@ def test_restart_in_the_same_subspace_changes_nothing(
 
 
 def test_path_is_continuous_where_a_window_begins(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
 ) -> None:
     run = least_squares.simulate(nominal, model.starts[0]).coordinates
     error = np.abs(run - full.coordinates).max(axis=1)
@@ -182,7 +182,7 @@ def test_path_is_continuous_where_a_window_begins(
 
 
 def test_every_sample_lies_in_the_subspace_of_its_window(
-    model: AlgebraicModel, nominal: Maneuver, least_squares: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, least_squares: AlgebraicProjection
 ) -> None:
     run = least_squares.simulate(nominal, model.starts[0]).coordinates
     for (mean, vectors), samples in zip(subspaces(least_squares), WINDOWS, strict=True):
@@ -191,7 +191,7 @@ def test_every_sample_lies_in_the_subspace_of_its_window(
 
 
 def test_least_squares_is_stationary(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: ProjectedModel
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
 ) -> None:
     run = least_squares.simulate(nominal, model.starts[0]).coordinates
     for (_, vectors), samples in zip(subspaces(least_squares), WINDOWS, strict=True):
