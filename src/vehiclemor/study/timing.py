@@ -21,8 +21,9 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.clock import repeated
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
-from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
+from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.scenario import Scenario, start_of
 from vehiclemor.study.store import prepare_folder, stored
