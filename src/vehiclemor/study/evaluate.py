@@ -75,8 +75,11 @@ def refusal(model: Model, experiment: Experiment) -> Failure | None:
     accepted, reason = method.accepts(model)
     if not accepted:
         return Failure("rejected", reason)
-    settings = for_method(model, experiment.method, experiment.settings)
-    return attempt(lambda: method.check(model, settings))
+
+    def check() -> None:
+        method.check(model, for_method(model, experiment.method, experiment.settings))
+
+    return attempt(check)
 
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:
