@@ -42,12 +42,12 @@ def test_the_sets_of_a_vehicle(protocols, name):
     assert {s.start for s in sets["test"]} == {"equilibrium", "dropped"}
     shapes = ("lane_change", "step_steer", "straight_ahead", "sine_sweep")
     assert {s.maneuver.name for s in sets["test"]} == {f"{prefix}{shape}" for shape in shapes}
-    assert min(s.amplitude for s in sets["test"]) < 0.0
-    trained = [s.frequency for s in sets["training"]]
+    assert min(s.maneuver.amplitude_factor for s in sets["test"]) < 0.0
+    trained = [s.maneuver.frequency_factor for s in sets["training"]]
     assert min(trained) < 0.7
     assert max(trained) > 1.6
     assert {26.0, 30.0} <= {s.speed for s in sets["outside"]}
-    assert 1.8 in {s.amplitude for s in sets["outside"]}
+    assert 1.8 in {s.maneuver.amplitude_factor for s in sets["outside"]}
 
 
 def test_no_run_stands_in_two_sets(protocols):

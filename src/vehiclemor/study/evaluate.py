@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from vehiclemor.simulation.model import Model, build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import Experiment, Keep
 from vehiclemor.study.failure import Failure, attempt
-from vehiclemor.study.method_settings import Settings, default_settings, for_method
+from vehiclemor.study.method_settings import default_settings, for_method
 from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
@@ -61,7 +62,7 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
 
 def model_of(experiment: Experiment) -> Model:
     """The model of an experiment; kept, since all experiments of a study share it."""
-    return _built(experiment.model, json.dumps(experiment.parameters, sort_keys=True))
+    return _built(experiment.model, _text(experiment.parameters))
 
 
 @lru_cache(maxsize=16)
@@ -96,7 +97,7 @@ kept_reference = lru_cache(maxsize=128)(reference_run)
 
 def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     """Fit the method on the training scenarios, and on nothing else."""
-    return _fitted(model, experiment.method, experiment.settings, experiment.training)
+    return _fit(model, experiment.method, _text(experiment.settings), experiment.training)
 
 
 def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
@@ -104,9 +105,8 @@ def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     settings = experiment.settings
     online = {name: value for name, value in settings.items() if name in ONLINE}
     defaults = default_settings(model, experiment.method)
-    common = settings | {name: defaults[name] for name in online}
-    text = json.dumps(common, sort_keys=True)
-    fitted: Any = _kept_fit(model, experiment.method, text, experiment.training)
+    common = _text(settings | {name: defaults[name] for name in online})
+    fitted: Any = _kept_fit(model, experiment.method, common, experiment.training)
     if isinstance(fitted, Failure) or not online:
         return fitted
     if not all(hasattr(fitted, name) for name in online):
@@ -114,23 +114,23 @@ def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     return replace(fitted, **online)
 
 
-@lru_cache(maxsize=64)
-def _kept_fit(
-    model: Model, method: str, settings: str, training: tuple[Scenario, ...]
-) -> ReducedModel | Failure:
-    return _fitted(model, method, json.loads(settings), training)
-
-
-def _fitted(
-    model: Model, method_name: str, settings: Settings, training: tuple[Scenario, ...]
+def _fit(
+    model: Model, method_name: str, settings: str, training: tuple[Scenario, ...]
 ) -> ReducedModel | Failure:
     method: Method = component("method", method_name)
 
     def fit() -> ReducedModel:
         runs = [training_run(model, scenario) for scenario in training]
-        return method.fit(model, runs, for_method(model, method_name, settings))
+        return method.fit(model, runs, for_method(model, method_name, json.loads(settings)))
 
     return attempt(fit)
+
+
+_kept_fit = lru_cache(maxsize=64)(_fit)
+
+
+def _text(content: Mapping[str, object]) -> str:
+    return json.dumps(content, sort_keys=True)
 
 
 def _tested(

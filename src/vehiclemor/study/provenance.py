@@ -51,6 +51,20 @@ def machine() -> str:
     return f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}"
 
 
+def attributes(title: str, kernel_hash: str, **further: object) -> dict[str, object]:
+    """Global attributes of every result file."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "source": "vehiclemor",
+        "references": "doi:10.1115/1.4029390",
+        "kernel_hash": kernel_hash,
+        "versions": versions(),
+        "machine": machine(),
+        **further,
+    }
+
+
 @cache
 def code_digest(model: str, method: str) -> str:
     """Hash of the source that computes a result.

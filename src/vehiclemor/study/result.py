@@ -15,7 +15,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
-from vehiclemor.study.provenance import machine, versions
+from vehiclemor.study.provenance import attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -180,15 +180,7 @@ def _errors(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return rms(error), max_abs(error), max_abs(outputs[first])
 
 
-def _attributes(experiment: Experiment) -> dict[str, str]:
-    return {
-        "Conventions": "CF-1.11",
-        "title": f"{experiment.method} on {experiment.model}",
-        "source": "vehiclemor",
-        "references": "doi:10.1115/1.4029390",
-        "cell": experiment.key,
-        "configuration": experiment.configuration,
-        "kernel_hash": experiment.kernel,
-        "versions": versions(),
-        "machine": machine(),
-    }
+def _attributes(experiment: Experiment) -> dict[str, object]:
+    title = f"{experiment.method} on {experiment.model}"
+    own = {"cell": experiment.key, "configuration": experiment.configuration}
+    return attributes(title, experiment.kernel, **own)

@@ -40,19 +40,11 @@ class Scenario:
     speed: float | None = None
 
     @property
-    def frequency(self) -> float:
-        """Factor on the frequency of the input."""
-        return self.maneuver.frequency_factor
-
-    @property
-    def amplitude(self) -> float:
-        """Factor on the amplitude of the input."""
-        return self.maneuver.amplitude_factor
-
-    @property
     def label(self) -> str:
         """One readable line, unique within a protocol."""
-        words = [self.maneuver.name, f"f {self.frequency:g}", f"a {self.amplitude:g}", self.start]
+        run = self.maneuver
+        factors = [f"f {run.frequency_factor:g}", f"a {run.amplitude_factor:g}"]
+        words = [run.name, *factors, self.start]
         if self.speed is not None:
             words.append(f"{self.speed:g} m/s")
         return ", ".join(words)
@@ -62,8 +54,8 @@ class Scenario:
         """Everything that determines the run of a given model, for a hash."""
         return {
             "maneuver": self.maneuver.name,
-            "frequency": self.frequency,
-            "amplitude": self.amplitude,
+            "frequency": self.maneuver.frequency_factor,
+            "amplitude": self.maneuver.amplitude_factor,
             "start": self.start,
             "speed": self.speed,
             "inputs": input_hash(self.maneuver),

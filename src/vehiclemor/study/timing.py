@@ -24,7 +24,7 @@ from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.method_settings import complete_settings
-from vehiclemor.study.provenance import machine, versions
+from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.scenario import Scenario, start_of
 from vehiclemor.study.store import prepare_folder, stored
 from vehiclemor.study.timing_case import TimingCase
@@ -187,15 +187,8 @@ def _dataset(
     variables["offline_seconds"] = ("case", offline, {"units": "s", "long_name": text})
     first = next(iter(experiments.values()))
     labels = {"case": list(experiments), "scenario": [scenario.label for scenario in first.test]}
-    attributes = {
-        "title": f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}",
-        "source": "vehiclemor",
-        "model": first.model,
-        "machine": machine(),
-        "versions": versions(),
-        "kernel_hash": first.kernel,
-    }
-    return xr.Dataset(variables, labels, attributes)
+    title = f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}"
+    return xr.Dataset(variables, labels, attributes(title, first.kernel, model=first.model))
 
 
 def _rounds(

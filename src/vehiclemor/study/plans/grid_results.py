@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.study.plans.grid import Grid
-from vehiclemor.study.provenance import machine, versions
+from vehiclemor.study.provenance import attributes, versions
 from vehiclemor.study.store import cell_path, read_arrays, read_dataset
 
 if TYPE_CHECKING:
@@ -76,20 +76,16 @@ def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
     }
     dataset = xr.Dataset(variables, coordinates)
     cell = next(iter(grid.cells.values()))
-    dataset.attrs = {
-        "Conventions": "CF-1.11",
-        "title": grid.definition.title,
-        "source": "vehiclemor",
-        "references": "doi:10.1115/1.4029390",
-        "study": grid.name,
-        "model": cell.model,
-        "training": grid.definition.training,
-        "configuration": json.dumps(grid.definition.model_dump(), sort_keys=True),
-        "kernel_hash": cell.kernel,
-        "versions": versions(),
-        "machine": machine(),
-    }
-    return dataset
+    return dataset.assign_attrs(
+        attributes(
+            grid.definition.title,
+            cell.kernel,
+            study=grid.name,
+            model=cell.model,
+            training=grid.definition.training,
+            configuration=json.dumps(grid.definition.model_dump(), sort_keys=True),
+        )
+    )
 
 
 def _empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
