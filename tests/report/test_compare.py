@@ -47,7 +47,7 @@ method = "pod"
 
 @pytest.fixture(scope="module")
 def rows(results_folder):
-    return comparison("paper", results_folder)
+    return comparison(results_folder)
 
 
 def test_every_published_number_has_a_row(rows):

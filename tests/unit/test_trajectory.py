@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vehiclemor.metrics import largest, rms, signal_range
+from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import (
@@ -74,6 +74,6 @@ def test_speeds_and_counts_of_a_dynamic_model_are_written(
 def test_measures_of_an_error() -> None:
     error = np.array([[3.0, 0.0], [-4.0, 1.0]])
     assert rms(error) == pytest.approx([np.sqrt(12.5), np.sqrt(0.5)])
-    assert list(largest(error)) == [4.0, 1.0]
+    assert list(max_abs(error)) == [4.0, 1.0]
     assert list(signal_range(error)) == [7.0, 1.0]
     assert np.isnan(rms(np.array([[1.0], [np.nan]]))).all()

@@ -6,7 +6,7 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.registry import names, unknown
+from vehiclemor.registry import names
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.criteria import CRITERIA, WITHOUT_REPLAY, Results
 from vehiclemor.report.published import Claim, Number, load_published
@@ -37,13 +37,11 @@ NOMINAL = {
 PARAMETERS = "the paper's parameters were never published; ours are public data"
 
 
-def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
+def comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     """The comparison as a table; studies and timings that are missing are run first.
 
     Parameters
     ----------
-    what
-        `paper`.
     folder
         Results folder.
     jobs
@@ -57,8 +55,6 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     """
     import pandas as pd
 
-    if what != "paper":
-        raise unknown("comparison", what, ["paper"])
     results = run_studies("paper", folder, jobs)
     published = load_published()
     costs = {model: cost_table(model, folder) for model in NOMINAL}
@@ -66,9 +62,7 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     for number in published.numbers.values():
         if number.kind not in ("rms_error", "time_reduction"):
             continue
-        if number.model is None or number.model not in NOMINAL:
-            rows.append(_absent_row(number))
-        elif number.kind == "rms_error":
+        if number.kind == "rms_error":
             rows += _error_rows(number, results)
         elif number.model == "double_wishbone":
             rows += _iteration_time_rows(number, _of_start(costs[number.model]))
@@ -85,7 +79,7 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
 
 
 def _of_start(costs: pd.DataFrame, start: str = "equilibrium") -> pd.DataFrame:
-    return costs[costs["start"] == start].set_index("contestant")
+    return costs[costs["start"] == start].set_index("case")
 
 
 def _error_rows(number: Number, results: Results) -> list[dict[str, object]]:
@@ -131,13 +125,13 @@ def _error_row(number: Number, nominal: xr.Dataset, label: str, origin: str) -> 
 
 def _integration_time_rows(number: Number, costs: pd.DataFrame) -> list[dict[str, object]]:
     """Share of the same integrator's full run that is saved, by variant and start."""
-    contestants = {"default": f"pod r={number.states}", "literal": f"pod literal r={number.states}"}
+    cases = {"default": f"pod_r{number.states}", "literal": f"pod_literal_r{number.states}"}
     rows: list[dict[str, object]] = []
-    for variant, contestant in contestants.items():
+    for variant, case in cases.items():
         for start in dict.fromkeys(costs["start"]):
             table = _of_start(costs, start)
-            row = table.loc[contestant]
-            baseline, strongest = table.iloc[0], table.iloc[1]
+            row = table.loc[case]
+            baseline, strongest = table.loc["baseline"], table.loc["strongest"]
             share = 1.0 / float(row["speed_up"])
             against = 1.0 / float(row["speed_up_strongest"])
             finished = row["status"] == "ok"
@@ -173,15 +167,15 @@ def _runs(count: float) -> str:
 
 
 def _iteration_time_rows(number: Number, costs: pd.DataFrame) -> list[dict[str, object]]:
-    contestants = {
-        3: {"default": "pod r=3", "literal": "pod literal r=3"},
-        6: {"literal": "pod literal r=6"},
+    cases = {
+        3: {"default": "pod_r3", "literal": "pod_literal_r3"},
+        6: {"literal": "pod_literal_r6"},
     }
-    baseline, strongest = costs.loc["full order, Newton"], costs.loc["full order, strongest"]
-    dense = costs.loc["full order, dense"]
+    baseline, strongest = costs.loc["baseline"], costs.loc["strongest"]
+    dense = costs.loc["dense"]
     rows: list[dict[str, object]] = []
-    for variant, contestant in contestants[number.states or 3].items():
-        row = costs.loc[contestant]
+    for variant, case in cases[number.states or 3].items():
+        row = costs.loc[case]
         reduction = 1.0 - 1.0 / float(row["speed_up"])
         against = {
             "the strongest solver": float(row["us_per_run"]) / float(strongest["us_per_run"]),
@@ -211,24 +205,9 @@ def _iteration_time_rows(number: Number, costs: pd.DataFrame) -> list[dict[str, 
     return rows
 
 
-def _absent_row(number: Number) -> dict[str, object]:
-    missing = float("nan")
-    return {
-        "model": number.model,
-        "item": number.item,
-        "published": number.value,
-        "reproduced": missing,
-        "unit": number.unit,
-        "floor": missing,
-        "replay": missing,
-        "verdict": "not_comparable",
-        "reason": "this model is not in the suite yet",
-    }
-
-
 def _six_slower_row(claim: Claim, costs: pd.DataFrame) -> dict[str, object]:
-    three, six = costs.loc["pod literal r=3"], costs.loc["pod literal r=6"]
-    full = costs.loc["full order, Newton"]
+    three, six = costs.loc["pod_literal_r3"], costs.loc["pod_literal_r6"]
+    full = costs.loc["baseline"]
     slower = float(six["us_per_run"]) / float(three["us_per_run"])
     faster_than_full = float(six["speed_up"]) > 1.0
     return {

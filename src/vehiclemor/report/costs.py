@@ -6,16 +6,22 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.report.contestants import RACES
-from vehiclemor.report.timing import timing
+from vehiclemor.report.timing_cases import COST_TABLES
+from vehiclemor.simulation.build import build
+from vehiclemor.study.timing import timed_model
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 
+def timings(model: str, folder: Path) -> xr.Dataset:
+    """Stored timing of the cases of a model, measured first if it is missing or out of date."""
+    return timed_model(build(model), COST_TABLES[model].cases, folder, f"timing-{model}")
+
+
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
-    """Cost of every contestant of a model on its nominal maneuver, from every start.
+    """Cost of every case of a model on its nominal maneuver, from every start.
 
     Returns
     -------
@@ -27,7 +33,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    data = timing(model, folder)
+    data = timings(model, folder)
     rows = [row for start in data["start"].values for row in _rows(model, data.sel(start=start))]
     return pd.DataFrame(rows)
 
@@ -35,17 +41,18 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
 def _rows(model: str, data: xr.Dataset) -> list[dict[str, object]]:
     """Rows of one start."""
     rows: list[dict[str, object]] = []
-    for label in data["contestant"].values:
-        row = data.sel(contestant=label)
+    for case in data["case"].values:
+        row = data.sel(case=case)
         own, offline = float(row["seconds"]), float(row["offline_seconds"])
         entry: dict[str, object] = {
             "start": str(data["start"].item()),
-            "contestant": str(label),
+            "case": str(case),
+            "contestant": str(row["label"].item()),
             "status": str(row["status"].item()),
             "rank": int(row["effective_rank"]),
             "us_per_run": own * 1e6,
             "ns_per_sample": float(row["seconds_per_sample"]) * 1e9,
-            **{name: int(row[name]) for name in RACES[model].counts},
+            **{name: int(row[name]) for name in COST_TABLES[model].counts},
             "tolerance": float(row["tolerance"]),
             "quartile_spread": _share(float(row["seconds_upper"] - row["seconds_lower"]), own),
         }
@@ -68,18 +75,18 @@ def _rows(model: str, data: xr.Dataset) -> list[dict[str, object]]:
 
 def printed_costs(folder: Path) -> str:
     """Cost tables of all timed models as text."""
-    return "\n\n".join(_printed(model, folder) for model in RACES)
+    return "\n\n".join(_printed(model, folder) for model in COST_TABLES)
 
 
 def _printed(model: str, folder: Path) -> str:
-    data, table, race = timing(model, folder), cost_table(model, folder), RACES[model]
+    data, table, shown = timings(model, folder), cost_table(model, folder), COST_TABLES[model]
     head = f"{'':<27}{'rank':>5}{'tol.':>8}{'us/run':>9}{'+-%':>5}{'ns/point':>9}"
-    head += "".join(f"{heading:>11}" for heading in race.counts.values())
-    head += f"{'x1':>7}{'x2':>7}" + "".join(f"{_heading(name):>10}" for name in race.errors)
+    head += "".join(f"{heading:>11}" for heading in shown.counts.values())
+    head += f"{'x1':>7}{'x2':>7}" + "".join(f"{_heading(name):>10}" for name in shown.errors)
     lines = [
         f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})",
         (
-            f"speed-up x1: against {race.baseline}; x2: against {race.strongest}; "
+            f"speed-up x1: against {shown.baseline}; x2: against {shown.strongest}; "
             f"break-even in runs; +-%: half the quartile spread; errors are RMS"
         ),
         f"{head}{'offline us':>11}{'break-even x1/x2':>17}",
@@ -89,7 +96,7 @@ def _printed(model: str, folder: Path) -> str:
         if len(starts) > 1:
             lines.append(f"start {start}")
         rows = table.loc[table["start"] == start].to_dict(orient="records")
-        lines += [_line(dict(row), race.counts, race.errors) for row in rows]
+        lines += [_line(dict(row), shown.counts, shown.errors) for row in rows]
     return "\n".join(lines)
 
 

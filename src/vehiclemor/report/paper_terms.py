@@ -7,31 +7,24 @@ fastest counts whose errors stay within the published ones from every start.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from vehiclemor.models.report import TimingCase
 from vehiclemor.reduction.settings import Value
-from vehiclemor.report.contestants import Contestant
 from vehiclemor.report.published import load_published
-from vehiclemor.report.timing import measure
 from vehiclemor.simulation.build import build
-from vehiclemor.study.provenance import code_digest, machine
-from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
-
-if TYPE_CHECKING:
-    import xarray as xr
+from vehiclemor.study.timing import timed_model
 
 Row = dict[str, Any]
 BASELINES = (
-    Contestant("full order, the paper's kind", "full_order"),
-    Contestant("full order, strongest", "full_order", "strongest"),
+    TimingCase("baseline", "full order, the paper's kind", "full_order"),
+    TimingCase("strongest", "full order, strongest", "full_order", "strongest"),
 )
 
 
@@ -53,12 +46,12 @@ class Terms:
     open: dict[str, tuple[Value, ...]]
     bounds: dict[str, str]
 
-    def contestants(self) -> Iterator[Contestant]:
-        """All variants, with what they set as their label."""
+    def variants(self) -> Iterator[TimingCase]:
+        """All variants, known by what they set."""
         for values in product(*self.open.values()):
             chosen = dict(zip(self.open, values, strict=True))
             label = ", ".join(str(value) for value in values)
-            yield Contestant(f"pod, {label}", "pod", settings=self.fixed | chosen)
+            yield TimingCase(label, f"pod, {label}", "pod", settings=self.fixed | chosen)
 
 
 FORMS: dict[str, tuple[Value, ...]] = {
@@ -112,10 +105,11 @@ def paper_terms_rows(folder: Path) -> list[Row]:
 def _model_rows(name: str, folder: Path) -> list[Row]:
     terms = TERMS[name]
     numbers = load_published().numbers
-    dataset = _measured(name, folder)
+    variants = tuple(terms.variants())
+    dataset = timed_model(build(name), (*BASELINES, *variants), folder, f"paper-terms-{name}")
     rows = []
-    for label in dataset["contestant"].values[len(BASELINES) :]:
-        part = dataset.sel(contestant=label)
+    for variant in variants:
+        part = dataset.sel(case=variant.id)
         worst = part["rms_error"].max("start")
         errors = {f"worst_rms_{o}": float(worst.sel(output=o)) for o in terms.bounds}
         ok = bool((part["status"] == "ok").all())
@@ -127,7 +121,7 @@ def _model_rows(name: str, folder: Path) -> list[Row]:
             {
                 "kind": "paper",
                 "model": name,
-                "method": str(label),
+                "method": variant.label,
                 "within_bounds": within,
                 "winner": False,
                 "stable_share": float((part["status"] == "ok").mean()),
@@ -139,25 +133,6 @@ def _model_rows(name: str, folder: Path) -> list[Row]:
             }
         )
     return rows
-
-
-def _measured(name: str, folder: Path) -> xr.Dataset:
-    """Stored timing of the variants from every start, measured first if missing or out of date."""
-    import xarray as xr
-
-    model = build(name)
-    contestants = (*BASELINES, *TERMS[name].contestants())
-    content = [repr(c) for c in contestants] + [code_digest(name, "pod"), model.kernel_hash]
-    key = hashlib.sha256(json.dumps([content, machine()]).encode()).hexdigest()[:16]
-    path = folder / "studies" / f"paper-terms-{name}.nc"
-    if (known := up_to_date(path, "timing", key)) is not None:
-        return known
-    prepare_folder(folder)
-    parts = [measure(model, contestants, start) for start in model.starts]
-    dataset = xr.concat(parts, dim="start", join="exact", combine_attrs="override")
-    dataset.attrs["timing"] = key
-    write_dataset(dataset, path)
-    return dataset
 
 
 def printed_terms(rows: list[Row]) -> list[str]:

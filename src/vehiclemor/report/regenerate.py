@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.errors import FileError
+from vehiclemor.files import make_folder, write_text, write_whole
 from vehiclemor.registry import unknown
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import TEMPORARY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,7 +55,7 @@ def regenerate_figures(
     chosen = {
         name: entry for name, entry in FIGURES.items() if (name in only if only else entry.default)
     }
-    _make_folder(out)
+    make_folder(out)
     needed = dict.fromkeys(study for entry in chosen.values() for study in entry.studies)
     data = {study: run_studies(study, results, jobs)[study] for study in needed}
     written: list[Path] = []
@@ -86,33 +84,7 @@ def regenerate_all(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     return written + regenerate_tables(results, out / "tables", jobs)
 
 
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise FileError(f"{folder}: not a folder") from None
-    except OSError as error:
-        raise FileError(f"{folder}: can't be written ({error.strerror})") from None
-
-
 def _save(figure: Figure, path: Path) -> None:
     # Without a date, two regenerations give the same bytes.
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    _move_into_place(path, lambda temporary: figure.savefig(temporary, metadata=metadata))
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write a text file under a temporary name, then move it into place."""
-    _make_folder(path.parent)
-    _move_into_place(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    return path
-
-
-def _move_into_place(path: Path, write: Callable[[Path], object]) -> None:
-    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
-    try:
-        write(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise FileError(f"{path}: can't be written ({error.strerror})") from None
+    write_whole(path, lambda temporary: figure.savefig(temporary, metadata=metadata))

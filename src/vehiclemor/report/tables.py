@@ -6,9 +6,9 @@ import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.files import write_text
 from vehiclemor.report.compare import NOMINAL, comparison
 from vehiclemor.report.costs import cost_table
-from vehiclemor.report.regenerate import write_text
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
@@ -53,7 +53,7 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     list of Path
         Files written.
     """
-    tables = {"comparison": comparison("paper", results, jobs)}
+    tables = {"comparison": comparison(results, jobs)}
     for model in OUTPUTS:
         tables[f"costs-{model}"] = cost_table(model, results)
         tables[f"errors-{model}"] = error_table(model, results, jobs)

@@ -17,7 +17,11 @@ FILES = (
     "maneuvers.py",
     "steering_maneuvers.py",
     "metrics.py",
-    "study/execution.py",
+    "study/scenario.py",
+    "study/method_settings.py",
+    "study/failure.py",
+    "study/evaluate.py",
+    "study/result.py",
 )
 
 
@@ -47,12 +51,26 @@ def machine() -> str:
     return f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.release()}"
 
 
+def attributes(title: str, kernel_hash: str, **further: object) -> dict[str, object]:
+    """Global attributes of every result file."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": title,
+        "source": "vehiclemor",
+        "references": "doi:10.1115/1.4029390",
+        "kernel_hash": kernel_hash,
+        "versions": versions(),
+        "machine": machine(),
+        **further,
+    }
+
+
 @cache
-def code_digest(model: str, method: str, further: tuple[str, ...] = ()) -> str:
-    """Hash of the source that computes a cell, and of further files.
+def code_digest(model: str, method: str) -> str:
+    """Hash of the source that computes a result.
 
     These are the layers of this package and, for a plug-in, all of its top-level package and its
-    version.  Results computed by other source are never taken for finished cells.
+    version.  Results computed by other source are never taken for finished ones.
     """
     parts = (component("model", model), component("method", method))
-    return source_digest(LAYERS, (*FILES, *further), parts)
+    return source_digest(LAYERS, FILES, parts)

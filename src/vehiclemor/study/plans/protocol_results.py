@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.study.choice import Row, Validation
-from vehiclemor.study.protocol import Protocol
-from vehiclemor.study.provenance import machine, versions
+from vehiclemor.study.plans.choice import Row, Validation
+from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.provenance import attributes
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def combined(
+def protocol_dataset(
     protocol: Protocol,
     rows: Sequence[Row],
     found: dict[str, list[xr.Dataset]],
@@ -60,23 +60,19 @@ def combined(
             dict(timed["offline_seconds"].attrs),
         ),
     }
-    for name, (values, attributes) in per_row.items():
-        dataset[name] = ("row", values, attributes)
+    for name, (values, described) in per_row.items():
+        dataset[name] = ("row", values, described)
     dataset["seconds"] = (("row", "scenario"), online, dict(timed["seconds"].attrs))
-    dataset.attrs = {
-        "Conventions": "CF-1.11",
-        "title": protocol.definition.title,
-        "source": "vehiclemor",
-        "references": "doi:10.1115/1.4029390",
-        "study": f"predictive-{protocol.name}",
-        "model": protocol.model.name,
-        "evaluations": protocol.model.evaluations,
-        "configuration": protocol.definition.model_dump_json(),
-        "kernel_hash": protocol.model.kernel_hash,
-        "versions": versions(),
-        "machine": machine(),
-    }
-    return dataset
+    return dataset.assign_attrs(
+        attributes(
+            protocol.definition.title,
+            protocol.model.kernel_hash,
+            study=protocol.study,
+            model=protocol.model.name,
+            evaluations=protocol.model.evaluations,
+            configuration=protocol.definition.model_dump_json(),
+        )
+    )
 
 
 def _settings(row: Row) -> str:

@@ -1,0 +1,87 @@
+"""Experiments: a method with its settings, what it is trained on, and what it is tested on."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.method_settings import Settings
+from vehiclemor.study.provenance import code_digest
+from vehiclemor.study.scenario import Scenario, parameters_of
+
+Keep = Literal["trajectories", "metrics", "errors"]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What one result file holds, and all that determines it.
+
+    Attributes
+    ----------
+    kernel, code
+        Hash of the compiled kernels, and of the source of everything that computes results.
+    parameters
+        Name -> value of the model's parameters, SI units.
+    settings
+        All settings of the method; empty if it does not accept the model.
+    keep
+        `trajectories`: histories and all metrics of the one test scenario; `metrics`: the metrics
+        alone; `errors`: errors of the outputs in every test scenario.
+    """
+
+    model: str
+    kernel: str
+    code: str
+    parameters: dict[str, Any]
+    method: str
+    settings: Settings
+    training: tuple[Scenario, ...]
+    test: tuple[Scenario, ...]
+    keep: Keep = "trajectories"
+
+    @cached_property
+    def configuration(self) -> str:
+        """Canonical JSON text of the experiment."""
+        names = self.__dataclass_fields__
+        content = {name: getattr(self, name) for name in names} | {
+            "training": [scenario.content for scenario in self.training],
+            "test": [scenario.content for scenario in self.test],
+        }
+        return json.dumps(content, sort_keys=True)
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of the configuration: the name of the result's file."""
+        return hashlib.sha256(self.configuration.encode()).hexdigest()[:20]
+
+
+def make_experiment(
+    model: Model,
+    method: str,
+    settings: Settings,
+    training: tuple[Scenario, ...],
+    test: tuple[Scenario, ...],
+    keep: Keep = "trajectories",
+) -> Experiment:
+    """An experiment with the present kernels, parameters and source.
+
+    Parameters
+    ----------
+    settings
+        All settings of the method, from `complete_settings`.
+    """
+    if keep != "errors" and len(test) != 1:
+        raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
+    return Experiment(
+        model.name,
+        model.kernel_hash,
+        code_digest(model.name, method),
+        parameters_of(model),
+        method,
+        settings,
+        training,
+        test,
+        keep,
+    )
