@@ -14,7 +14,6 @@ from vehiclemor import __version__, api
 from vehiclemor.errors import InputError, VehiclemorError
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from rich.progress import TaskID
 
@@ -230,8 +229,8 @@ def compare(
     Parameters
     ----------
     what
-        The comparison: paper (published beside reproduced), or predictive (reduced models on inputs
-        that they have not seen).
+        The comparison: paper (published beside reproduced), predictive (reduced models on inputs
+        that they have not seen), or the name of a model (every method that fits it).
     json_output
         Print JSON.
     out
@@ -243,22 +242,12 @@ def compare(
     if json_output:
         print(rows.to_json(orient="records", indent=2))
     else:
-        _print_comparison(what, rows, out)
-    return MISSED if "missed" in set(rows["verdict"]) else 0
+        from vehiclemor.report.comparison.kinds import comparison_text
 
-
-def _print_comparison(what: str, rows: pd.DataFrame, out: Path) -> None:
-    if what == "predictive":
-        from vehiclemor.report import predictive_text
-
-        print(predictive_text.printed(rows))
-        return
-    from vehiclemor.report.compare import printed
-    from vehiclemor.report.costs import printed_costs
-
-    print(printed(rows))
-    print()
-    print(printed_costs(out))
+        print(comparison_text(what, rows, out))
+    # The comparison of a model judges nothing that was published.
+    judged = what in ("paper", "predictive")
+    return MISSED if judged and "missed" in set(rows["verdict"]) else 0
 
 
 @app.command
@@ -274,7 +263,8 @@ def figures(
     Parameters
     ----------
     only
-        Names of figures, separated by commas; all by default.
+        Names of figures, separated by commas: those of the paper, such as 6, or histories-,
+        errors-, map- or pareto- and the name of a model.  The paper's by default.
     out
         Folder of the figures.
     results

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.errors import FileError
-from vehiclemor.registry import unknown
+from vehiclemor.files import make_folder, write_text, write_whole
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import TEMPORARY
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 FORMATS = ("svg", "png")
@@ -30,7 +28,7 @@ def regenerate_figures(
     out
         Folder of the figures.
     only
-        Names of figures; those of the paper if empty.
+        Names of figures, see `figures/catalogue.py`; those of the paper if empty.
     jobs
         Number of processes for missing studies.
 
@@ -49,30 +47,29 @@ def regenerate_figures(
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS
+    from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
 
-    for name in only:
-        if name not in FIGURES:
-            raise unknown("figure", name, FIGURES)
-    chosen = {
-        name: entry for name, entry in FIGURES.items() if (name in only if only else entry.default)
-    }
-    _make_folder(out)
-    needed = dict.fromkeys(study for entry in chosen.values() for study in entry.studies)
-    data = {study: run_studies(study, results, jobs)[study] for study in needed}
+    defaults = [name for name, entry in FIGURES.items() if entry.default]
+    chosen = {name: find(name, results) for name in only or defaults}
+    make_folder(out)
+    data: dict[str, xr.Dataset] = {}
+    for study in dict.fromkeys(study for entry in chosen.values() for study in entry.studies):
+        data |= run_studies(study, results, jobs)
     written: list[Path] = []
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
         with plt.style.context(Path(__file__).with_name("style.mplstyle")):
-            figure = entry.draw({study: data[study] for study in entry.studies})
+            figure = entry.draw(data)
             for suffix in FORMATS:
                 path = out / f"figure-{name}.{suffix}"
                 _save(figure, path)
                 written.append(path)
             plt.close(figure)
-        hashes = sorted({str(data[study].attrs["kernel_hash"]) for study in entry.studies})
-        origin = f"Studies: {', '.join(entry.studies)}; kernels {', '.join(hashes)}."
-        index += [f"- figure-{name}: {entry.caption} {origin if entry.studies else ''}".rstrip()]
+        origin = ""
+        if entry.studies:
+            hashes = sorted({str(data[study].attrs["kernel_hash"]) for study in entry.names})
+            origin = f"Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
+        index.append(f"- figure-{name}: {entry.caption} {origin}".rstrip())
     if not only:
         written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
     return written
@@ -86,33 +83,7 @@ def regenerate_all(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     return written + regenerate_tables(results, out / "tables", jobs)
 
 
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError):
-        raise FileError(f"{folder}: not a folder") from None
-    except OSError as error:
-        raise FileError(f"{folder}: can't be written ({error.strerror})") from None
-
-
 def _save(figure: Figure, path: Path) -> None:
     # Without a date, two regenerations give the same bytes.
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    _move_into_place(path, lambda temporary: figure.savefig(temporary, metadata=metadata))
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write a text file under a temporary name, then move it into place."""
-    _make_folder(path.parent)
-    _move_into_place(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    return path
-
-
-def _move_into_place(path: Path, write: Callable[[Path], object]) -> None:
-    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
-    try:
-        write(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise FileError(f"{path}: can't be written ({error.strerror})") from None
+    write_whole(path, lambda temporary: figure.savefig(temporary, metadata=metadata))

@@ -6,10 +6,14 @@ import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.report.compare import NOMINAL, comparison
+from vehiclemor.files import write_text
+from vehiclemor.models.report import tabled_outputs
+from vehiclemor.registry import component, names
+from vehiclemor.report.comparison.paper import paper_comparison
 from vehiclemor.report.costs import cost_table
-from vehiclemor.report.regenerate import write_text
-from vehiclemor.simulation.model import build
+from vehiclemor.report.default_studies import nominal, perturbed
+from vehiclemor.report.predictive.paper_terms import paper_terms_rows
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
 
@@ -17,52 +21,23 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-# Model -> outputs whose errors are listed.
-OUTPUTS = {
-    "double_wishbone": ("spindle_y", "second_euler_angle"),
-    "independent_suspension_vehicle": (
-        "pitch",
-        "yaw",
-        "roll",
-        "lateral_position",
-        "vertical_speed",
-    ),
-    "high_fidelity_vehicle": (
-        "lateral_speed",
-        "vertical_speed",
-        "lateral_position",
-        "yaw",
-        "roll",
-        "position_drift",
-        "velocity_drift",
-    ),
-}
-# Name of a table -> its study over all settings, and outputs whose errors are listed.
-SETTINGS = {
-    "vehicle-settings": ("pitch", "yaw"),
-    "high-fidelity-settings": ("lateral_speed", "vertical_speed", "position_drift"),
-}
 LATEX_SPECIAL = {"\\": r"\textbackslash{}"} | {c: f"\\{c}" for c in "&%$#_{}"} | {"^": r"\^{}"}
 
 
 def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
-    """Write every table in three formats.
+    """Write every table of every registered model in three formats.
 
     Returns
     -------
     list of Path
         Files written.
     """
-    tables = {"comparison": comparison("paper", results, jobs)}
-    for model in OUTPUTS:
-        tables[f"costs-{model}"] = cost_table(model, results)
-        tables[f"errors-{model}"] = error_table(model, results, jobs)
-        tables[f"operations-{model}"] = operation_table(model)
-    for study in SETTINGS:
-        tables[Path(study).stem] = settings_table(study, results, jobs)
-    for model in ("independent_suspension_vehicle", "high_fidelity_vehicle"):
-        tables[f"quantities-{model}"] = quantity_table(model, results, jobs)
-    written = []
+    tables = {"comparison": paper_comparison(results, jobs)}
+    for model in names("model"):
+        tables |= {f"{name}-{model}": t for name, t in model_tables(model, results, jobs).items()}
+    for study, outputs in settings_studies().items():
+        tables[Path(study).stem] = settings_table(study, outputs, results, jobs)
+    written: list[Path] = []
     for name, table in tables.items():
         for suffix, text in (
             ("csv", table.to_csv(index=False, lineterminator="\n")),
@@ -73,20 +48,53 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     return written
 
 
-def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
-    """RMS errors, floors, counts and status of every cell of the paper's studies of a model."""
+def model_tables(model: str, results: Path, jobs: int = 1) -> dict[str, pd.DataFrame]:
+    """Tables that every model has: costs, errors, paper's terms, operations, quantities."""
     import pandas as pd
 
-    parts = []
-    for name, dataset in run_studies("paper", results, jobs).items():
-        if dataset.attrs["model"] == model:
-            parts.append(_flat(dataset, OUTPUTS[model]).assign(study=name))
+    tables = {
+        "costs": cost_table(model, results),
+        "errors": error_table(model, results, jobs),
+        "paper-terms": pd.DataFrame(paper_terms_rows([model], results)),
+        "operations": operation_table(model),
+    }
+    if component("model", model).speeds:
+        tables["quantities"] = quantity_table(model, results, jobs)
+    return tables
+
+
+def settings_studies() -> dict[str, tuple[str, ...]]:
+    """Studies over all settings of control-period POD -> outputs whose errors are listed."""
+    reports = [component("model", model).report for model in names("model")]
+    return {r.settings_study: r.settings_outputs for r in reports if r.settings_study}
+
+
+def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
+    """RMS errors, floors, counts and status of every cell of a model's studies.
+
+    These are the paper's, or of a model that the paper does not have its nominal and perturbed
+    runs with every method.
+    """
+    import pandas as pd
+
+    outputs = tabled_outputs(component("model", model))
+    datasets = run_studies("paper", results, jobs)
+    if not any(dataset.attrs["model"] == model for dataset in datasets.values()):
+        studies = nominal(model, results), perturbed(model, results)
+        datasets = {k: v for study in studies for k, v in run_studies(study, results, jobs).items()}
+    parts = [
+        _flat(dataset, outputs).assign(study=name)
+        for name, dataset in datasets.items()
+        if dataset.attrs["model"] == model
+    ]
     table = pd.concat(parts, ignore_index=True)
     first = ["study", "method", "start"]
     return table.reindex(columns=[*first, *(c for c in table.columns if c not in first)])
 
 
-def settings_table(study: str, results: Path, jobs: int = 1) -> pd.DataFrame:
+def settings_table(
+    study: str, outputs: tuple[str, ...], results: Path, jobs: int = 1
+) -> pd.DataFrame:
     """Control-period POD on a vehicle with every combination of its settings.
 
     Returns
@@ -96,7 +104,7 @@ def settings_table(study: str, results: Path, jobs: int = 1) -> pd.DataFrame:
         status and reason of each combination.
     """
     dataset = next(iter(run_studies(study, results, jobs).values()))
-    return _flat(dataset, SETTINGS[study])
+    return _flat(dataset, outputs)
 
 
 def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
@@ -110,8 +118,8 @@ def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
     """
     import pandas as pd
 
-    name = NOMINAL[model]
-    dataset = run_studies(name, results, jobs)[name]
+    study = component("model", model).report.study or nominal(model, results)
+    dataset = next(iter(run_studies(study, results, jobs).values()))
     rows: list[dict[str, object]] = []
     for label, start in itertools.product(dataset["method"].values, dataset["start"].values):
         point = dataset.sel({"method": label, "start": start}).squeeze(drop=True)

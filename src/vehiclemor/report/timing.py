@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,8 @@ from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.report.contestants import RACES, Contestant
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.models.report import TimingCase
+from vehiclemor.simulation.model import Model
 from vehiclemor.study.provenance import code_digest, machine, versions
 from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
 
@@ -31,62 +32,62 @@ ROUNDS = 41
 FIT_ROUNDS = 9
 
 
-def timing(model_name: str, folder: Path) -> xr.Dataset:
-    """Stored timing of a model's contestants, measured first if it is missing or out of date.
+def stored_timing(
+    model: Model, cases: Sequence[TimingCase], folder: Path, name: str
+) -> xr.Dataset:
+    """Stored timing of cases from every start, measured first if it is missing or out of date.
+
+    Parameters
+    ----------
+    name
+        Of the file in the results folder.
 
     Returns
     -------
     xarray.Dataset
-        On the dimensions `start` and `contestant`: median and quartiles of the seconds of a run,
+        On the dimensions `start` and `case`: median and quartiles of the seconds of a run,
         seconds for a time point, offline seconds, counts, errors, status.
     """
     import xarray as xr
 
-    model = build(model_name)
-    path = folder / "studies" / f"timing-{model_name}.nc"
-    key = _identity(model)
+    cases = tuple(cases)
+    path = folder / "studies" / f"{name}.nc"
+    digests = [code_digest(model.name, method) for method in sorted({c.method for c in cases})]
+    content = [[repr(case) for case in cases], digests, model.kernel_hash, machine(), ROUNDS]
+    key = hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
     if (known := up_to_date(path, "timing", key)) is not None:
         return known
     prepare_folder(folder)
-    contestants = RACES[model_name].contestants
-    parts = [measure(model, contestants, start) for start in model.starts]
+    parts = [measure(model, cases, start) for start in model.starts]
     dataset = xr.concat(parts, dim="start", join="exact", combine_attrs="override")
     dataset.attrs["timing"] = key
     write_dataset(dataset, path)
     return dataset
 
 
-def _identity(model: Model) -> str:
-    race = RACES[model.name].contestants
-    contestants = [repr(contestant) for contestant in race]
-    digests = [code_digest(model.name, contestant.method) for contestant in race]
-    content = json.dumps([contestants, digests, model.kernel_hash, machine(), ROUNDS])
-    return hashlib.sha256(content.encode()).hexdigest()[:16]
-
-
-def measure(model: Model, contestants: tuple[Contestant, ...], start: str) -> xr.Dataset:
-    """Time the contestants on the model's nominal maneuver from one start."""
+def measure(model: Model, cases: tuple[TimingCase, ...], start: str) -> xr.Dataset:
+    """Time the cases on the model's nominal maneuver from one start."""
     import xarray as xr
 
-    maneuver: Maneuver = component("maneuver", component("model", model.name).MANEUVER)
-    fits: list[list[float]] = [[] for _ in contestants]
+    maneuver: Maneuver = component("maneuver", component("model", model.name).maneuver)
+    fits: list[list[float]] = [[] for _ in cases]
     reduced: list[ReducedModel] = []
     tolerances: list[float] = []
-    for index, contestant in enumerate(contestants):
-        method: Method = component("method", contestant.method)
-        preset = method.presets(model)[contestant.preset]
+    for index, case in enumerate(cases):
+        method: Method = component("method", case.method)
+        preset = method.presets(model)[case.preset]
         declared = method.settings(model.kind)
-        settings = validated(contestant.method, declared, contestant.settings, preset)
+        settings = validated(case.method, declared, case.settings, preset)
         runs = training_runs(model, maneuver, start, "nominal")
         # The first fit loads machine code and is not counted.
         candidates = [method.fit(model, runs, settings) for _ in range(FIT_ROUNDS + 1)]
         fits[index] = [candidate.offline.seconds for candidate in candidates[1:]]
         reduced.append(candidates[-1])
         tolerances.append(float(settings.get("tolerance", np.nan)))
-    seconds = np.empty((ROUNDS + 1, len(contestants)))
-    counts: list[dict[str, int]] = [{} for _ in contestants]
-    status = [""] * len(contestants)
-    errors = np.empty((len(contestants), len(model.outputs)))
+    seconds = np.empty((ROUNDS + 1, len(cases)))
+    counts: list[dict[str, int]] = [{} for _ in cases]
+    status = [""] * len(cases)
+    errors = np.empty((len(cases), len(model.outputs)))
     reference = model.simulate(maneuver, start).outputs
     for turn in range(ROUNDS + 1):
         for index, candidate in enumerate(reduced):
@@ -121,19 +122,18 @@ def measure(model: Model, contestants: tuple[Contestant, ...], start: str) -> xr
     for name in model.counts:
         columns[name] = ([count[name] for count in counts], "1", name.replace("_", " "))
     variables: dict[str, tuple] = {
-        name: ("contestant", values, {"units": unit, "long_name": text})
+        name: ("case", values, {"units": unit, "long_name": text})
         for name, (values, unit, text) in columns.items()
     }
     variables["rms_error"] = (
-        ("contestant", "output"),
+        ("case", "output"),
         errors,
         {"units": "see outputs", "long_name": "RMS error on the run that is timed"},
     )
-    variables["status"] = ("contestant", status, {"long_name": "ok, or why there is no result"})
-    labels = [contestant.label for contestant in contestants]
-    dataset = xr.Dataset(
-        variables, {"contestant": labels, "output": list(model.outputs), "start": start}
-    )
+    variables["status"] = ("case", status, {"long_name": "ok, or why there is no result"})
+    coordinates = {"case": [case.id for case in cases], "output": list(model.outputs)}
+    labels = ("case", [case.label for case in cases])
+    dataset = xr.Dataset(variables, {**coordinates, "label": labels, "start": start})
     dataset.attrs = {
         "title": f"timing of {model.name}, interleaved, {ROUNDS} rounds, {samples} time points",
         "source": "vehiclemor",

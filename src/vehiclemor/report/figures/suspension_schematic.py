@@ -12,7 +12,6 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from vehiclemor.simulation.algebraic import AlgebraicModel, build
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -45,9 +44,8 @@ EDGES = (
 )
 
 
-def figure_5(results: Mapping[str, xr.Dataset]) -> Figure:
+def figure_suspension() -> Figure:
     """Mechanism at design, with its positions at +-0.1 m of travel, and the graph."""
-    del results
     model = build("double_wishbone")
     # Placed by hand: the style's automatic layout can't deal with axes in space.
     figure = plt.figure(figsize=(6.7, 4.1))
