@@ -10,7 +10,7 @@ from vehiclemor.maneuvers import sine_travel
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import build
+from vehiclemor.simulation.build import build
 from vehiclemor.study.run import run_studies
 from vehiclemor.symbolic.program import Program
 

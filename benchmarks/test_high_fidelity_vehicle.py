@@ -13,7 +13,7 @@ from vehiclemor.models.high_fidelity import definition as high_fidelity_vehicle
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.signals import signal_of
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.system_loops import FULL as FULL_FORM

@@ -11,7 +11,7 @@ from vehiclemor.models.independent_suspension import definition as independent_s
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.symbolic.program import Program
 

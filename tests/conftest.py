@@ -11,7 +11,8 @@ import pytest
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 
 matplotlib.use("Agg")

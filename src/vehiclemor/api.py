@@ -21,7 +21,7 @@ RESULTS = Path("results")
 
 def models() -> dict[str, str]:
     """Registered models: name -> one line."""
-    return _summaries("model", "SUMMARY")
+    return _summaries("model", "summary")
 
 
 def methods() -> dict[str, str]:
@@ -75,7 +75,7 @@ def model(
     VehiclemorError
         If a name or value is wrong, or the mechanism can't be assembled.
     """
-    from vehiclemor.simulation.model import build
+    from vehiclemor.simulation.build import build
 
     registry.component("model", name)
     return build(name, Path(parameter_file) if parameter_file else None, parameters)
@@ -139,7 +139,7 @@ def simulate(
 
     ready = _model(model) if isinstance(model, str) else model
     if isinstance(maneuver, str) or maneuver is None:
-        default = registry.component("model", ready.name).MANEUVER
+        default = registry.component("model", ready.name).maneuver
         base: Maneuver = registry.component("maneuver", maneuver or default)
     else:
         base = maneuver

@@ -15,11 +15,12 @@ from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 
 
 def _nominal(model: Model) -> Maneuver:
-    return component("maneuver", component("model", model.name).MANEUVER)
+    return component("maneuver", component("model", model.name).maneuver)
 
 
 def check_model(name: str) -> None:

@@ -1,7 +1,7 @@
 """Models, methods and maneuvers by entry point: built-ins and plug-ins register the same way.
 
-An entry point of the group `vehiclemor.models` or `vehiclemor.methods` names a module, one of
-`vehiclemor.maneuvers` a `Maneuver`.
+An entry point of the group `vehiclemor.models` names a `ModelDefinition`, one of
+`vehiclemor.maneuvers` a `Maneuver`, one of `vehiclemor.methods` a module of the interface `Method`.
 """
 
 from collections.abc import Iterable
@@ -16,19 +16,13 @@ GROUPS = {
     "method": "vehiclemor.methods",
     "maneuver": "vehiclemor.maneuvers",
 }
-
-# What a component must have; see `reduction/interface.py` and the handbook.
-REQUIRED = {
-    "model": ("KIND", "SUMMARY", "MANEUVER", "PARAMETERS", "derive"),
-    "method": ("SUMMARY", "REFERENCE", "settings", "presets", "accepts", "check", "fit"),
-    "maneuver": ("summary", "signal", "inputs", "duration", "samples", "perturbed"),
+# Class of the components of a kind, named as in an entry point: it stands in a layer above.
+CLASSES = {
+    "model": "vehiclemor.models.definition:ModelDefinition",
+    "maneuver": "vehiclemor.maneuvers:Maneuver",
 }
-# What a model of a kind must have besides.
-REQUIRED_OF_KIND = {
-    "ae": ("design_coordinates",),
-    "ode": ("starts", "check", "CYCLIC"),
-    "dae": ("starts", "check", "CYCLIC"),
-}
+# What a component of another kind must have; see `reduction/interface.py` and the handbook.
+REQUIRED = {"method": ("SUMMARY", "REFERENCE", "settings", "presets", "accepts", "check", "fit")}
 
 
 def names(kind: str) -> list[str]:
@@ -43,7 +37,7 @@ def component(kind: str, name: str) -> Any:
     ------
     InputError
         If no component of that kind has the name (the nearest names are listed), or if it is a
-        plug-in that can't be imported.
+        plug-in that can't be imported, or is something else.
     """
     entries = _entries(kind)
     if name not in entries:
@@ -55,10 +49,15 @@ def component(kind: str, name: str) -> Any:
             f"{kind} {name!r} ({entries[name].value}) can't be imported: "
             f"{type(error).__name__}: {error}"
         ) from error
-    required = REQUIRED[kind] + REQUIRED_OF_KIND.get(getattr(loaded, "KIND", ""), ())
-    missing = [a for a in required if not hasattr(loaded, a)]
-    if missing:
-        raise InputError(f"{kind} {name!r} ({entries[name].value}) has no {missing[0]}")
+    where = f"{kind} {name!r} ({entries[name].value})"
+    if kind in CLASSES:
+        wanted = EntryPoint(kind, CLASSES[kind], "").load()
+        if not isinstance(loaded, wanted):
+            found = type(loaded).__name__
+            raise InputError(f"{where} is of type {found}: it must be a {wanted.__name__}")
+    for attribute in REQUIRED.get(kind, ()):
+        if not hasattr(loaded, attribute):
+            raise InputError(f"{where} has no {attribute}")
     return loaded
 
 

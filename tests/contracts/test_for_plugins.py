@@ -9,7 +9,7 @@ import pytest
 from vehiclemor import contracts
 from vehiclemor.registry import component, names
 
-KINEMATIC = [name for name in names("model") if component("model", name).KIND == "ae"]
+KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
 @pytest.mark.parametrize("name", KINEMATIC)

@@ -7,11 +7,13 @@ import pytest
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import KINDS
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Setting, validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component, names
-from vehiclemor.simulation.model import KINDS, Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory, trajectory_dataset
 
 METHODS = names("method")
@@ -20,7 +22,7 @@ METHODS = names("method")
 def _declares(method: str, model: str) -> bool:
     """Whether the method has settings for models of that kind, if it has any at all."""
     settings = component("method", method).settings
-    return bool(settings(component("model", model).KIND)) or not any(map(settings, KINDS))
+    return bool(settings(component("model", model).kind)) or not any(map(settings, KINDS))
 
 
 PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(method, m)]
@@ -51,7 +53,7 @@ class Pair:
     def __init__(self, model: str, method: str) -> None:
         self.model: Model = build(model)
         self.name, self.method = method, component("method", method)
-        self.maneuver: Maneuver = component("maneuver", component("model", model).MANEUVER)
+        self.maneuver: Maneuver = component("maneuver", component("model", model).maneuver)
         self._fitted: dict[tuple[str, str], ReducedModel] = {}
 
     def fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:

@@ -6,7 +6,8 @@ import pytest
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.registry import component, names
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import trajectory_dataset
 
 SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m", "1"} | {
@@ -17,7 +18,7 @@ SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m", "1"} | {
     "1/s",
     "N s/m",
 }
-KINEMATIC = [name for name in names("model") if component("model", name).KIND == "ae"]
+KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
 @pytest.fixture(scope="module", params=KINEMATIC)
@@ -27,18 +28,18 @@ def any_model(request: pytest.FixtureRequest) -> AlgebraicModel:
 
 @pytest.fixture(scope="module")
 def its_maneuver(any_model: AlgebraicModel) -> Maneuver:
-    return component("maneuver", component("model", any_model.name).MANEUVER)
+    return component("maneuver", component("model", any_model.name).maneuver)
 
 
 @pytest.mark.parametrize("name", names("model"))
 def test_definition_describes_itself(name: str) -> None:
     definition = component("model", name)
-    assert name == definition.NAME
-    assert definition.KIND in ("ode", "ae", "dae")
-    assert definition.SUMMARY
-    assert "\n" not in definition.SUMMARY
-    assert definition.MANEUVER in names("maneuver")
-    assert {declared.unit for declared in definition.PARAMETERS.values()} <= SI_UNITS
+    assert name == definition.name
+    assert definition.kind in ("ode", "ae", "dae")
+    assert definition.summary
+    assert "\n" not in definition.summary
+    assert definition.maneuver in names("maneuver")
+    assert {declared.unit for declared in definition.parameters.values()} <= SI_UNITS
 
 
 def test_quantities_have_unique_names_units_and_meanings(any_model: AlgebraicModel) -> None:
@@ -59,7 +60,7 @@ def test_quantities_have_unique_names_units_and_meanings(any_model: AlgebraicMod
 
 
 def test_every_parameter_has_a_source(any_model: AlgebraicModel) -> None:
-    declared = component("model", any_model.name).PARAMETERS
+    declared = component("model", any_model.name).parameters
     assert list(any_model.parameters.entries) == list(declared)
     for name, entry in any_model.parameters.entries.items():
         assert entry.unit == declared[name].unit

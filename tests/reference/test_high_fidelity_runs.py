@@ -16,8 +16,8 @@ from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS, lane_change
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.projection import (
     projected_state,
     simulate_projected,

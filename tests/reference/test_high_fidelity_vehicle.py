@@ -11,8 +11,8 @@ from tests.oracles import high_fidelity_pinocchio as pinocchio
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import DEPENDENT, PARAMETERS, State, design, random_states
 from vehiclemor.simulation import linearisation
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 
 NAME = "high_fidelity_vehicle"
 N, LOOPS = 26, 12

@@ -13,8 +13,8 @@ from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation import linearisation
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.trajectory import Trajectory

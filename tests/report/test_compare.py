@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from vehiclemor.report.compare import COLUMNS, comparison
 
 from vehiclemor.cli import main
 from vehiclemor.report import tables
-from vehiclemor.report.compare import COLUMNS, comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.published import load_published

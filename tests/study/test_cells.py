@@ -9,7 +9,7 @@ import xarray as xr
 import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError, UnreachableError
 from vehiclemor.maneuvers import sine_travel
-from vehiclemor.simulation.algebraic import build
+from vehiclemor.simulation.build import build
 from vehiclemor.study.cells import expand, make_cell
 from vehiclemor.study.combine import flattened
 from vehiclemor.study.definition import load_studies

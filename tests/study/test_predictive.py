@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from vehiclemor.report.predictive_text import printed
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
-from vehiclemor.report.predictive_text import printed
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import predictive_timing, trial_execution
 from vehiclemor.study.choice import Validation, choose

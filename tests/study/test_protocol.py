@@ -8,7 +8,7 @@ from vehiclemor.reduction.methods import replay
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.resources import data_names
-from vehiclemor.simulation.model import build
+from vehiclemor.simulation.build import build
 from vehiclemor.study.definition import load_studies
 from vehiclemor.study.protocol import load_protocol
 from vehiclemor.study.scenarios import Scenario, same_run, start_of, training_run

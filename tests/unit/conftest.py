@@ -5,13 +5,15 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from vehiclemor import registry
-from vehiclemor.simulation import dynamic_build
+from vehiclemor.simulation.build import build as built
 
 
 @pytest.fixture(scope="session")
 def standard():
     """Builder of the standard problems: parameter values -> model."""
-    entry = EntryPoint("standard_problems", "tests.unit.standard_problems", "vehiclemor.models")
+    entry = EntryPoint(
+        "standard_problems", "tests.unit.standard_problems:DEFINITION", "vehiclemor.models"
+    )
     known = {**registry._entries("model"), "standard_problems": entry}
     real = registry._entries
 
@@ -20,6 +22,6 @@ def standard():
             patch.setattr(
                 registry, "_entries", lambda kind: known if kind == "model" else real(kind)
             )
-            return dynamic_build.build("standard_problems", overrides=values)
+            return built("standard_problems", overrides=values)
 
     return build

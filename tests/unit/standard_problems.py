@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.parameters import Declared
@@ -18,26 +19,22 @@ from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
 
 NAME = "standard_problems"
-KIND = "ode"
-SUMMARY = "problems with known solutions"
-MANEUVER = "straight_ahead"
-CYCLIC = ()
-PARAMETER_FILE = Path(__file__).with_suffix(".toml")
 PARAMETERS = {name: Declared("1") for name in ("rate", "growth", "angle", "tracked", "exploding")}
 ANGLE, TRACKED, ANGULAR_SPEED, EXPLODING = range(4)
 
 
-def check(p: Mapping[str, float]) -> None:
-    """Every value is allowed."""
-    del p
+def quantities(*names: str) -> tuple[Quantity, ...]:
+    return tuple(Quantity(name, "1", name) for name in names)
+
+
+COORDINATES, SPEEDS = quantities("angle", "tracked"), quantities("angular_speed", "exploding")
+INPUTS = quantities("torque", "target", "target_rate")
+ARCTANGENTS = quantities(*(f"arctangent_{state.name}" for state in (*COORDINATES, *SPEEDS)))
+OUTPUTS = (*COORDINATES, *SPEEDS, *ARCTANGENTS)
 
 
 def starts(p: Mapping[str, float]) -> dict[str, np.ndarray]:
     return {"only": np.array([p["angle"], p["tracked"], 0.0, p["exploding"]])}
-
-
-def quantities(*names: str) -> tuple[Quantity, ...]:
-    return tuple(Quantity(name, "1", name) for name in names)
 
 
 def derive() -> DynamicEquations:
@@ -60,10 +57,23 @@ def derive() -> DynamicEquations:
         "speeds": (list(x[2:]), (2,)),
     }
     program = assemble(tape, {"x": x, "u": u}, list(p.values()), functions)
-    names = quantities("angle", "tracked"), quantities("angular_speed", "exploding")
-    inputs = quantities("torque", "target", "target_rate")
-    arcs = quantities(*(f"arctangent_{state}" for state in x))
-    return DynamicEquations(*names, inputs, (*names[0], *names[1], *arcs), program)
+    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program)
+
+
+DEFINITION = ModelDefinition(
+    name=NAME,
+    kind="ode",
+    summary="problems with known solutions",
+    maneuver="straight_ahead",
+    coordinates=COORDINATES,
+    speeds=SPEEDS,
+    inputs=INPUTS,
+    outputs=OUTPUTS,
+    parameters=PARAMETERS,
+    parameter_file=Path(__file__).with_suffix(".toml"),
+    derive=derive,
+    starts=starts,
+)
 
 
 def driven(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:

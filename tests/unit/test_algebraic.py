@@ -5,7 +5,8 @@ import pytest
 
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 
 

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from tests.oracles import kinematics
 from vehiclemor.errors import GeometryError
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 
 COORDINATES = ("zeta", "eta", "xi", "theta_u", "theta_l", "alpha", "beta", "s")

@@ -13,7 +13,7 @@ from vehiclemor.reduction.projection.inner_products import coordinate_weight, st
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.simulation import linearisation
-from vehiclemor.simulation.dynamic_build import build
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.spaces import Spaces, full_space
 from vehiclemor.simulation.system_loops import COORDINATES, STATE
 

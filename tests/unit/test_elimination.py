@@ -8,7 +8,7 @@ import sympy as sp
 
 from tests.unit.programs import function_of, pivot_shares, run
 from vehiclemor.codegen.emit import operation_counts, reference_source
-from vehiclemor.registry import component
+from vehiclemor.models.double_wishbone.equations import PIVOTS
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.elimination import (
     Pivots,
@@ -153,7 +153,7 @@ def test_pivots_of_the_model_follow_the_rule(
     design = model.jacobian(model.design, np.zeros(2))
     # Entries that vanish at the design position alone count as nonzeros, but are no pivots.
     design[pattern & (np.abs(design) < 1e-12)] = 1e-9
-    assert choose_pivots(design) == component("model", "double_wishbone").PIVOTS
+    assert choose_pivots(design) == PIVOTS
 
 
 def test_newton_step_equals_a_dense_solve(
@@ -169,6 +169,5 @@ def test_newton_step_equals_a_dense_solve(
 def test_pivots_of_the_model_stay_away_from_zero(
     model: AlgebraicModel, states: list[tuple[np.ndarray, np.ndarray]]
 ) -> None:
-    pivots = component("model", "double_wishbone").PIVOTS
-    shares = [pivot_shares(model.jacobian(q, u), pivots) for q, u in states]
+    shares = [pivot_shares(model.jacobian(q, u), PIVOTS) for q, u in states]
     assert np.min(shares) > 0.1

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from tests.unit.programs import function_of
 from vehiclemor.models.components import tilted_wheel, tires
+from vehiclemor.models.components.tire_coefficients import FIALA
 from vehiclemor.symbolic.tape import Tape
 
 ALONG, ACROSS, MOST, LEAST, WIDTH = COEFFICIENTS = (115e3, 117e3, 0.75, 0.2, 0.32)
@@ -42,7 +43,7 @@ def friction(kappa: float, t: float) -> float:
 def compiled() -> Callable:
     """(load, slip ratio, tangent of the slip angle) -> (Fx, Fy, Mz)."""
     tape, symbols = Tape(), sp.symbols("load kappa t", real=True)
-    named = zip(tires.FIALA, COEFFICIENTS, strict=True)
+    named = zip(FIALA, COEFFICIENTS, strict=True)
     coefficients = {name: sp.Float(value, 17) for name, value in named}
     forces = tires.fiala(tape, coefficients, *symbols)
     return function_of(
@@ -228,7 +229,7 @@ WHEEL = {
     "tire_stiffness": STIFFNESS,
     "tire_damping": DAMPING,
     "slip_speed": SLOW,
-} | dict(zip(tires.FIALA, COEFFICIENTS, strict=True))
+} | dict(zip(FIALA, COEFFICIENTS, strict=True))
 FIELDS = ("arm", "heading", "leftward", "up", "load", "slip_ratio", "tan_slip")
 
 

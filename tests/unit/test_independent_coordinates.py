@@ -10,8 +10,8 @@ from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity.independent import PLACES
 from vehiclemor.reduction.vehicle.frozen_constants import frozen_encoder, frozen_kernels
 from vehiclemor.reduction.vehicle.independent import independent_kernels
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 
 INDEPENDENT = np.concatenate([np.array(PLACES), 26 + np.array(PLACES)])
 DERIVATIVE, FULL = 28, 52

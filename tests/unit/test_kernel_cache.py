@@ -16,7 +16,7 @@ from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.projection.dynamic import check_subspace
 from vehiclemor.registry import component
-from vehiclemor.simulation import dynamic_build, newton_loops, system_loops
+from vehiclemor.simulation import build, newton_loops, system_loops
 from vehiclemor.simulation.spaces import Spaces, full_space
 from vehiclemor.simulation.system import SOLVERS
 from vehiclemor.simulation.system_loops import COORDINATES
@@ -109,7 +109,7 @@ def test_second_process_compiles_nothing(tmp_path: Path, script: str, functions:
 
 
 def test_all_dynamic_models_run_in_the_same_loops(standard) -> None:
-    vehicle = dynamic_build.build("independent_suspension_vehicle")
+    vehicle = build.build("independent_suspension_vehicle")
     other = standard()
     assert vehicle.loops is other.loops
     assert vehicle.kernel_hash != other.kernel_hash
@@ -132,7 +132,7 @@ def test_hash_of_a_dynamic_model_follows_its_loops(
 ) -> None:
     before = standard().kernel_hash
     assert standard().kernel_hash == before
-    monkeypatch.setattr(dynamic_build, "loops_digest", lambda: "changed")
+    monkeypatch.setattr(build, "loops_digest", lambda: "changed")
     assert standard().kernel_hash != before
 
 

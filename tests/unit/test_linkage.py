@@ -14,8 +14,8 @@ from vehiclemor.models.double_wishbone import linkage as double_wishbone_linkage
 from vehiclemor.models.double_wishbone.points import POINTS, tie_rod_angles
 from vehiclemor.models.high_fidelity import corners as vehicle_corners
 from vehiclemor.models.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.symbolic.joints import free_rate
 from vehiclemor.symbolic.tape import Tape
 

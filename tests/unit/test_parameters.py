@@ -8,7 +8,7 @@ import pytest
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.parameters import Declared, load_parameters, point
 from vehiclemor.resources import data_folder
-from vehiclemor.simulation.algebraic import build
+from vehiclemor.simulation.build import build
 
 EXPECTED = {"pivot": point(), "joint": point()}
 VALID = """

@@ -15,8 +15,8 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import build
 from vehiclemor.simulation.spaces import whole_space
 
 LANE_CHANGES = {

@@ -15,6 +15,7 @@ from tests.oracles.vehicle_data import (
     trail_at_rest,
 )
 from vehiclemor.models.components import tires
+from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
 from vehiclemor.symbolic.tape import Tape
 
 REFERENCE_LOAD = PARAMETERS["FNOMIN"] * PARAMETERS["LFZO"]
@@ -29,7 +30,7 @@ def compiled() -> Callable[[float, float, float], tuple[float, float, float]]:
     """(load, slip ratio, slip angle) -> (Fx, Fy, Mz), of the published coefficients."""
     tape = Tape()
     load, kappa, alpha, cosine = symbols = sp.symbols("load kappa alpha cosine", real=True)
-    coefficients = {name: sp.Float(PARAMETERS[name], 17) for name in tires.MAGIC_FORMULA}
+    coefficients = {name: sp.Float(PARAMETERS[name], 17) for name in MAGIC_FORMULA}
     reference, radius = sp.Float(REFERENCE_LOAD, 17), sp.Float(RADIUS, 17)
     forces = tires.magic_formula(tape, coefficients, load, reference, radius, kappa, alpha, cosine)
     results = (forces.longitudinal, forces.lateral, forces.aligning)

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.models.high_fidelity.equilibrium import check_vehicle
+from vehiclemor.models.high_fidelity.equilibrium import check
 from vehiclemor.models.quantities import WHEELS
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 
 NAME = "high_fidelity_vehicle"
 N = 26
@@ -251,9 +251,9 @@ def test_the_centre_of_mass_must_be_between_the_axles(given_values, ahead):
         centre = p["chassis_centre"] + [limit + direction * beyond, 0.0, 0.0]
         return p | {"chassis_centre": centre}
 
-    check_vehicle(shifted(-1e-9))
+    check(shifted(-1e-9))
     with pytest.raises(GeometryError, match=f"lifts the {'rear' if ahead else 'front'} wheels"):
-        check_vehicle(shifted(1e-9))
+        check(shifted(1e-9))
     # It also stands there, as far as its tires carry it.
     x = built(chassis_centre=shifted(-0.05)["chassis_centre"]).start()
     assert np.isfinite(x).all()
@@ -263,9 +263,9 @@ def test_the_softest_tires_that_carry_the_vehicle(given_values):
     mass, share = statics(given_values)
     heavier = max(share, 1.0 - share)
     softest = heavier * mass * given_values["gravity"] / 2.0 / given_values["tire_radius"]
-    check_vehicle(given_values | {"tire_stiffness": softest * (1.0 + 1e-12)})
+    check(given_values | {"tire_stiffness": softest * (1.0 + 1e-12)})
     with pytest.raises(GeometryError, match="presses the rear tires flat"):
-        check_vehicle(given_values | {"tire_stiffness": softest * (1.0 - 1e-12)})
+        check(given_values | {"tire_stiffness": softest * (1.0 - 1e-12)})
 
 
 @pytest.mark.parametrize(

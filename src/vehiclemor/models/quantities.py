@@ -4,6 +4,7 @@ Chassis frame of the vehicles: origin at the centre of mass of the sprung body, 
 z up (ISO 8855).  The road is the plane z = 0.
 """
 
+import math
 from dataclasses import dataclass
 
 
@@ -51,3 +52,18 @@ CHASSIS_OUTPUTS = (
 def per_wheel(name: str, unit: str, long_name: str) -> tuple[Quantity, ...]:
     """One quantity for each wheel; the wheel's name fills the braces in the meaning."""
     return tuple(Quantity(f"{name}_{w}", unit, long_name.format(w)) for w in WHEELS)
+
+
+TIRE_OUTPUTS = (
+    *per_wheel("Fx", "N", "longitudinal force on the {} tire"),
+    *per_wheel("Fy", "N", "lateral force on the {} tire"),
+    *per_wheel("Fz", "N", "vertical load of the {} tire"),
+    *per_wheel("Mz", "N m", "aligning moment on the {} tire"),
+    *per_wheel("slip_ratio", "1", "longitudinal slip of the {} tire"),
+    *per_wheel("slip_angle", "rad", "slip angle of the {} tire, sliding left positive"),
+)
+# Outputs that are zero where a wheel has left the road.
+TIRE_LOADS = tuple(f"Fz_{wheel}" for wheel in WHEELS)
+# Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
+FORWARD = (0.5, math.inf)
+UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}

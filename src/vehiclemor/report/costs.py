@@ -85,8 +85,10 @@ def costs_text(model: str, folder: Path) -> str:
     )
     times: list[Row] = []
     errors: list[Row] = []
-    for start, part in table.groupby("start", sort=False):
-        if table["start"].nunique() > 1:
+    starts = list(dict.fromkeys(table["start"]))
+    for start in starts:
+        part = table[table["start"] == start]
+        if len(starts) > 1:
             times.append(Row([f"start {start}"]))
             errors.append(Row([f"start {start}"]))
         for row in part.to_dict(orient="records"):
@@ -96,7 +98,7 @@ def costs_text(model: str, folder: Path) -> str:
     found = [f"{label_of(output).short} error" for output in outputs]
     tails = ["", *found, "offline us", "break-even x1", "break-even x2"]
     tables = table_text(heads, times), table_text(tails, errors)
-    return "\n".join([wrapped(title), wrapped(legend), *tables])
+    return "\n".join([wrapped(title), wrapped(legend), "\n\n".join(tables)])
 
 
 def _times(row: dict, counts: list[str]) -> list[str]:

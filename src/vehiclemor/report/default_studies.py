@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from vehiclemor.errors import InputError
+from vehiclemor.files import write_text
 from vehiclemor.models.report import default_rank, tabled_outputs
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.files import write_text
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.

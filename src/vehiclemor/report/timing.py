@@ -16,11 +16,11 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import rms
+from vehiclemor.models.report import TimingCase
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.models.report import TimingCase
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.provenance import code_digest, machine, versions
 from vehiclemor.study.store import prepare_folder, up_to_date, write_dataset
@@ -32,9 +32,7 @@ ROUNDS = 41
 FIT_ROUNDS = 9
 
 
-def stored_timing(
-    model: Model, cases: Sequence[TimingCase], folder: Path, name: str
-) -> xr.Dataset:
+def stored_timing(model: Model, cases: Sequence[TimingCase], folder: Path, name: str) -> xr.Dataset:
     """Stored timing of cases from every start, measured first if it is missing or out of date.
 
     Parameters

@@ -4,28 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from pathlib import Path
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import kernel_hash, load_module
-from vehiclemor.codegen.emit import (
-    kernel_source,
-    operation_counts,
-    reference_source,
-    tangent_source,
-    work_size,
-)
-from vehiclemor.codegen.link import linked_source
-from vehiclemor.errors import ConvergenceError, GeometryError, InputError, UnreachableError
+from vehiclemor.codegen.emit import operation_counts, reference_source
+from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.equations import AlgebraicEquations
-from vehiclemor.parameters import ParameterSet, load_parameters
-from vehiclemor.registry import component, unknown
-from vehiclemor.simulation import newton_loops, projected_loops
+from vehiclemor.parameters import ParameterSet
+from vehiclemor.registry import unknown
+from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import check_inputs, checked_array
 from vehiclemor.simulation.clock import timed
 from vehiclemor.simulation.reach import reachable_range
@@ -40,12 +31,8 @@ SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 STARTS = ("equilibrium",)
-# Within this travel of the wheel centre (m) the limits of reach are looked for, by default.
-TRAVEL_LIMIT = 0.5
 # Rack displacements at which the limits of travel are found; between them the tighter ones count.
 RACKS_OF_REACH = 9
-# Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
-SMALLEST_SINGULAR_VALUE = 1e-8
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",
@@ -73,6 +60,8 @@ class AlgebraicModel:
         Hoisted constants of the parameter set.
     design
         Coordinates (n,) at the design position, where all inputs are zero.
+    travel_limit
+        Travel in m up to which the limits of reach are looked for.
     """
 
     name: str
@@ -343,63 +332,3 @@ class AlgebraicModel:
 
     def _inputs(self, u: Any) -> np.ndarray:
         return checked_array(u, len(self.inputs), "u", self.name)
-
-
-@lru_cache(maxsize=8)
-def _compiled(name: str) -> tuple[AlgebraicEquations, ModuleType, str]:
-    """Equations and compiled kernels of a registered model; parameters play no part here."""
-    equations: AlgebraicEquations = component("model", name).derive()
-    sizes = {
-        "N": len(equations.coordinates),
-        "INPUTS": len(equations.inputs),
-        "OUTPUTS": len(equations.outputs),
-        "WORK": work_size(equations.program),
-    }
-    kernels = kernel_source(equations.program) + "\n\n" + tangent_source(equations.program)
-    source = linked_source(kernels, [newton_loops, projected_loops], sizes, f"model {name}")
-    return equations, load_module(name, source), kernel_hash(source)
-
-
-def build(
-    name: str,
-    parameter_file: Path | None = None,
-    overrides: Mapping[str, object] | None = None,
-) -> AlgebraicModel:
-    """Derive (or fetch), compile and parametrise a registered kinematic model.
-
-    Raises
-    ------
-    GeometryError
-        If the mechanism can't be assembled, or is locked at its design position.
-    """
-    definition = component("model", name)
-    # A plug-in brings its own parameter file.
-    path = parameter_file or getattr(definition, "PARAMETER_FILE", None)
-    parameters = load_parameters(name, definition.PARAMETERS, path, overrides)
-    design = definition.design_coordinates(parameters.values())
-    equations, kernels, digest = _compiled(name)
-    constants = np.empty(len(equations.program.constant_symbols))
-    kernels.constants(parameters.flat(), np.empty(kernels.WORK), constants)
-    model = AlgebraicModel(
-        name,
-        definition.SUMMARY,
-        definition.KIND,
-        equations,
-        parameters,
-        kernels,
-        digest,
-        constants,
-        design,
-        getattr(definition, "TRAVEL_LIMIT", TRAVEL_LIMIT),
-    )
-    nothing = np.zeros(len(model.inputs))
-    gap = float(np.abs(model.residual(design, nothing)).max())
-    if not gap < 1e-9:
-        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
-    smallest = float(np.linalg.svd(model.jacobian(design, nothing), compute_uv=False)[-1])
-    if smallest < SMALLEST_SINGULAR_VALUE:
-        raise GeometryError(
-            f"the geometry can't be assembled: the mechanism is locked at design "
-            f"(smallest singular value of the Jacobian {smallest:.1e})"
-        )
-    return model

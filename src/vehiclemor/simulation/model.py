@@ -1,22 +1,16 @@
-"""What every model offers, whatever its kind, and how a registered model is built."""
+"""What every model offers, whatever its kind."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.parameters import ParameterSet
-from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import Start, Trajectory
-
-# Algebraic equations; ordinary differential equations; those with constraints.
-KINDS = ("ae", "ode", "dae")
 
 
 class Model(Protocol):
@@ -113,30 +107,3 @@ class Model(Protocol):
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
         ...
-
-
-def build(
-    name: str,
-    parameter_file: Path | None = None,
-    overrides: Mapping[str, object] | None = None,
-) -> Model:
-    """Derive (or fetch), compile and parametrise a registered model of any kind.
-
-    Raises
-    ------
-    InputError
-        If the name, the model's kind or an override is wrong.
-    VehiclemorError
-        If the parameters can't be read or the model can't be assembled from them.
-    """
-    kind = component("model", name).KIND
-    # Imported here: a model of one kind needs nothing of the other.
-    if kind == "ae":
-        from vehiclemor.simulation import algebraic
-
-        return algebraic.build(name, parameter_file, overrides)
-    if kind in ("ode", "dae"):
-        from vehiclemor.simulation import dynamic_build
-
-        return dynamic_build.build(name, parameter_file, overrides)
-    raise InputError(f"model {name!r} is of kind {kind!r}; allowed: {', '.join(KINDS)}")

@@ -15,8 +15,8 @@ import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
-from vehiclemor.simulation.dynamic_build import build
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Trajectory
 

@@ -16,7 +16,8 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import Setting, Value, validated
 from vehiclemor.reduction.training import POLICIES
 from vehiclemor.registry import component, unknown
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.study.definition import FACTORS, StudyFile, values
 from vehiclemor.study.provenance import code_digest
 
@@ -175,7 +176,7 @@ def expand(name: str, study: StudyFile) -> Grid:
 def _expand(name: str, study: StudyFile) -> Grid:
     model = build(study.model)
     definition = component("model", study.model)
-    maneuver: Maneuver = component("maneuver", study.maneuver or definition.MANEUVER)
+    maneuver: Maneuver = component("maneuver", study.maneuver or definition.maneuver)
     methods = {entry.label or entry.method: entry for entry in study.methods}
     dimensions: dict[str, list[Any]] = {factor: [1.0] for factor in FACTORS}
     dimensions |= {key: values(entry) for key, entry in study.grid.items()}

@@ -14,7 +14,8 @@ from vehiclemor.metrics import largest, rms, signal_range
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.registry import component
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset
 from vehiclemor.study.cells import Cell
 from vehiclemor.study.provenance import machine, versions

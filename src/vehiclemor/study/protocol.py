@@ -11,7 +11,8 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import Value, validated
 from vehiclemor.registry import component, unknown
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.study.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.scenarios import Scenario, check, own_speed, same_run
 from vehiclemor.toml_files import read_toml

@@ -13,7 +13,8 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 
 # Parameter with the speed (m/s) at which a vehicle starts.

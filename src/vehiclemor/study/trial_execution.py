@@ -14,7 +14,8 @@ from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, Ve
 from vehiclemor.metrics import largest, rms
 from vehiclemor.reduction.interface import Method, Offline, ReducedModel
 from vehiclemor.registry import component
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
 from vehiclemor.study.protocol import Settings
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.scenarios import Scenario, maneuver_of, start_of, training_run

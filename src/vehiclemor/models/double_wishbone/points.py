@@ -48,3 +48,17 @@ def check_linkage(points: Mapping[str, np.ndarray]) -> None:
             raise GeometryError(
                 f"the geometry can't be assembled: {arm}_ball_joint lies on the axis of its arm"
             )
+
+
+def design_coordinates(points: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Coordinates (8,) at the design position: zero, but for the tie rod's universal joint.
+
+    Raises
+    ------
+    GeometryError
+        If two joints of one body coincide, so that the mechanism can't be assembled.
+    """
+    check_linkage(points)
+    design = np.zeros(8)
+    design[5:7] = tie_rod_angles(points["tie_rod_inner"], points["tie_rod_outer"])
+    return design

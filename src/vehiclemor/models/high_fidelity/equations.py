@@ -15,7 +15,7 @@ from vehiclemor.models.components import body
 from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity import corners, parts
-from vehiclemor.models.high_fidelity.definition import (
+from vehiclemor.models.high_fidelity.quantities import (
     CONSTRAINTS,
     COORDINATES,
     INPUTS,

@@ -4,12 +4,13 @@ The springs are as long as it takes for the design position of all joints to be 
 a workshop would set the ride height; height and pitch follow from the deflections of the tires.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.errors import GeometryError
+from vehiclemor.models.definition import Derivative
 from vehiclemor.models.double_wishbone.points import POINTS, check_linkage, tie_rod_angles
 
 # Places of z, theta, the left lower arm and the left rear arm among the coordinates.
@@ -22,11 +23,8 @@ MOST_ITERATIONS = 30
 # Share by which a published moment of inertia may break the triangle inequality.
 ROUNDED = 0.01
 
-# Free lengths, state, inputs -> time derivative of the state.
-Derivative = Callable[[list[float], np.ndarray, np.ndarray], np.ndarray]
 
-
-def check_vehicle(p: Mapping[str, Any]) -> None:
+def check(p: Mapping[str, Any]) -> None:
     """Raise `GeometryError` if the vehicle can't be assembled, or can't stand on its wheels."""
     check_linkage({name: p[name] for name in POINTS})
     wheels = wheel_places(p)
@@ -123,7 +121,7 @@ def design_state(p: Mapping[str, Any], height: float, pitch: float) -> np.ndarra
     return x
 
 
-def settled(p: Mapping[str, Any], derivative: Derivative) -> dict[str, float]:
+def solve_equilibrium(p: Mapping[str, Any], derivative: Derivative) -> dict[str, float]:
     """Free lengths of the springs, height and pitch at which nothing accelerates.
 
     Newton's method on the accelerations of height, pitch, lower arm and rear arm, which are linear
@@ -173,13 +171,13 @@ def settled(p: Mapping[str, Any], derivative: Derivative) -> dict[str, float]:
     return dict(zip(names, map(float, unknown), strict=True))
 
 
-def initial_states(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Initial states (52,) by name: straight running, and the same dropped onto the road.
 
     Parameters
     ----------
     p
-        Parameters, and what `settled` has found.
+        Parameters, and what `solve_equilibrium` has found.
     """
     equilibrium = design_state(p, p["height"], p["pitch"])
     equilibrium[COORDINATES] = p["initial_speed"]

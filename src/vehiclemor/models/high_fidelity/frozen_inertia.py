@@ -19,8 +19,8 @@ from vehiclemor.models.components import body, tilted_wheel
 from vehiclemor.models.components.tires import fiala, maximum
 from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity import closed_corner, independent, parts
-from vehiclemor.models.high_fidelity.definition import COORDINATES as ALL_COORDINATES
-from vehiclemor.models.high_fidelity.definition import INPUTS
+from vehiclemor.models.high_fidelity.quantities import COORDINATES as ALL_COORDINATES
+from vehiclemor.models.high_fidelity.quantities import INPUTS
 from vehiclemor.models.quantities import CHASSIS_SPEEDS, WHEELS, per_wheel
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector

@@ -12,9 +12,9 @@ from vehiclemor.models.components import body
 from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity import closed_corner, parts
 from vehiclemor.models.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
-from vehiclemor.models.high_fidelity.definition import COORDINATES as ALL_COORDINATES
-from vehiclemor.models.high_fidelity.definition import INPUTS, OUTPUTS
-from vehiclemor.models.high_fidelity.definition import SPEEDS as ALL_SPEEDS
+from vehiclemor.models.high_fidelity.quantities import COORDINATES as ALL_COORDINATES
+from vehiclemor.models.high_fidelity.quantities import INPUTS, OUTPUTS
+from vehiclemor.models.high_fidelity.quantities import SPEEDS as ALL_SPEEDS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.joints import free_rate

@@ -9,7 +9,7 @@ from vehiclemor.models.components import body
 from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.double_wishbone.points import POINTS
 from vehiclemor.models.high_fidelity import corners
-from vehiclemor.models.high_fidelity.definition import PARAMETERS, SOLVED
+from vehiclemor.models.high_fidelity.quantities import PARAMETERS, SOLVED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric

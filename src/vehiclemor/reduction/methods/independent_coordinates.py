@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vehiclemor.models.high_fidelity.definition import NAME
+from vehiclemor.models.high_fidelity.definition import DEFINITION
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.online_settings import ONLINE_SETTINGS
 from vehiclemor.reduction.settings import Setting, Value
@@ -40,7 +40,7 @@ def presets(model: Model) -> Mapping[str, Mapping[str, Value]]:
 
 def accepts(model: Model) -> tuple[bool, str]:
     """The one model whose constraints have been solved by hand."""
-    return model.name == NAME, f"closed forms are known for {NAME} alone"
+    return model.name == DEFINITION.name, f"closed forms are known for {DEFINITION.name} alone"
 
 
 def check(model: Model, settings: Mapping[str, Value]) -> None:

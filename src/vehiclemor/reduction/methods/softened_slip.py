@@ -22,9 +22,10 @@ from vehiclemor.reduction.online_settings import online_settings
 from vehiclemor.reduction.settings import Setting, Value
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.vehicle.shape import is_vehicle
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.model import Model, build
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.spaces import full_space
 from vehiclemor.simulation.trajectory import Start, Trajectory
 

@@ -11,8 +11,8 @@ import numpy as np
 from vehiclemor.models.high_fidelity import frozen_inertia as frozen
 from vehiclemor.models.high_fidelity.independent import PLACES
 from vehiclemor.reduction.vehicle.independent import free_lengths, independent_kernels
+from vehiclemor.simulation.build import compiled
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import compiled
 
 N = frozen.N
 # Ranges over which polynomials are fitted: angle of an arm in rad, displacement of the rack in m.

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
+from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.models.high_fidelity import independent as high_fidelity_independent
 from vehiclemor.registry import component
+from vehiclemor.simulation.build import compiled, hoisted_constants, solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.dynamic_build import compiled, hoisted_constants, solved_parameters
 
 
 def independent_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
@@ -27,7 +27,7 @@ def independent_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
 
 def free_lengths(model: DynamicModel) -> list[float]:
     """Free lengths of the springs in m, with which the design position is the equilibrium."""
-    definition: Any = component("model", model.name)
+    definition: ModelDefinition = component("model", model.name)
     values = model.parameters.values()
     solved = solved_parameters(definition, values, model.parameters, model.kernels)
-    return [solved[name] for name in definition.SOLVED]
+    return [solved[name] for name in definition.solved]

@@ -140,12 +140,17 @@ def _errors(model: str, results: Path) -> Entry:
 def _map(model: str, results: Path) -> Entry:
     labels = default_studies.legend(model)
     shown = {label: text for label, text in labels.items() if label != "pod_literal"}
+    outputs = list(printed_outputs(component("model", model)))[:3]
     return Entry(
         name=f"map-{model}",
         draw="error map",
         studies=[default_studies.perturbed(model, results)],
         caption=f"{model}: RMS errors over perturbations of the input, trained on the nominal one",
-        options={"outputs": list(printed_outputs(component("model", model)))[:3], "methods": shown, "values": True},
+        options={
+            "outputs": list(printed_outputs(component("model", model)))[:3],
+            "methods": shown,
+            "values": True,
+        },
     )
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from vehiclemor.models.high_fidelity import definition as vehicle
+from vehiclemor.models.high_fidelity import quantities as vehicle
+from vehiclemor.models.high_fidelity.definition import DEFINITION
 from vehiclemor.models.high_fidelity.equilibrium import wheel_places
 from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures import suspension_schematic
@@ -72,7 +73,7 @@ Point = np.ndarray
 
 def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, and the graph of its bodies and joints."""
-    parameters = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
+    parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: parameters[name] for name in vehicle.PARAMETERS}
     # Placed by hand: the style's automatic layout can't deal with axes in space.
     figure = plt.figure(figsize=(6.7, 6.7))

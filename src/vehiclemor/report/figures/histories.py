@@ -145,7 +145,8 @@ def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
         elif _plot_until_it_leaves(axis, history, text, style):
             left["leaves the axes"] = style["color"]
     axis.ticklabel_format(style="plain")
-    axis.locator_params(axis="y", nbins=5)
+    if not whole:
+        axis.locator_params(axis="y", nbins=5)
     return left
 
 
@@ -216,9 +217,7 @@ def _largest(error: xr.DataArray, period: float) -> tuple[np.ndarray, np.ndarray
     return period * starts, np.array([np.fmax.reduce(error.values[window == k]) for k in starts])
 
 
-def figure_paths(
-    results: Results, *, methods: Mapping[str, str], shown: Sequence[float]
-) -> Figure:
+def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequence[float]) -> Figure:
     """Path in the plane from equilibrium, one panel for each length (m) that is shown."""
     ((_, dataset),) = results.items()
     figure, axes = plt.subplots(len(shown), 1)

@@ -76,7 +76,7 @@ def figure_error_map(
     """
     ((_, dataset),) = results.items()
     shape = len(outputs), len(methods)
-    size = (3.35 * len(methods), 2.8 * len(outputs))
+    size = ((3.35 if len(methods) < 4 else 2.4) * len(methods), 2.8 * len(outputs))
     figure, axes = plt.subplots(*shape, sharex=True, sharey=True, squeeze=False, figsize=size)
     published = rms_numbers(str(dataset.attrs["model"]))
     frequency, amplitude = (100.0 * (dataset[factor].values - 1.0) for factor in FACTORS)
@@ -121,6 +121,8 @@ def _write(
 ) -> None:
     """Errors with two digits, in white where they are below `dark`."""
     for (j, i), value in np.ndenumerate(values):
+        if np.isnan(value):
+            continue
         digits = f"{value:.1g}" if value < 1e-3 else f"{value:#.2g}"
         place = float(frequency[i]), float(amplitude[j])
         color = "white" if value < dark else "black"

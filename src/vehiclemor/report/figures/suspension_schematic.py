@@ -9,7 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from vehiclemor.simulation.algebraic import AlgebraicModel, build
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vehiclemor.models.independent_suspension import definition as vehicle
+from vehiclemor.models.independent_suspension import quantities as vehicle
+from vehiclemor.models.independent_suspension.definition import DEFINITION
+from vehiclemor.models.independent_suspension.equilibrium import derived
+from vehiclemor.models.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
-from vehiclemor.report.figures.suspension_schematic import draw_graph
 from vehiclemor.report.figures.space import (
     CAPTIONS,
     SIZES,
@@ -21,6 +23,7 @@ from vehiclemor.report.figures.space import (
     frame_space,
     symbol,
 )
+from vehiclemor.report.figures.suspension_schematic import draw_graph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +38,7 @@ DRAWN_STEER = np.deg2rad(20.0)
 
 def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, in the chassis frame moved to the road, and the graph."""
-    parameters = load_parameters(vehicle.NAME, vehicle.PARAMETERS)
+    parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: float(parameters[name]) for name in vehicle.PARAMETERS}
     # Placed by hand: the style's automatic layout can't deal with axes in space.
     figure = plt.figure(figsize=(6.7, 4.1))
@@ -49,7 +52,7 @@ def figure_vehicle() -> Figure:
     handles, labels = space.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower left", ncols=5, fontsize=7.5)
     figure.text(0.02, 0.95, "(a)")
-    whole = 1e3 * (p["front_axle_distance"] - vehicle.derived(p).sprung_distance[0])
+    whole = 1e3 * (p["front_axle_distance"] - derived(p).sprung_distance[0])
     note = f"a, b: to the CG of the whole car, {whole:.0f} mm behind that of the sprung body"
     figure.text(0.07, 0.953, note, fontsize=6.5, color=SIZES)
     figure.text(0.65, 0.95, "(b)")
@@ -58,7 +61,7 @@ def figure_vehicle() -> Figure:
 
 def wheel_centres(p: dict[str, float]) -> np.ndarray:
     """Wheel centres (4, 3) in m at zero travel, x and y from the sprung CG, z from the road."""
-    d = vehicle.derived(p)
+    d = derived(p)
     return np.array(
         [
             (
@@ -132,7 +135,7 @@ def _draw_vehicle_graph(axis: Axes) -> None:
     nodes, colors = {"road": (1.5, 3.1), "chassis": (1.5, 2.1)}, dict(COLORS)
     free = f"free, {len(names) - 8} DOF\n" + ", ".join(names[:-8])
     edges = [("road", "chassis", free)]
-    for number, wheel in enumerate(vehicle.WHEELS):
+    for number, wheel in enumerate(WHEELS):
         mass, tire = f"mass {wheel}", f"wheel {wheel}"
         nodes |= {mass: (float(number), 0.95), tire: (float(number), 0.0)}
         colors |= {mass: COLORS["mass"], tire: COLORS["wheel"]}

@@ -1,0 +1,86 @@
+"""Equations of the double-wishbone suspension: closures, analytic Jacobian, Newton step."""
+
+from typing import cast
+
+import sympy as sp
+
+from vehiclemor.models.double_wishbone import linkage as double_wishbone_linkage
+from vehiclemor.models.double_wishbone.points import POINTS
+from vehiclemor.models.double_wishbone.quantities import (
+    COORDINATES,
+    EQUATIONS,
+    INPUTS,
+    JOINTS,
+    OUTPUTS,
+)
+from vehiclemor.models.equations import AlgebraicEquations
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic.elimination import eliminate
+from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.tape import Tape
+
+# Pivots (equation, coordinate) of the Newton step, by Markowitz' rule at the design position.
+PIVOTS = ((7, 7), (3, 5), (5, 6), (2, 4), (6, 3), (1, 2), (0, 1), (4, 0))
+
+
+def derive() -> AlgebraicEquations:
+    """Derive residual, analytic Jacobian and outputs; the hard points stay symbols."""
+    tape = Tape()
+    q = sp.symbols([c.name for c in COORDINATES], real=True)
+    u = sp.symbols([i.name for i in INPUTS], real=True)
+    points = {
+        name: g.vector(sp.symbols([f"{name}_{axis}" for axis in "xyz"], real=True))
+        for name in POINTS
+    }
+    position = _positions(tape, q, points)
+
+    closures = [
+        *g.subtract(position["lower_ball_joint"], position["lower_ball_joint_arm"]),
+        *g.subtract(position["tie_rod_outer"], position["tie_rod_outer_rod"]),
+    ]
+    centre = g.subtract(position["wheel_centre"], points["wheel_centre"])
+    residual = [tape.let(e) for e in [*closures, centre[2] - u[0], q[7] - u[1]]]
+    jacobian = tape.jacobian(residual, q)
+    axle = position["axle_direction"]
+    outputs = [
+        centre[0],
+        centre[1],
+        q[1],
+        sp.atan2(-axle[0], axle[1]),
+        sp.asin(axle[2]),
+        q[7],
+    ]
+    step = eliminate(tape, jacobian, residual, PIVOTS)
+    augmented = [e for row, phi in zip(jacobian, residual, strict=True) for e in [*row, phi]]
+    n = len(COORDINATES)
+    program = assemble(
+        tape,
+        {"q": q, "u": u},
+        cast("list[sp.Symbol]", [component for point in points.values() for component in point]),
+        {
+            "residual": (residual, (n,)),
+            "residual_jacobian": (augmented, (n, n + 1)),
+            "newton_step": (step, (n,)),
+            "outputs": (outputs, (len(OUTPUTS),)),
+            "joints": (
+                [c for name in JOINTS for c in position[name]],
+                (len(JOINTS), 3),
+            ),
+        },
+    )
+    return AlgebraicEquations(COORDINATES, INPUTS, OUTPUTS, EQUATIONS, JOINTS, program)
+
+
+def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> dict[str, g.Vector]:
+    """Moving points in the chassis frame, each ball joint as seen from both of its bodies."""
+    linkage = double_wishbone_linkage.assembled(tape, q[:7], q[7], points)
+    return {
+        "upper_ball_joint": linkage.upper_ball_joint,
+        "lower_ball_joint": linkage.on_carrier(tape, points["lower_ball_joint"]),
+        "lower_ball_joint_arm": linkage.on_lower_arm(tape, points["lower_ball_joint"]),
+        "tie_rod_inner": linkage.rack_end,
+        "tie_rod_outer": linkage.on_carrier(tape, points["tie_rod_outer"]),
+        "tie_rod_outer_rod": g.named(tape, linkage.rod_end),
+        "wheel_centre": linkage.on_carrier(tape, points["wheel_centre"]),
+        "axle_direction": (linkage.carrier[0][1], linkage.carrier[1][1], linkage.carrier[2][1]),
+    }

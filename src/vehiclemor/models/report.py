@@ -1,0 +1,222 @@
+"""What tables and figures show of a model: outputs, costs to time, nominal study, paper's terms.
+
+Data only.  What a model leaves empty follows from its kind, so that one that declares nothing still
+gets every table; the functions below give what it declares or else these defaults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from vehiclemor.models.quantities import Quantity
+
+Value = float | int | str | bool
+
+
+@dataclass(frozen=True)
+class TimingCase:
+    """One row of a cost table: a method with settings, run on the nominal maneuver.
+
+    Attributes
+    ----------
+    id
+        By which the row is known; `baseline` is the paper's kind of full-order run and `strongest`
+        the best full-order solver, for every model.
+    label
+        As it is printed.
+    method, preset, settings
+        Registered name, one of its presets, and settings that differ from that.
+    """
+
+    id: str
+    label: str
+    method: str
+    preset: str = "recommended"
+    settings: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ModelReport:
+    """What tables and figures show of a model; what is empty follows from its kind.
+
+    Attributes
+    ----------
+    outputs
+        Whose errors are tabled; all by default.
+    printed_outputs
+        Whose errors stand beside the times where a table is printed; the first three by default.
+    counts
+        Counts of the solvers that are printed: name -> heading.
+    timing
+        Rows of the cost table, in order; it has `baseline` and `strongest`.
+    baselines
+        What the cases `baseline` and `strongest` are, in words.
+    study
+        Study of the nominal run; none by default.
+    settings_study, settings_outputs
+        Study over all settings of control-period POD, and the outputs that its table lists.
+    bounds
+        Output -> key of its published RMS error.
+    paper_fixed
+        Settings of control-period POD that the paper names.
+    paper_open
+        Settings that it leaves open -> values that are tried, in all combinations.
+    """
+
+    outputs: tuple[str, ...] = ()
+    printed_outputs: tuple[str, ...] = ()
+    counts: Mapping[str, str] = field(default_factory=dict)
+    timing: tuple[TimingCase, ...] = ()
+    baselines: tuple[str, str] = ("", "")
+    study: str = ""
+    settings_study: str = ""
+    settings_outputs: tuple[str, ...] = ()
+    bounds: Mapping[str, str] = field(default_factory=dict)
+    paper_fixed: Mapping[str, Value] = field(default_factory=dict)
+    paper_open: Mapping[str, tuple[Value, ...]] = field(default_factory=dict)
+
+
+class Reported(Protocol):
+    """What the functions below read of a model's definition."""
+
+    @property
+    def kind(self) -> str:
+        """`ae`, `ode` or `dae`."""
+        ...
+
+    @property
+    def coordinates(self) -> tuple[Quantity, ...]:
+        """Coordinates in order."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Outputs in order."""
+        ...
+
+    @property
+    def report(self) -> ModelReport:
+        """As declared."""
+        ...
+
+
+REPLAY = TimingCase("replay", "replay", "replay")
+STRONGEST = TimingCase("strongest", "full order, strongest", "full_order", "strongest")
+ALGEBRAIC_BASELINES = (
+    TimingCase("baseline", "full order, Newton", "full_order"),
+    STRONGEST,
+    TimingCase("dense", "full order, dense", "full_order", settings={"solver": "newton_dense"}),
+    TimingCase(
+        "newton_1e-6", "full order, Newton, 1e-6", "full_order", settings={"tolerance": 1e-6}
+    ),
+    REPLAY,
+)
+DYNAMIC_BASELINES = (
+    TimingCase("baseline", "full order, explicit", "full_order"),
+    STRONGEST,
+    TimingCase(
+        "explicit_1e-3", "full order, explicit, 1e-3", "full_order", settings={"tolerance": 1e-3}
+    ),
+    TimingCase(
+        "rodas4_1e-4",
+        "full order, RODAS4, 1e-4",
+        "full_order",
+        settings={"solver": "rodas4", "tolerance": 1e-4},
+    ),
+    REPLAY,
+)
+# What the paper does not say of control-period POD.
+ALGEBRAIC_OPEN: Mapping[str, tuple[Value, ...]] = {
+    "test_space": ("least_squares", "galerkin"),
+    "tolerance": (1e-12, 1e-8, 1e-6, 1e-5, 1e-4),
+}
+DYNAMIC_OPEN: Mapping[str, tuple[Value, ...]] = {
+    "formulation": ("coordinates", "state"),
+    "inner_product": ("energy", "euclidean"),
+    "solver": ("explicit", "rodas4"),
+    "tolerance": (1e-6, 1e-4, 1e-3),
+}
+_ALGEBRAIC = ModelReport(
+    counts={
+        "iterations": "iterations",
+        "residual_evaluations": "residuals",
+        "jacobian_evaluations": "Jacobians",
+    },
+    timing=ALGEBRAIC_BASELINES,
+    baselines=("Newton with fresh Jacobians at 1e-12", "the strongest full-order solver"),
+    paper_open=ALGEBRAIC_OPEN,
+)
+_DYNAMIC = ModelReport(
+    counts={"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"},
+    timing=DYNAMIC_BASELINES,
+    baselines=("the explicit pair at 1e-6", "the W-method with one Jacobian"),
+    paper_open=DYNAMIC_OPEN,
+)
+DEFAULTS = {"ae": _ALGEBRAIC, "ode": _DYNAMIC, "dae": _DYNAMIC}
+LARGEST_DEFAULT_RANK = 3
+
+
+def default_rank(definition: Reported) -> int:
+    """Rank of the reduced models in the default rows: 3, but less than the coordinates."""
+    return max(1, min(LARGEST_DEFAULT_RANK, len(definition.coordinates) - 1))
+
+
+def timing_cases(definition: Reported) -> tuple[TimingCase, ...]:
+    """Rows of a model's cost table: by default full-order solvers, replay, and POD both ways."""
+    if definition.report.timing:
+        return definition.report.timing
+    rank = default_rank(definition)
+    reduced = (("pod", "recommended", "pod"), ("pod", "literal", "pod literal"))
+    reduced += (("fixed_basis", "recommended", "fixed basis"),)
+    cases = [
+        TimingCase(
+            f"{label.replace(' ', '_')}_r{rank}",
+            f"{label} r={rank}",
+            method,
+            preset,
+            {"rank": rank},
+        )
+        for method, preset, label in reduced
+    ]
+    return (*DEFAULTS[definition.kind].timing, *cases)
+
+
+def tabled_outputs(definition: Reported) -> tuple[str, ...]:
+    """Outputs whose errors are tabled."""
+    return definition.report.outputs or tuple(output.name for output in definition.outputs)
+
+
+def printed_outputs(definition: Reported) -> tuple[str, ...]:
+    """Outputs whose errors are printed beside the times."""
+    return definition.report.printed_outputs or tabled_outputs(definition)[:3]
+
+
+def printed_counts(definition: Reported) -> Mapping[str, str]:
+    """Counts that are printed: name -> heading."""
+    return definition.report.counts or DEFAULTS[definition.kind].counts
+
+
+def baselines(definition: Reported) -> tuple[str, str]:
+    """What the cases `baseline` and `strongest` are, in words."""
+    declared, default = definition.report.baselines, DEFAULTS[definition.kind].baselines
+    return (declared[0] or default[0], declared[1] or default[1])
+
+
+def paper_cases(definition: Reported) -> Iterator[TimingCase]:
+    """Both full-order cases, then control-period POD with all that the paper leaves open.
+
+    The identifier and the label of a variant are the values that it sets.
+    """
+    yield TimingCase("baseline", "full order, the paper's kind", "full_order")
+    yield STRONGEST
+    declared = definition.report
+    fixed = declared.paper_fixed or {"rank": default_rank(definition)}
+    varied = declared.paper_open or DEFAULTS[definition.kind].paper_open
+    for values in product(*varied.values()):
+        label = ", ".join(str(value) for value in values)
+        chosen = {**fixed, **dict(zip(varied, values, strict=True))}
+        yield TimingCase(label, f"pod, {label}", "pod", settings=chosen)
