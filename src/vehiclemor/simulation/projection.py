@@ -37,7 +37,9 @@ def without_stabilisation(model: DynamicModel) -> DynamicModel:
     if not set(GAINS) <= set(model.parameters.entries):
         raise InputError(f"{model.name} has no constraints that are stabilised")
     values = {name: entry.value for name, entry in model.parameters.entries.items()}
-    return build(model.name, overrides=values | dict.fromkeys(GAINS, 0.0))
+    free = build(model.name, overrides=values | dict.fromkeys(GAINS, 0.0))
+    assert isinstance(free, DynamicModel)
+    return free
 
 
 def projected_state(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> np.ndarray:

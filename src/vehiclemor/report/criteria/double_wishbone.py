@@ -25,6 +25,7 @@ from vehiclemor.report.criteria.finding import (
     not_visible,
     relative_rms,
 )
+from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 
 # Largest principal angle (rad) up to which two subspaces count as similar.
@@ -90,6 +91,7 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     """Figure 12: training at amplitude +20 % gives nearly the same subspaces."""
     del results, label
     model = build("double_wishbone")
+    assert isinstance(model, AlgebraicModel)
     maneuver = component("maneuver", component("model", model.name).maneuver)
     settings = validated("pod", pod.settings(model.kind), {"rank": 3})
     edges = window_edges(maneuver.duration, float(settings["control_period"]))

@@ -48,6 +48,7 @@ EDGES = (
 def figure_suspension() -> Figure:
     """Mechanism at design, with its positions at +-0.1 m of travel, and the graph."""
     model = build("double_wishbone")
+    assert isinstance(model, AlgebraicModel)
     # Placed by hand: the style's automatic layout can't deal with axes in space.
     figure = plt.figure(figsize=(6.7, 4.1))
     figure.set_layout_engine("none")

@@ -1,0 +1,124 @@
+"""The quarter car of a plug-in package: its physics, and what it gets without declaring it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import vehiclemor as vm
+from vehiclemor.contracts import check_method, check_model
+from vehiclemor.models import report
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+
+pytestmark = pytest.mark.usefixtures("plug_in_package")
+SOLVERS = {"explicit": 1e-10, "rodas4": 1e-9, "ros34pw2": 1e-8, "etdrk4": 1e-8}
+
+
+@pytest.fixture(scope="module")
+def car(plug_in_package):
+    return build("quarter_car")
+
+
+def matrices(model) -> tuple[np.ndarray, np.ndarray]:
+    """State matrix (4, 4) and input column (4,), from the springs' and masses' own equations."""
+    p = {name: float(value) for name, value in model.parameters.values().items()}
+    mass = np.diag([p["sprung_mass"], p["unsprung_mass"]])
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    stiffness = p["stiffness"] * pair + np.diag([0.0, p["tire_stiffness"]])
+    accelerations = -np.linalg.solve(mass, np.hstack([stiffness, p["damping"] * pair]))
+    a = np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), accelerations])
+    return a, np.array([0.0, 0.0, 0.0, p["tire_stiffness"] / p["unsprung_mass"]])
+
+
+def exact(model, start: np.ndarray, frequency: float, times: np.ndarray) -> np.ndarray:
+    """States over a sine road: exponential of the system with the oscillator that is its road."""
+    a, b = matrices(model)
+    rate = 2.0 * np.pi * 1.5 * frequency
+    whole = np.zeros((6, 6))
+    whole[:4, :4], whole[:4, 4] = a, 0.02 * b
+    whole[4:, 4:] = [[0.0, rate], [-rate, 0.0]]
+    at_start = np.concatenate([start, [0.0, 1.0]])
+    return np.array([expm(whole * t) @ at_start for t in times])[:, :4]
+
+
+def test_an_installed_plug_in_is_listed_in_a_new_process():
+    text = "import vehiclemor as vm; print(vm.models()['quarter_car'])"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    assert done.stdout == "quarter car, 2 degrees of freedom\n"
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+@pytest.mark.parametrize("frequency", [1.0, 1.7])
+def test_runs_are_those_of_the_linear_system(car, start, frequency):
+    maneuver = component("maneuver", "sine_road").perturbed(frequency)
+    expected = exact(car, car.start(start), frequency, maneuver.times)
+    size = np.abs(expected).max(axis=0)
+    for solver, tolerance in SOLVERS.items():
+        run = car.simulate(maneuver, start, solver=solver, tolerance=tolerance)
+        error = np.abs(run.states - expected).max(axis=0)
+        assert np.all(error < 1e-6 * size), solver
+
+
+def test_outputs_are_acceleration_travel_and_tire_force(car):
+    run = car.simulate(component("maneuver", "sine_road"), "dropped")
+    a, b = matrices(car)
+    rates = run.states @ a.T + run.inputs * b
+    tire = float(car.parameters["tire_stiffness"])
+    np.testing.assert_allclose(run.outputs[:, 0], rates[:, 2], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run.outputs[:, 1], run.states[:, 1] - run.states[:, 0], atol=1e-15)
+    np.testing.assert_allclose(
+        run.outputs[:, 2], tire * (run.inputs[:, 0] - run.states[:, 1]), rtol=0, atol=1e-9
+    )
+    # Newton's second law of the whole: what the tire gives moves both masses.
+    masses = [float(car.parameters[name]) for name in ("sprung_mass", "unsprung_mass")]
+    np.testing.assert_allclose(rates[:, 2:] @ masses, run.outputs[:, 2], rtol=0, atol=1e-9)
+
+
+def test_steady_amplitude_is_that_of_the_transfer_function(car):
+    a, b = matrices(car)
+    for frequency in (0.3, 1.0, 4.0):
+        maneuver = component("maneuver", "sine_road").perturbed(frequency)
+        rate = 2.0 * np.pi * 1.5 * frequency
+        response = 0.02 * np.linalg.solve(1j * rate * np.eye(4) - a, b)
+        # Started on the periodic solution, it stays there.
+        run = car.simulate(maneuver, response.imag.copy(), tolerance=1e-10)
+        expected = np.imag(np.exp(1j * rate * run.time)[:, None] * response)
+        assert np.abs(run.states - expected).max() < 1e-8 * np.abs(response).max()
+
+
+def test_second_order_form_is_that_of_the_masses(car):
+    x = np.array([0.01, -0.02, 0.3, -0.4])
+    np.testing.assert_array_equal(car.mass_matrix(x), np.diag([250.0, 45.0]))
+    np.testing.assert_array_equal(car.speeds_of_rates(x), x[2:])
+
+
+def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
+    definition = component("model", "quarter_car")
+    cases = report.timing_cases(definition)
+    ids = [case.id for case in cases]
+    assert ids[:2] == ["baseline", "strongest"]
+    assert len(set(ids)) == len(ids)
+    assert {"full_order", "replay", "pod", "fixed_basis"} == {case.method for case in cases}
+    # Of two coordinates, one is a reduction.
+    assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {1}
+    outputs = ("body_acceleration", "suspension_travel", "tire_force")
+    assert report.tabled_outputs(definition) == report.printed_outputs(definition) == outputs
+    assert set(report.printed_counts(definition)) <= set(build("quarter_car").counts)
+    variants = list(report.paper_cases(definition))
+    assert [case.id for case in variants[:2]] == ["baseline", "strongest"]
+    assert len({case.id for case in variants}) == len(variants) == 2 + 2 * 2 * 2 * 3
+
+
+def test_it_passes_the_contracts():
+    check_model("quarter_car")
+    for method in ("full_order", "replay"):
+        check_method(method, "quarter_car")
+
+
+def test_every_row_of_its_cost_table_can_be_run():
+    for case in report.timing_cases(component("model", "quarter_car")):
+        data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
+        assert data.attrs["status"] == "ok", case.id
