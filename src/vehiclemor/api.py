@@ -48,7 +48,7 @@ def _summaries(kind: str, attribute: str) -> dict[str, str]:
 def studies() -> dict[str, str]:
     """Studies that come with the package: name -> one line."""
     from vehiclemor.resources import data_names
-    from vehiclemor.study.definition import StudyFile, study_path
+    from vehiclemor.study.plans.study_file import StudyFile, study_path
     from vehiclemor.toml_files import read_toml
 
     return {name: read_toml(study_path(name), StudyFile).title for name in data_names("studies")}
@@ -134,8 +134,9 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    from vehiclemor.study.cells import make_cell
-    from vehiclemor.study.execution import compute_cell
+    from vehiclemor.study.evaluate import evaluate
+    from vehiclemor.study.experiment import complete_settings, make_experiment
+    from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
     ready = _model(model) if isinstance(model, str) else model
     if isinstance(maneuver, str) or maneuver is None:
@@ -145,18 +146,12 @@ def simulate(
         base = maneuver
     if rtol is not None:
         settings["tolerance"] = rtol
-    perturbed = base.perturbed(frequency, amplitude)
-    cell = make_cell(
-        ready,
-        perturbed,
-        start or ready.starts[0],
-        method,
-        settings,
-        preset,
-        training,
-        tuple((float(f), float(a)) for f, a in training_set),
-    )
-    dataset = compute_cell(cell, ready, perturbed)
+    chosen = complete_settings(ready, method, settings, preset)
+    test = Scenario(base.perturbed(frequency, amplitude), start or ready.starts[0])
+    check(ready, test)
+    factors = [(float(f), float(a)) for f, a in training_set]
+    trained = training_scenarios(test, training, factors)
+    dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError
@@ -190,7 +185,7 @@ def run_study(
         cell of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
-    from vehiclemor.study.combine import flattened
+    from vehiclemor.study.plans.grid_results import flattened
     from vehiclemor.study.run import run_studies
 
     results = run_studies(study, Path(out), jobs, progress)

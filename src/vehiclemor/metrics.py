@@ -8,7 +8,7 @@ def rms(error: np.ndarray) -> np.ndarray:
     return np.sqrt(np.mean(np.square(error), axis=0))
 
 
-def largest(error: np.ndarray) -> np.ndarray:
+def max_abs(error: np.ndarray) -> np.ndarray:
     """Largest absolute value over the samples: (samples, k) -> (k,)."""
     return np.abs(error).max(axis=0)
 

@@ -4,11 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from vehiclemor.report.compare import COLUMNS, comparison
+from vehiclemor.report.comparison.paper import paper_comparison
+from vehiclemor.report.comparison.row import COLUMNS
 
 from vehiclemor.cli import main
-from vehiclemor.report import tables
-from vehiclemor.report.costs import cost_table
+from vehiclemor.report import errors, tables
+from vehiclemor.report.costs import cost_table, costs_text
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.published import load_published
 from vehiclemor.report.regenerate import regenerate_figures
@@ -47,7 +48,7 @@ method = "pod"
 
 @pytest.fixture(scope="module")
 def rows(results_folder):
-    return comparison("paper", results_folder)
+    return paper_comparison(results_folder)
 
 
 def test_every_published_number_has_a_row(rows):
@@ -117,8 +118,8 @@ def test_time_of_a_vehicle_stands_beside_both_baselines(rows, model):
 
 
 def test_costs_are_consistent(results_folder):
-    table = cost_table("double_wishbone", results_folder).set_index("contestant")
-    newton, strongest = table.loc["full order, Newton"], table.loc["full order, strongest"]
+    table = cost_table("double_wishbone", results_folder).set_index("case")
+    newton, strongest = table.loc["baseline"], table.loc["strongest"]
     assert newton["speed_up"] == 1.0
     assert strongest["speed_up_strongest"] == 1.0
     assert strongest["residual_evaluations"] < 1.1 * 1001
@@ -144,20 +145,20 @@ def test_break_even_is_the_training_over_what_a_run_saves(results_folder, model)
 
 @pytest.mark.parametrize(
     ("model", "reduced", "share", "yaw"),
-    [(VEHICLES[0], "pod r=3", 0.25, 3e-4), (VEHICLES[1], "pod r=1", 0.1, 1e-3)],
+    [(VEHICLES[0], "pod_r3", 0.25, 3e-4), (VEHICLES[1], "pod_r1", 0.1, 1e-3)],
 )
 def test_counts_of_a_vehicle(results_folder, model, reduced, share, yaw):
     table = cost_table(model, results_folder)
     for start, part in table.groupby("start"):
-        rows = part.set_index("contestant")
-        explicit, best = rows.loc["full order, explicit"], rows.loc["full order, strongest"]
+        rows = part.set_index("case")
+        explicit, best = rows.loc["baseline"], rows.loc["strongest"]
         assert rows.loc[reduced, "rhs_calls"] < share * explicit["rhs_calls"], start
         assert best["rhs_calls"] < 0.05 * explicit["rhs_calls"], start
         assert best["rms_yaw"] < yaw, start
 
 
 def test_errors_of_a_vehicle_by_groups_of_quantities(results_folder):
-    table = tables.quantity_table("high_fidelity_vehicle", results_folder)
+    table = errors.quantity_table("high_fidelity_vehicle", results_folder)
     assert set(table["group"]) == {"coordinate", "speed", "output", "constraint"}
     exact = table[table["method"] == "replay"]
     assert (exact[exact["group"] != "constraint"]["rms"] == 0.0).all()
@@ -192,7 +193,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
     # The whole study of settings has hundreds of cells: a few stand in for them.
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
-    monkeypatch.setattr(tables, "SETTINGS", {str(path): ("pitch", "yaw")})
+    monkeypatch.setattr(tables, "settings_studies", lambda: {str(path): ("pitch", "yaw")})
     names = ["5", "8", "10"]
     contents = []
     for turn in ("first", "second"):
@@ -200,7 +201,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
         paths = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)
         contents.append({path.name: path.read_bytes() for path in paths})
-    assert len(contents[0]) == 2 * len(names) + 3 * 13
+    assert len(contents[0]) == 2 * len(names) + 3 * 16
     assert contents[0] == contents[1]
     assert all(contents[0].values())
 
@@ -241,11 +242,10 @@ def test_tables_escape_what_their_format_reserves():
     assert r"5 \% | x\_1 \& y" in latex(table)
 
 
-def test_table_of_settings_records_what_does_not_fit(tmp_path, monkeypatch):
+def test_table_of_settings_records_what_does_not_fit(tmp_path):
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
-    monkeypatch.setattr(tables, "SETTINGS", {str(path): ("pitch", "yaw")})
-    table = tables.settings_table(str(path), tmp_path / "results")
+    table = errors.settings_table(str(path), ("pitch", "yaw"), tmp_path / "results")
     table = table.set_index(["formulation", "rank"])
     assert len(table) == 4
     assert (table.xs(7, level="rank")["status"] == "rejected").all()

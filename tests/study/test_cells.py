@@ -10,27 +10,46 @@ import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError, UnreachableError
 from vehiclemor.maneuvers import sine_travel
 from vehiclemor.simulation.build import build
-from vehiclemor.study.cells import expand, make_cell
-from vehiclemor.study.combine import flattened
-from vehiclemor.study.definition import load_studies
-from vehiclemor.study.execution import compute_cell
+from vehiclemor.study import evaluate as evaluation
+from vehiclemor.study.evaluate import evaluate
+from vehiclemor.study.experiment import complete_settings, make_experiment
+from vehiclemor.study.plans.grid import expand
+from vehiclemor.study.plans.grid_results import flattened
+from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.run import run_studies
+from vehiclemor.study.scenario import Scenario, training_scenarios
+
+
+def make_cell(model, maneuver, method, given, **policy):
+    """An experiment on one run from the equilibrium."""
+    test = Scenario(maneuver, "equilibrium")
+    settings = complete_settings(model, method, given)
+    training = training_scenarios(test, **{"policy": "matched"} | policy)
+    return make_experiment(model, method, settings, training, (test,))
+
+
+@pytest.fixture(autouse=True)
+def _nothing_kept():
+    """What an earlier test has fitted or solved is not used again."""
+    evaluation.kept_reference.cache_clear()
+    evaluation._kept_fit.cache_clear()
 
 
 @pytest.fixture(scope="module")
 def cell():
-    return make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rank": 3})
+    return make_cell(build("double_wishbone"), sine_travel, "pod", {"rank": 3})
 
 
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("frequency_factor", 1.0000001),
-        ("amplitude_factor", 0.9),
+        ("test", (Scenario(sine_travel.perturbed(1.0000001), "equilibrium"),)),
+        ("test", (Scenario(sine_travel.perturbed(1.0, 0.9), "equilibrium"),)),
         ("kernel", "another"),
         ("code", "another"),
-        ("inputs", "another"),
-        ("training", "nominal"),
+        ("test", (Scenario(dataclasses.replace(sine_travel, samples=1002), "equilibrium"),)),
+        ("test", (Scenario(sine_travel, "dropped"),)),
+        ("training", (Scenario(sine_travel.perturbed(1.1), "equilibrium"),)),
         ("settings", {"rank": 4}),
         ("parameters", {}),
         ("keep", "metrics"),
@@ -43,22 +62,22 @@ def test_key_changes_with_all_that_determines_the_result(cell, field, value):
 def test_a_maneuver_of_ones_own_is_simulated_and_has_a_key_of_its_own(cell):
     half = dataclasses.replace(sine_travel, duration=5.0, samples=101)
     model = build("double_wishbone")
-    assert make_cell(model, half, "equilibrium", "pod", {"rank": 3}).key != cell.key
+    assert make_cell(model, half, "pod", {"rank": 3}).key != cell.key
     data = vm.simulate(model, "full_order", maneuver=half)
     np.testing.assert_array_equal(data["time"], np.linspace(0.0, 5.0, 101))
     np.testing.assert_array_equal(data["inputs"], half.at(half.times))
 
 
 def test_key_is_the_same_for_the_same_cell(cell):
-    again = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rank": 3})
+    again = make_cell(build("double_wishbone"), sine_travel, "pod", {"rank": 3})
     assert again.key == cell.key
 
 
 def test_another_geometry_gives_another_key_and_result(cell):
     moved = build("double_wishbone", overrides={"tie_rod_inner": [-0.2, 0.4921, -0.0962]})
-    other = make_cell(moved, sine_travel, "equilibrium", "full_order", {})
+    other = make_cell(moved, sine_travel, "full_order", {})
     assert other.key != cell.key
-    dataset = compute_cell(other)
+    dataset = evaluate(other)
     # The low-bump-steer tie rod of the source: toe within 0.06 deg over +-0.1 m.
     assert float(abs(dataset["outputs"].sel(output="toe")).max()) < 0.06 * 3.15 / 180.0
 
@@ -78,7 +97,7 @@ def test_a_plug_in_error_spoils_only_its_cell(cell, monkeypatch):
         raise ZeroDivisionError("in a plug-in")
 
     monkeypatch.setattr(pod, "fit", broken)
-    dataset = compute_cell(cell)
+    dataset = evaluate(cell)
     assert dataset["status"].item() == "error"
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
 
@@ -90,14 +109,14 @@ def test_a_plug_in_model_that_breaks_in_the_reference_spoils_only_its_cell(
         raise ZeroDivisionError("in a plug-in")
 
     monkeypatch.setattr(type(model), "simulate", broken)
-    dataset = compute_cell(cell)
+    dataset = evaluate(cell)
     assert dataset["status"].item() == "error"
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
 
 
 def test_divergence_is_a_result(cell):
     singular = dataclasses.replace(cell, settings={**cell.settings, "tolerance": 1e-300})
-    dataset = compute_cell(singular)
+    dataset = evaluate(singular)
     assert dataset["status"].item() == "diverged"
     assert "no convergence" in dataset["message"].item()
 
@@ -105,19 +124,18 @@ def test_divergence_is_a_result(cell):
 def test_set_policy_needs_and_uses_its_factors():
     model = build("double_wishbone")
     with pytest.raises(InputError, match="training_set"):
-        make_cell(model, sine_travel, "equilibrium", "pod", {}, training="set")
+        make_cell(model, sine_travel, "pod", {}, policy="set")
     errors = {}
     for factors in (((1.0, 1.0),), ((1.0, 1.0), (1.2, 1.0))):
         cell = make_cell(
             model,
             sine_travel.perturbed(1.2),
-            "equilibrium",
             "pod",
             {"rank": 4},
-            training="set",
-            training_set=factors,
+            policy="set",
+            factors=factors,
         )
-        errors[len(factors)] = float(compute_cell(cell)["rms_error"].sel(output="spindle_y"))
+        errors[len(factors)] = float(evaluate(cell)["rms_error"].sel(output="spindle_y"))
     assert errors[2] < 0.5 * errors[1]
 
 
@@ -161,9 +179,12 @@ def test_settings_of_a_method_that_refuses_the_model_are_not_judged(monkeypatch)
     from vehiclemor.reduction.methods import pod
 
     monkeypatch.setattr(pod, "accepts", lambda model: (False, f"pod can't reduce {model.name}"))
-    cell = make_cell(build("double_wishbone"), sine_travel, "equilibrium", "pod", {"rnk": 3}, "x")
+    model = build("double_wishbone")
+    settings = complete_settings(model, "pod", {"rnk": 3}, "x")
+    scenarios = (Scenario(sine_travel, "equilibrium"),)
+    cell = make_experiment(model, "pod", settings, scenarios, scenarios)
     assert cell.settings == {}
-    dataset = compute_cell(cell)
+    dataset = evaluate(cell)
     assert dataset["status"].item() == "rejected"
     assert dataset["message"].item() == "pod can't reduce double_wishbone"
     assert np.isnan(dataset["coordinates"]).all()

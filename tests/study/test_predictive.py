@@ -11,12 +11,11 @@ import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.study import predictive_timing, trial_execution
-from vehiclemor.study.choice import Validation, choose
-from vehiclemor.study.protocol import load_protocol
+from vehiclemor.study import evaluate, timing
+from vehiclemor.study.plans.choice import Validation, choose
+from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.scenarios import training_run
-from vehiclemor.study.trial_execution import reference_outputs
+from vehiclemor.study.scenario import training_run
 
 OTHER_TEST = '[[test]]\nmaneuver = "sine_travel"\npoints = [[2.0, 0.3]]\n'
 OUTSIDE = '\n[[outside]]\nmaneuver = "sine_travel"\npoints = [[1.0, 1.5]]\n'
@@ -25,7 +24,7 @@ OUTSIDE = '\n[[outside]]\nmaneuver = "sine_travel"\npoints = [[1.0, 1.5]]\n'
 @pytest.fixture(scope="module", autouse=True)
 def _quick():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(predictive_timing, "ROUNDS", 2)
+        patch.setattr(timing, "PROTOCOL_ROUNDS", 2)
         yield
 
 
@@ -41,18 +40,16 @@ def study_of(folder, *texts):
     return str(study)
 
 
-def files(folder, purpose=""):
-    """Content of the trials' files of a set, without seconds, by name."""
+def files(folder, name=""):
+    """Content of the results of a set, or of all, without seconds, by name of the file."""
+    labels = [s.label for s in load_protocol(str(folder / "small0.toml")).sets.get(name, ())]
     found = {}
-    for path in sorted((folder / "predictive").glob("*.nc")):
+    for path in sorted((folder / "cells").glob("*.nc")):
         with xr.open_dataset(path) as dataset:
-            if dataset.attrs["title"].endswith(f", {purpose}" if purpose else ""):
-                found[path.name] = dataset.load()
-    return {
-        name: dataset.drop_vars(["seconds", "offline_seconds"])
-        for name, dataset in found.items()
-        if "timing" not in name
-    }
+            if not name or list(dataset["scenario"].values) == labels:
+                found[path.name] = dataset.load().drop_vars(["seconds", "offline_seconds"])
+    assert found
+    return found
 
 
 def assert_same(one, other):
@@ -100,9 +97,9 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     hidden = [s for key in ("test", "outside") for s in protocol.sets[key]]
     inputs = {training_run(protocol.model, s).maneuver.at(TIMES).tobytes() for s in hidden}
     seen, trained = [], []
-    reference_outputs.cache_clear()
+    evaluate.kept_reference.cache_clear()
     # What an earlier test has fitted would not be fitted again.
-    trial_execution._kept.cache_clear()
+    evaluate._kept_fit.cache_clear()
 
     def recorded(function):
         def run(self, maneuver, *arguments, **named):
@@ -121,8 +118,8 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
 
     monkeypatch.setattr(AlgebraicModel, "simulate", recorded(AlgebraicModel.simulate))
     monkeypatch.setattr(fixed_basis, "fit", recorded_fit)
-    monkeypatch.setattr("vehiclemor.study.predictive.choose", recorded_choice)
-    monkeypatch.setattr("vehiclemor.study.predictive.timing", no_timing)
+    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.choose", recorded_choice)
+    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
     run_studies(study, tmp_path)
     last_choice = len(seen) - seen[::-1].index("choice")
     assert seen[:last_choice].count(False) > 0
@@ -149,11 +146,11 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
     done, tmp_path, protocol_text, monkeypatch
 ):
     folder, study, dataset = done
-    written = {path: path.stat().st_mtime_ns for path in (folder / "predictive").iterdir()}
+    written = {path: path.stat().st_mtime_ns for path in (folder / "cells").iterdir()}
     again = run_studies(study, folder)["predictive-small0"]
-    assert {path: path.stat().st_mtime_ns for path in (folder / "predictive").iterdir()} == written
+    assert {path: path.stat().st_mtime_ns for path in (folder / "cells").iterdir()} == written
     xr.testing.assert_identical(again, dataset)
-    monkeypatch.setattr("vehiclemor.study.predictive.timing", no_timing)
+    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
     run_studies(study_of(tmp_path, protocol_text), tmp_path, jobs=2)
     assert_same(files(folder), files(tmp_path))
 

@@ -9,11 +9,16 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
-from vehiclemor.study.definition import load_studies
-from vehiclemor.study.protocol import load_protocol
-from vehiclemor.study.scenarios import Scenario, same_run, start_of, training_run
+from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
+
+
+def scenario(maneuver, start, speed):
+    """An unperturbed scenario."""
+    return Scenario(component("maneuver", maneuver), start, speed)
 
 
 @pytest.fixture(scope="module")
@@ -30,13 +35,13 @@ def test_the_study_names_every_protocol(protocols):
 def test_the_sets_of_a_vehicle(protocols, name):
     sets = protocols[name].sets
     prefix = "rack_" if name == "high_fidelity_vehicle" else ""
-    nominal = Scenario(f"{prefix}lane_change", 1.0, 1.0, "equilibrium", 20.0)
+    nominal = scenario(f"{prefix}lane_change", "equilibrium", 20.0)
     assert nominal in sets["test"]
     assert {s.start for s in sets["training"]} == {"equilibrium"}
     assert {18.0, 20.0, 22.0} <= {s.speed for s in sets["test"]}
     assert {s.start for s in sets["test"]} == {"equilibrium", "dropped"}
     shapes = ("lane_change", "step_steer", "straight_ahead", "sine_sweep")
-    assert {s.maneuver for s in sets["test"]} == {f"{prefix}{shape}" for shape in shapes}
+    assert {s.maneuver.name for s in sets["test"]} == {f"{prefix}{shape}" for shape in shapes}
     assert min(s.amplitude for s in sets["test"]) < 0.0
     trained = [s.frequency for s in sets["training"]]
     assert min(trained) < 0.7
@@ -47,17 +52,17 @@ def test_the_sets_of_a_vehicle(protocols, name):
 
 def test_no_run_stands_in_two_sets(protocols):
     for protocol in protocols.values():
-        runs = [same_run(s) for scenarios in protocol.sets.values() for s in scenarios]
+        runs = [s.run_key for scenarios in protocol.sets.values() for s in scenarios]
         assert len(set(runs)) == len(runs)
 
 
 def test_another_speed_is_a_state_and_the_own_speed_a_name():
     model = build(VEHICLES[0])
-    own = Scenario("lane_change", 1.0, 1.0, "dropped", 20.0)
+    own = scenario("lane_change", "dropped", 20.0)
     assert start_of(model, own) == "dropped"
-    faster = start_of(model, Scenario("lane_change", 1.0, 1.0, "dropped", 26.0))
+    faster = start_of(model, scenario("lane_change", "dropped", 26.0))
     assert isinstance(faster, np.ndarray)
-    run = training_run(model, Scenario("lane_change", 1.0, 1.0, "equilibrium", 26.0))
+    run = training_run(model, scenario("lane_change", "equilibrium", 26.0))
     speeds = run.at(np.array([0.0, 0.1])).outputs[:, model.outputs.index("longitudinal_speed")]
     np.testing.assert_allclose(speeds, 26.0, rtol=1e-3)
 
@@ -72,7 +77,7 @@ def test_full_order_rows_are_named_after_their_tolerances(protocols):
 def test_a_contestant_may_learn_from_some_maneuvers_only(protocols):
     for contestant in protocols[VEHICLES[1]].contestants:
         if contestant.label == "fixed basis":
-            assert {s.maneuver for s in contestant.training} == {"rack_lane_change"}
+            assert {s.maneuver.name for s in contestant.training} == {"rack_lane_change"}
             assert len(contestant.training) < len(protocols[VEHICLES[1]].sets["training"])
 
 

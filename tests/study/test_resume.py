@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from vehiclemor.files import TEMPORARY
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import TEMPORARY
 
 STUDY = """
 title = "for the tests"

@@ -49,12 +49,26 @@ def training_runs(
     factors
         (frequency, amplitude) factors of the policy `set`.
     """
+    pairs = policy_factors(maneuver, policy, factors)
+    return tuple(TrainingRun(model, maneuver.perturbed(*pair), start) for pair in pairs)
+
+
+def policy_factors(
+    maneuver: Maneuver, policy: str, factors: Sequence[tuple[float, float]] = ()
+) -> tuple[tuple[float, float], ...]:
+    """(frequency, amplitude) factors of the training runs of a policy for a test maneuver.
+
+    Raises
+    ------
+    InputError
+        If the policy is unknown, or `set` without factors.
+    """
     if policy == "matched":
-        return (TrainingRun(model, maneuver, start),)
+        return ((maneuver.frequency_factor, maneuver.amplitude_factor),)
     if policy == "nominal":
-        return (TrainingRun(model, maneuver.perturbed(), start),)
+        return ((1.0, 1.0),)
     if policy == "set":
         if not factors:
             raise InputError("the training policy 'set' needs training_set: pairs of factors")
-        return tuple(TrainingRun(model, maneuver.perturbed(f, a), start) for f, a in factors)
+        return tuple(factors)
     raise unknown("training policy", policy, POLICIES)

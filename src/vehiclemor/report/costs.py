@@ -9,8 +9,8 @@ from vehiclemor.models.report import baselines, printed_counts, printed_outputs,
 from vehiclemor.registry import component
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.printing import Row, fixed, power, table_text, wrapped
-from vehiclemor.report.timing import stored_timing
 from vehiclemor.simulation.build import build
+from vehiclemor.study.timing import timed_model
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +41,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
 
 def _timing(model: str, folder: Path) -> xr.Dataset:
     cases = timing_cases(component("model", model))
-    return stored_timing(build(model), cases, folder, f"timing-{model}")
+    return timed_model(build(model), cases, folder, f"timing-{model}")
 
 
 def _row(data: xr.Dataset, counts: list[str]) -> dict[str, object]:
@@ -87,13 +87,13 @@ def costs_text(model: str, folder: Path) -> str:
     errors: list[Row] = []
     starts = list(dict.fromkeys(table["start"]))
     for start in starts:
-        part = table[table["start"] == start]
         if len(starts) > 1:
             times.append(Row([f"start {start}"]))
             errors.append(Row([f"start {start}"]))
-        for row in part.to_dict(orient="records"):
-            times.append(Row(_times(row, list(counts))))
-            errors.append(Row(_errors(row, outputs)))
+        for row in table.to_dict(orient="records"):
+            if row["start"] == start:
+                times.append(Row(_times(row, list(counts))))
+                errors.append(Row(_errors(row, outputs)))
     heads = ["", "rank", "tol.", "us/run", "+-%", "ns/ point", *counts.values(), "x1", "x2"]
     found = [f"{label_of(output).short} error" for output in outputs]
     tails = ["", *found, "offline us", "break-even x1", "break-even x2"]

@@ -17,7 +17,10 @@ FILES = (
     "maneuvers.py",
     "steering_maneuvers.py",
     "metrics.py",
-    "study/execution.py",
+    "study/scenario.py",
+    "study/failure.py",
+    "study/evaluate.py",
+    "study/result.py",
 )
 
 
@@ -48,11 +51,11 @@ def machine() -> str:
 
 
 @cache
-def code_digest(model: str, method: str, further: tuple[str, ...] = ()) -> str:
-    """Hash of the source that computes a cell, and of further files.
+def code_digest(model: str, method: str) -> str:
+    """Hash of the source that computes a result.
 
     These are the layers of this package and, for a plug-in, all of its top-level package and its
-    version.  Results computed by other source are never taken for finished cells.
+    version.  Results computed by other source are never taken for finished ones.
     """
     parts = (component("model", model), component("method", method))
-    return source_digest(LAYERS, (*FILES, *further), parts)
+    return source_digest(LAYERS, FILES, parts)

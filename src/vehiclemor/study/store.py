@@ -1,20 +1,18 @@
-"""Result files: one netCDF-4 file for each cell, moved into place when complete."""
+"""Result files: one netCDF-4 file for each experiment, moved into place when complete."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.errors import FileError
+from vehiclemor.files import make_folder, remove_leftovers, temporary_path, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
     import xarray as xr
-
-TEMPORARY = ".partial-"
 
 
 def prepare_folder(folder: Path) -> None:
@@ -25,58 +23,31 @@ def prepare_folder(folder: Path) -> None:
     FileError
         If it is a file, or can't be made or written.
     """
-    try:
-        for part in ("cells", "studies"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-            probe = folder / part / f"{TEMPORARY}{os.getpid()}-probe"
+    for part in (folder / "cells", folder / "studies"):
+        make_folder(part)
+        probe = temporary_path(part / "probe")
+        try:
             probe.touch()
             probe.unlink()
-    except (FileExistsError, NotADirectoryError):
-        raise FileError(f"{folder}: not a folder") from None
-    except OSError as error:
-        raise FileError(f"{folder}: can't be written ({error.strerror})") from None
-    _remove_leftovers(folder / "cells")
-    _remove_leftovers(folder / "studies")
-
-
-def _remove_leftovers(folder: Path) -> None:
-    """Remove partial files of processes that are no more; finished files are never touched."""
-    for path in folder.glob(f"{TEMPORARY}*"):
-        process = path.name.removeprefix(TEMPORARY).split("-")[0]
-        if process.isdigit() and not _alive(int(process)):
-            path.unlink(missing_ok=True)
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
+        except OSError as error:
+            raise FileError(f"{folder}: can't be written ({error.strerror})") from None
+        remove_leftovers(part)
 
 
 def cell_path(folder: Path, key: str) -> Path:
-    """File of the cell with this key."""
+    """File of the experiment with this key."""
     return folder / "cells" / f"{key}.nc"
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a dataset under a temporary name, then move it into place.
+    """Write a dataset as a whole file.
 
     Raises
     ------
     FileError
         If the folder can't be written.
     """
-    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
-    try:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4")
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise FileError(f"{path}: can't be written ({error.strerror or error})") from None
+    write_whole(path, lambda temporary: dataset.to_netcdf(temporary, engine="netcdf4"))
 
 
 def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
@@ -100,12 +71,31 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     return dataset
 
 
-def up_to_date(path: Path, attribute: str, key: str) -> xr.Dataset | None:
-    """A result file of this package that was made for this key, if there is one."""
-    if not path.exists():
-        return None
-    dataset = read_dataset(path, "source", "vehiclemor")
-    return dataset if dataset.attrs.get(attribute) == key else None
+def stored(
+    path: Path,
+    attribute: str,
+    key: str,
+    make: Callable[[], xr.Dataset],
+    sources: Iterable[Path] = (),
+) -> xr.Dataset:
+    """What a file holds if it was made for this key, else what `make` gives, stored there.
+
+    Parameters
+    ----------
+    attribute
+        Global attribute that holds the key.
+    sources
+        Files that it was made from; if one of them is as new, it is made again.
+    """
+    if path.exists():
+        dataset = read_dataset(path, "source", "vehiclemor")
+        written = path.stat().st_mtime_ns
+        current = all(source.stat().st_mtime_ns < written for source in sources)
+        if current and dataset.attrs.get(attribute) == key:
+            return dataset
+    dataset = make().assign_attrs({attribute: key})
+    write_dataset(dataset, path)
+    return dataset
 
 
 def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarray]:

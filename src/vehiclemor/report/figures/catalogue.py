@@ -92,6 +92,16 @@ PARAMETERS = _FILE.parameters
 FIGURES: Mapping[str, Entry] = {entry.name: entry for entry in _FILE.figures}
 
 
+MOST_OUTPUTS = 4
+# Kind -> drawing, what its panels show, study, caption.
+OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
+    "histories": ("histories", "history", default_studies.nominal, "nominal run, as trained"),
+    "errors": ("histories", "error", default_studies.nominal, "errors of the nominal run"),
+    "map": ("error map", "", default_studies.perturbed, "errors at perturbed, untrained inputs"),
+    "pareto": ("pareto", "", default_studies.unseen, "error on unseen inputs over time"),
+}
+
+
 def find(name: str, results: Path) -> Entry:
     """The figure of that name: from the file, or one that every model has.
 
@@ -113,59 +123,22 @@ def find(name: str, results: Path) -> Entry:
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
         raise unknown("figure", name, [*FIGURES, *known])
-    return OF_A_MODEL[kind](model, results)
+    return _of_a_model(kind, model, results)
 
 
-def _histories(model: str, results: Path, content: str = "history") -> Entry:
-    outputs = list(printed_outputs(component("model", model)))[:4]
-    labels = default_studies.legend(model)
+def _of_a_model(kind: str, model: str, results: Path) -> Entry:
+    """One of the figures that every model has, of all registered methods."""
+    drawing, content, study, caption = OF_A_MODEL[kind]
+    outputs = list(printed_outputs(component("model", model)))[:MOST_OUTPUTS]
+    options: dict[str, object] = {"outputs": outputs, "methods": default_studies.legend(model)}
+    if drawing == "histories":
+        options |= {"rows": [content], "height": 1.4 + 1.8 * len(outputs)}
+    elif drawing == "error map":
+        options["values"] = True
     return Entry(
-        name=f"{'histories' if content == 'history' else 'errors'}-{model}",
-        draw="histories",
-        studies=[default_studies.nominal(model, results)],
-        caption=f"{model}: {content} of outputs in the nominal run that the methods are trained on",
-        options={
-            "outputs": outputs,
-            "methods": labels,
-            "rows": [content],
-            "height": 1.4 + 1.8 * len(outputs),
-        },
+        name=f"{kind}-{model}",
+        draw=drawing,
+        studies=[study(model, results)],
+        caption=f"{model}: {caption}",
+        options={} if drawing == "pareto" else options,
     )
-
-
-def _errors(model: str, results: Path) -> Entry:
-    return _histories(model, results, "error")
-
-
-def _map(model: str, results: Path) -> Entry:
-    labels = default_studies.legend(model)
-    shown = {label: text for label, text in labels.items() if label != "pod_literal"}
-    outputs = list(printed_outputs(component("model", model)))[:3]
-    return Entry(
-        name=f"map-{model}",
-        draw="error map",
-        studies=[default_studies.perturbed(model, results)],
-        caption=f"{model}: RMS errors over perturbations of the input, trained on the nominal one",
-        options={
-            "outputs": list(printed_outputs(component("model", model)))[:3],
-            "methods": shown,
-            "values": True,
-        },
-    )
-
-
-def _pareto(model: str, results: Path) -> Entry:
-    return Entry(
-        name=f"pareto-{model}",
-        draw="pareto",
-        studies=[default_studies.unseen(model, results)],
-        caption=f"{model}: worst error on unseen inputs as a multiple of its bound, and time",
-    )
-
-
-OF_A_MODEL: Mapping[str, Callable[[str, Path], Entry]] = {
-    "histories": _histories,
-    "errors": _errors,
-    "map": _map,
-    "pareto": _pareto,
-}

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PUBLISHED = "published RMS error"
 STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
 
 
@@ -57,6 +58,7 @@ def figure_histories(
     whole: bool = False,
     limits: Sequence[float] | None = None,
     height: float = 4.4,
+    columns: int = 4,
 ) -> Figure:
     """Rows of panels for each output, one column for each start.
 
@@ -79,18 +81,23 @@ def figure_histories(
         Of the axes of the largest errors.
     height
         Of the figure, in inches.
+    columns
+        Of the legend.
     """
-    ((_, dataset),) = results.items()
+    (dataset,) = results.values()
     dataset = dataset.sel(dict(place or {}))
     lines = _lines(dataset, methods)
     starts = [str(start) for start in dataset["start"].values]
     shape = len(outputs) * len(rows), len(starts)
     figure, axes = plt.subplots(*shape, sharex=True, squeeze=False, figsize=(6.7, height))
     ended: dict[str, str] = {}
-    for number, ((row, column), axis) in enumerate(np.ndenumerate(axes)):
-        content = rows[row % len(rows)]
-        output = outputs[row // len(rows)]
-        panel = Panel(dataset.sel(start=starts[column]), output, lines)
+    contents = [
+        (output, content, start) for output in outputs for content in rows for start in starts
+    ]
+    for number, (axis, (output, content, start)) in enumerate(
+        zip(axes.flat, contents, strict=True)
+    ):
+        panel = Panel(dataset.sel(start=start), output, lines)
         if content == "history":
             ended |= _draw_history(axis, panel, whole)
         elif content == "error":
@@ -99,7 +106,7 @@ def figure_histories(
             ended |= _draw_largest_errors(axis, panel, limits)
         for moment in marks:
             axis.axvline(moment, color="#999999", linewidth=0.8, linestyle=(0, (1, 3)))
-        several = f" {STARTS.get(starts[column], starts[column])}" if len(starts) > 1 else ""
+        several = f" {STARTS.get(start, start)}" if len(starts) > 1 else ""
         axis.set_title(letter(number) + several)
     last = float(dataset["time"][-1])
     for axis in axes[-1]:
@@ -109,22 +116,15 @@ def figure_histories(
     for text, color in ended.items():
         axes[0, 0].plot([], [], color=color, label=text, **CROSS)
     if "history" in rows and "largest error" in rows:
-        _published_line(axes[1, 0], axes[0, 0])
-    legend_above(figure, axes[0, 0], 4 if len(axes[0, 0].get_lines()) != 6 else 3)
+        # The legend is that of the first panel.
+        axes[0, 0].plot([], [], color="black", linestyle=":", label=PUBLISHED)
+    legend_above(figure, axes[0, 0], columns)
     return figure
 
 
 def _lines(dataset: xr.Dataset, methods: Mapping[str, str]) -> list[Line]:
     known = [method for method in methods if method in dataset["method"].values]
     return [Line(m, methods[m], style) for m, style in styles(known).items()]
-
-
-def _published_line(source: Axes, target: Axes) -> None:
-    """Name the line of the published errors in the legend of another panel."""
-    handles, labels = source.get_legend_handles_labels()
-    for handle, text in zip(handles, labels, strict=True):
-        if text.startswith("published"):
-            target.plot([], [], color="black", linestyle=handle.get_linestyle(), label=text)
 
 
 def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
@@ -201,8 +201,7 @@ def _draw_largest_errors(
             place = edges[missing[0]], largest[max(missing[0] - 1, 0)]
             axis.plot(*place, color=style["color"], **CROSS)
     if published:
-        text = "published RMS error"
-        axis.axhline(published.value, color="black", linestyle=":", label=text)
+        axis.axhline(published.value, color="black", linestyle=":", label=PUBLISHED)
     if limits:
         axis.set_ylim(*limits)
     axis.set_ylabel(error_label(dataset, "largest error", output).replace(" of ", "\nof "))
@@ -219,7 +218,7 @@ def _largest(error: xr.DataArray, period: float) -> tuple[np.ndarray, np.ndarray
 
 def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequence[float]) -> Figure:
     """Path in the plane from equilibrium, one panel for each length (m) that is shown."""
-    ((_, dataset),) = results.items()
+    (dataset,) = results.values()
     figure, axes = plt.subplots(len(shown), 1)
     for number, (axis, furthest) in enumerate(zip(axes, shown, strict=True)):
         for method, text, style in _lines(dataset, {"full_order": "full order", **methods}):
@@ -248,7 +247,7 @@ def figure_replayed_paths(
     beside_replay
         Whether a second panel shows what sets the reduced models apart from replay.
     """
-    ((_, dataset),) = results.items()
+    (dataset,) = results.values()
     panels, output = 2 if beside_replay else 1, "lateral_position"
     size = (6.7, 4.8 if beside_replay else 3.2)
     figure, axes = plt.subplots(panels, 1, sharex=True, squeeze=False, figsize=size)

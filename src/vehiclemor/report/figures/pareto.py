@@ -12,7 +12,7 @@ import numpy as np
 from vehiclemor.report.figures.lines import COLORS, Results, Style
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row
-from vehiclemor.study.protocol import FULL_ORDER
+from vehiclemor.study.plans.protocol import FULL_ORDER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

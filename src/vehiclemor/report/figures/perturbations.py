@@ -74,7 +74,7 @@ def figure_error_map(
         Write the error into each cell instead; the colours then leave the nominal input out,
         whose error is far below all others.
     """
-    ((_, dataset),) = results.items()
+    (dataset,) = results.values()
     shape = len(outputs), len(methods)
     size = ((3.35 if len(methods) < 4 else 2.4) * len(methods), 2.8 * len(outputs))
     figure, axes = plt.subplots(*shape, sharex=True, sharey=True, squeeze=False, figsize=size)
@@ -87,6 +87,7 @@ def figure_error_map(
         norm = LogNorm(float(np.nanmin(shown[shown > 0.0])), float(np.nanmax(shown)))
         assert norm.vmin is not None
         assert norm.vmax is not None
+        mesh = None
         for column, (method, found) in enumerate(errors.items()):
             axis = axes[row, column]
             cells = np.maximum(found, 0.5 * norm.vmin) if values else found
@@ -101,6 +102,7 @@ def figure_error_map(
             axis.grid(visible=False)
             axis.set_title(f"{letter(len(methods) * row + column)} {methods[method]}")
         axes[row, 0].set_ylabel("amplitude perturbation (%)")
+        assert mesh is not None
         extend, label = "min" if values else "neither", error_label(dataset, "RMS error", output)
         bar = figure.colorbar(mesh, ax=axes[row, :], label=label, extend=extend)
         if values:

@@ -18,8 +18,8 @@ from vehiclemor.report.default_studies import bounds
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.report.printing import Row as Printed
 from vehiclemor.report.printing import fixed, table_text
-from vehiclemor.report.timing import stored_timing
 from vehiclemor.simulation.build import build
+from vehiclemor.study.timing import timed_model
 
 
 def paper_terms_rows(models: Iterable[str], folder: Path) -> list[Row]:
@@ -46,7 +46,7 @@ def paper_terms_rows(models: Iterable[str], folder: Path) -> list[Row]:
 def _model_rows(name: str, folder: Path) -> list[Row]:
     model = build(name)
     cases, limits = list(paper_cases(component("model", name))), bounds(model)
-    dataset = stored_timing(model, cases, folder, f"paper-terms-{name}")
+    dataset = timed_model(model, cases, folder, f"paper-terms-{name}")
     rows = []
     for case in cases:
         if case.method == "full_order":

@@ -10,9 +10,9 @@ import numpy as np
 
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
-from vehiclemor.study.choice import scores
-from vehiclemor.study.protocol import FULL_ORDER
-from vehiclemor.study.protocol_file import ProtocolFile
+from vehiclemor.study.plans.choice import scores
+from vehiclemor.study.plans.protocol import FULL_ORDER
+from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.run import run_studies
 
 if TYPE_CHECKING:

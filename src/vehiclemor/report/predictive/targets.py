@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.study.protocol_file import ProtocolFile, Straight, Target
+from vehiclemor.study.plans.protocol_file import ProtocolFile, SpeedTarget, Straight
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,7 +82,7 @@ def _unit(dataset: xr.Dataset, output: str) -> str:
     return str(dataset["output_unit"].sel(output=output).item())
 
 
-def _ratio_row(target: Target, winner: Row, methods: list[Row]) -> Row:
+def _ratio_row(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:
     """Speed-up of the winner against a full-order row."""
     aim = f"; the aim is {target.aim:g}" if target.aim else ""
     if target.against == "equal accuracy":

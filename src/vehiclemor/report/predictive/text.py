@@ -10,7 +10,7 @@ from vehiclemor.report.predictive.paper_terms import paper_terms_text
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.report.printing import Row as Printed
 from vehiclemor.report.printing import fixed, short, table_text
-from vehiclemor.study.protocol import FULL_ORDER
+from vehiclemor.study.plans.protocol import FULL_ORDER
 
 if TYPE_CHECKING:
     import pandas as pd

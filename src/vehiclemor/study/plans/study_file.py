@@ -37,7 +37,7 @@ class StudyFile(FileSchema):
     """Schema of `data/studies/*.toml`.
 
     Either a grid of one model, or a collection that names other studies, or protocols (see
-    `study/protocol.py`).
+    `study/plans/protocol.py`).
     """
 
     title: str
@@ -51,6 +51,11 @@ class StudyFile(FileSchema):
     keep: Literal["trajectories", "metrics"] = "trajectories"
     grid: dict[str, list[int | float | str] | Span] = Field(default_factory=dict)
     methods: list[MethodEntry] = Field(default_factory=list)
+
+    @property
+    def labelled(self) -> dict[str, MethodEntry]:
+        """Label -> method of the study."""
+        return {entry.label or entry.method: entry for entry in self.methods}
 
     @field_validator("training_set")
     @classmethod

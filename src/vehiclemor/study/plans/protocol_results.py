@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.study.choice import Row, Validation
-from vehiclemor.study.protocol import Protocol
+from vehiclemor.study.plans.choice import Row, Validation
+from vehiclemor.study.plans.protocol import Protocol
 from vehiclemor.study.provenance import machine, versions
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def combined(
+def protocol_dataset(
     protocol: Protocol,
     rows: Sequence[Row],
     found: dict[str, list[xr.Dataset]],
@@ -68,7 +68,7 @@ def combined(
         "title": protocol.definition.title,
         "source": "vehiclemor",
         "references": "doi:10.1115/1.4029390",
-        "study": f"predictive-{protocol.name}",
+        "study": protocol.study,
         "model": protocol.model.name,
         "evaluations": protocol.model.evaluations,
         "configuration": protocol.definition.model_dump_json(),

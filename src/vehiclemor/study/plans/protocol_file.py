@@ -50,7 +50,7 @@ class ContestantEntry(FileSchema):
     train_on: list[str] = Field(default_factory=list)
 
 
-class Target(FileSchema):
+class SpeedTarget(FileSchema):
     """How many times faster than a full-order integrator the winner must be."""
 
     # `equal accuracy`, `within bounds`, or the label of a full-order row.
@@ -80,5 +80,5 @@ class ProtocolFile(FileSchema):
     test: list[Group] = Field(min_length=1)
     outside: list[Group] = Field(default_factory=list)
     contestants: list[ContestantEntry] = Field(min_length=1)
-    targets: list[Target] = Field(default_factory=list)
+    targets: list[SpeedTarget] = Field(default_factory=list)
     straight: Straight | None = None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.study.cells import Grid
+from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.store import cell_path, read_arrays, read_dataset
 
@@ -37,7 +37,7 @@ def cells_digest(grid: Grid) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
-def combined(grid: Grid, folder: Path) -> xr.Dataset:
+def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
     """Read all cells of a grid and put them together.
 
     Raises
@@ -83,8 +83,7 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
         "references": "doi:10.1115/1.4029390",
         "study": grid.name,
         "model": cell.model,
-        "training": cell.training,
-        "cells": cells_digest(grid),
+        "training": grid.definition.training,
         "configuration": json.dumps(grid.definition.model_dump(), sort_keys=True),
         "kernel_hash": cell.kernel,
         "versions": versions(),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.study.protocol import Contestant
-from vehiclemor.study.protocol_file import Bound
+from vehiclemor.study.plans.protocol import Contestant
+from vehiclemor.study.plans.protocol_file import Bound
 
 if TYPE_CHECKING:
     import xarray as xr

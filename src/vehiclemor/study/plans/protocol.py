@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vehiclemor.errors import FileError, InputError
+from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Value, validated
 from vehiclemor.registry import component, unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.protocol_file import ContestantEntry, Group, ProtocolFile
-from vehiclemor.study.scenarios import Scenario, check, own_speed, same_run
+from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
+from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
+from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml
 
 SETS = ("training", "validation", "test", "outside")
 FULL_ORDER = "full order"
-Settings = dict[str, Value]
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,11 @@ class Contestant:
     role: str
     candidates: tuple[Settings, ...]
     training: tuple[Scenario, ...]
+
+    def experiment(self, model: Model, candidate: int, test: tuple[Scenario, ...]) -> Experiment:
+        """A candidate, tested on some scenarios."""
+        settings = self.candidates[candidate]
+        return make_experiment(model, self.method, settings, self.training, test, "errors")
 
     @property
     def row_labels(self) -> list[str]:
@@ -62,6 +67,11 @@ class Protocol:
     model: Model
     sets: dict[str, tuple[Scenario, ...]]
     contestants: tuple[Contestant, ...]
+
+    @property
+    def study(self) -> str:
+        """Name of its results."""
+        return f"predictive-{self.name}"
 
 
 def load_protocol(protocol: str) -> Protocol:
@@ -108,27 +118,31 @@ def _resolved(name: str, definition: ProtocolFile) -> Protocol:
 
 
 def _scenarios(model: Model, key: str, groups: list[Group]) -> tuple[Scenario, ...]:
-    """Scenarios of one set, checked against the model and each once."""
+    """Scenarios of one set, checked against the model."""
     found: list[Scenario] = []
     for number, group in enumerate(groups, start=1):
-        speeds = group.speed or [own_speed(model)]
-        products = itertools.product(group.frequency or [1.0], group.amplitude or [1.0], speeds)
-        for point in group.points or products:
-            speed = point[2] if len(point) > 2 else own_speed(model)
-            for start in group.start or model.starts[:1]:
-                scenario = Scenario(
-                    group.maneuver,
-                    float(point[0] or 0.0),
-                    float(point[1] or 0.0),
-                    start,
-                    None if speed is None else float(speed),
-                )
-                try:
-                    check(model, scenario)
-                except InputError as error:
-                    raise InputError(f"{key}, group {number}: {error}") from None
-                found.append(scenario)
+        try:
+            found += _of_group(model, group)
+        except InputError as error:
+            raise InputError(f"{key}, group {number}: {error}") from None
     return tuple(found)
+
+
+def _of_group(model: Model, group: Group) -> list[Scenario]:
+    """Every point of a group from every start."""
+    maneuver: Maneuver = component("maneuver", group.maneuver)
+    own = own_speed(model)
+    speeds = group.speed or [own]
+    products = itertools.product(group.frequency or [1.0], group.amplitude or [1.0], speeds)
+    found: list[Scenario] = []
+    for point in group.points or products:
+        frequency, amplitude, speed = (*point, own)[:3]
+        perturbed = maneuver.perturbed(frequency or 0.0, amplitude or 0.0)
+        for start in group.start or model.starts[:1]:
+            scenario = Scenario(perturbed, start, None if speed is None else float(speed))
+            check(model, scenario)
+            found.append(scenario)
+    return found
 
 
 def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
@@ -136,7 +150,7 @@ def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
     seen: dict[tuple, str] = {}
     for key in SETS:
         for scenario in sets[key]:
-            run = same_run(scenario)
+            run = scenario.run_key
             if run in seen:
                 raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
             seen[run] = key
@@ -150,23 +164,17 @@ def _contestant(
     candidates: list[Settings] = []
     for given in entry.candidates:
         settings: dict[str, object] = dict(given)
-        preset = settings.pop("preset", "recommended")
-        complete: Settings = {}
-        # A refused model is a result: settings for a model of another kind can't be judged here.
-        if method.accepts(model)[0]:
-            presets = method.presets(model)
-            if preset not in presets:
-                raise unknown(f"preset of {entry.method}", preset, presets)
-            defaults = presets[str(preset)]
-            complete = validated(entry.method, method.settings(model.kind), settings, defaults)
+        preset = str(settings.pop("preset", "recommended"))
+        complete = complete_settings(model, entry.method, settings, preset)
+        # Of a method that refuses the model all candidates are empty.
         if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)
-    known = {scenario.maneuver for scenario in sets["training"]}
+    known = {scenario.maneuver.name for scenario in sets["training"]}
     for name in entry.train_on:
         if name not in known:
             raise unknown(f"maneuver in the training of {where}", name, known)
     training = tuple(
-        s for s in sets["training"] if not entry.train_on or s.maneuver in entry.train_on
+        s for s in sets["training"] if not entry.train_on or s.maneuver.name in entry.train_on
     )
     return Contestant(entry.label, entry.method, entry.role, tuple(candidates), training)

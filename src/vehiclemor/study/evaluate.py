@@ -1,0 +1,163 @@
+"""Evaluating experiments: fit on the training, simulate the tests.  Failures are results."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.errors import ConvergenceError
+from vehiclemor.metrics import rms
+from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.study.experiment import Experiment, Keep, Settings
+from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
+from vehiclemor.study.scenario import Scenario, start_of, training_run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# How a fitted model is integrated: experiments that differ in these alone are fitted once.
+ONLINE = ("solver", "tolerance")
+
+
+def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
+    """Labelled result of an experiment, whatever becomes of it.
+
+    Parameters
+    ----------
+    model
+        The model that the experiment was made with.  By default it is built from the registry, and
+        what was fitted and solved for other experiments is used again.
+
+    Returns
+    -------
+    xarray.Dataset
+        As the experiment keeps it, see `study/result.py`.  Where nothing could be computed the
+        values are missing, and `status` and `message` tell why.
+    """
+    kept = model is None
+    model = model or model_of(experiment)
+    refused = refusal(model, experiment)
+    reduced = refused or (kept_fit if kept else fresh_fit)(model, experiment)
+    solve = kept_reference if kept else reference_run
+    outcomes: list[Outcome | Failure] = []
+    for scenario in experiment.test:
+        outcome = refused or attempt(partial(solve, model, scenario), "the full-order reference: ")
+        if isinstance(outcome, Trajectory):
+            outcome = _tested(model, reduced, scenario, outcome, experiment.keep)
+        outcomes.append(outcome)
+    if experiment.keep == "errors":
+        return errors_dataset(model, experiment, outcomes, reduced)
+    return metrics_dataset(model, experiment, outcomes[0], reduced)
+
+
+def model_of(experiment: Experiment) -> Model:
+    """The model of an experiment; kept, since all experiments of a study share it."""
+    return _built(experiment.model, json.dumps(experiment.parameters, sort_keys=True))
+
+
+@lru_cache(maxsize=16)
+def _built(name: str, parameters: str) -> Model:
+    return build(name, overrides=json.loads(parameters))
+
+
+def refusal(model: Model, experiment: Experiment) -> Failure | None:
+    """Why the method can't reduce the model with these settings, if it can't."""
+    method: Method = component("method", experiment.method)
+    accepted, reason = method.accepts(model)
+    if not accepted:
+        return Failure("rejected", reason)
+    return attempt(lambda: method.check(model, experiment.settings))
+
+
+def reference_run(model: Model, scenario: Scenario) -> Trajectory:
+    """Full-order solution at the model's default tolerance."""
+    trajectory = model.simulate(scenario.maneuver, start_of(model, scenario))
+    if trajectory.status != "ok":
+        raise ConvergenceError(trajectory.message)
+    return trajectory
+
+
+# More than the scenarios of any protocol, each of which is simulated with every candidate.
+kept_reference = lru_cache(maxsize=128)(reference_run)
+
+
+def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
+    """Fit the method on the training scenarios, and on nothing else."""
+    return _fitted(model, experiment.method, experiment.settings, experiment.training)
+
+
+def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
+    """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
+    settings = experiment.settings
+    online = {name: value for name, value in settings.items() if name in ONLINE}
+    declared = component("method", experiment.method).settings(model.kind)
+    common = settings | {name: declared[name].default for name in online}
+    text = json.dumps(common, sort_keys=True)
+    fitted: Any = _kept_fit(model, experiment.method, text, experiment.training)
+    if isinstance(fitted, Failure) or not online:
+        return fitted
+    if not all(hasattr(fitted, name) for name in online):
+        return fresh_fit(model, experiment)
+    return replace(fitted, **online)
+
+
+@lru_cache(maxsize=64)
+def _kept_fit(
+    model: Model, method: str, settings: str, training: tuple[Scenario, ...]
+) -> ReducedModel | Failure:
+    return _fitted(model, method, json.loads(settings), training)
+
+
+def _fitted(
+    model: Model, method_name: str, settings: Settings, training: tuple[Scenario, ...]
+) -> ReducedModel | Failure:
+    method: Method = component("method", method_name)
+
+    def fit() -> ReducedModel:
+        runs = [training_run(model, scenario) for scenario in training]
+        return method.fit(model, runs, settings)
+
+    return attempt(fit)
+
+
+def _tested(
+    model: Model,
+    reduced: ReducedModel | Failure,
+    scenario: Scenario,
+    reference: Trajectory,
+    keep: Keep,
+) -> Outcome | Failure:
+    """One test scenario, simulated with the reduced model."""
+    if isinstance(reduced, Failure):
+        return reduced
+
+    def run() -> Outcome:
+        start = start_of(model, scenario)
+        if keep == "errors":
+            return Outcome(_finite(reduced.simulate(scenario.maneuver, start)), reference)
+        # The first run loads machine code and warms caches, the second is timed.
+        reduced.simulate(scenario.maneuver, start)
+        trajectory = _finite(reduced.simulate(scenario.maneuver, start))
+        nearest = reduced.best_approximation(reference.states)
+        if nearest is None:
+            return Outcome(trajectory, reference)
+        floor = rms(model.outputs_at(nearest, reference.inputs) - reference.outputs)
+        return Outcome(trajectory, reference, floor)
+
+    return attempt(run)
+
+
+def _finite(trajectory: Trajectory) -> Trajectory:
+    """The trajectory; what ends without complaint, but in values that are no numbers, diverged."""
+    if trajectory.status != "ok" or np.isfinite(trajectory.outputs).all():
+        return trajectory
+    return replace(trajectory, status="diverged", message="an output is not finite")

@@ -1,0 +1,148 @@
+"""Grids: every combination of a study file's values, each an experiment with one test scenario."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Method
+from vehiclemor.registry import component, unknown
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
+from vehiclemor.study.plans.study_file import FACTORS, StudyFile, values
+from vehiclemor.study.scenario import Scenario, check, training_scenarios
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Experiments of a study on its dimensions.
+
+    Attributes
+    ----------
+    dimensions
+        Name -> values of every grid dimension, the labels of `method` last.
+    cells
+        Place in the grid (one index per dimension) -> experiment.  A dimension that does not
+        concern a method has the same experiment at all of its places.
+    """
+
+    name: str
+    definition: StudyFile
+    dimensions: dict[str, list[Any]]
+    cells: dict[tuple[int, ...], Experiment]
+
+    @property
+    def unique(self) -> dict[str, Experiment]:
+        """Key -> experiment, each once, in grid order."""
+        return {cell.key: cell for cell in self.cells.values()}
+
+
+def expand(name: str, study: StudyFile) -> Grid:
+    """All experiments of a study.
+
+    Raises
+    ------
+    FileError
+        If the study names something unknown or a setting does not fit.
+    """
+    try:
+        model = build(study.model)
+        declared = _declared_settings(model, study)
+        dimensions = _dimensions(model, study, set().union(*declared.values()))
+        return Grid(name, study, dimensions, _cells(model, study, dimensions, declared))
+    except InputError as error:
+        raise FileError(f"study {name}: {error}") from None
+
+
+def _declared_settings(model: Model, study: StudyFile) -> dict[str, set[str]]:
+    """Label of a method -> names of its settings."""
+    found: dict[str, set[str]] = {}
+    for label, entry in study.labelled.items():
+        method: Method = component("method", entry.method)
+        found[label] = set(method.settings(model.kind))
+    return found
+
+
+def _dimensions(model: Model, study: StudyFile, settings: set[str]) -> dict[str, list[Any]]:
+    """Name -> values of every dimension, checked."""
+    for dimension in study.grid:
+        if dimension not in settings and dimension not in FACTORS:
+            raise unknown("grid dimension", dimension, settings | set(FACTORS))
+    dimensions: dict[str, list[Any]] = {factor: [1.0] for factor in FACTORS}
+    dimensions |= {key: values(entry) for key, entry in study.grid.items()}
+    dimensions["start"] = list(study.start or [model.starts[0]])
+    if len(set(dimensions["start"])) != len(dimensions["start"]):
+        raise InputError("start has the same value twice")
+    dimensions["method"] = list(study.labelled)
+    return dimensions
+
+
+def _cells(
+    model: Model,
+    study: StudyFile,
+    dimensions: Mapping[str, list[Any]],
+    declared: Mapping[str, set[str]],
+) -> dict[tuple[int, ...], Experiment]:
+    """Place -> experiment; each is made once."""
+    name = study.maneuver or component("model", study.model).maneuver
+    maneuver: Maneuver = component("maneuver", name)
+    tests = _tests(model, study, maneuver, dimensions)
+    cells: dict[tuple[int, ...], Experiment] = {}
+    made: dict[tuple[Any, ...], Experiment] = {}
+    for place in itertools.product(*(range(len(v)) for v in dimensions.values())):
+        point = {d: dimensions[d][i] for d, i in zip(dimensions, place, strict=True)}
+        label = point["method"]
+        entry = study.labelled[label]
+        given = dict(entry.settings)
+        given |= {d: point[d] for d in study.grid if d in declared[label]}
+        run = tuple(point[d] for d in (*FACTORS, "start"))
+        identity = (label, run, *given.values())
+        if identity not in made:
+            settings = complete_settings(model, entry.method, given, entry.preset)
+            training, test = tests[run]
+            made[identity] = make_experiment(
+                model, entry.method, settings, training, (test,), study.keep
+            )
+        cells[place] = made[identity]
+    for label in study.labelled:
+        _some_fits(model, [cell for key, cell in made.items() if key[0] == label])
+    return cells
+
+
+def _tests(
+    model: Model, study: StudyFile, maneuver: Maneuver, dimensions: Mapping[str, list[Any]]
+) -> dict[tuple[Any, ...], tuple[tuple[Scenario, ...], Scenario]]:
+    """Factors and start -> training and test scenarios."""
+    pairs = [(pair[0], pair[1]) for pair in study.training_set]
+    found: dict[tuple[Any, ...], tuple[tuple[Scenario, ...], Scenario]] = {}
+    for run in itertools.product(*(dimensions[d] for d in (*FACTORS, "start"))):
+        test = Scenario(maneuver.perturbed(*run[:-1]), run[-1])
+        check(model, test)
+        found[run] = training_scenarios(test, study.training, pairs), test
+    return found
+
+
+def _some_fits(model: Model, cells: list[Experiment]) -> None:
+    """Raise the first error if no cell of a method has settings that fit the model.
+
+    Corners of a grid may not fit, such as a rank above the number of snapshots; if nothing does,
+    the study is wrong.
+    """
+    first: InputError | None = None
+    for cell in cells:
+        method: Method = component("method", cell.method)
+        if not method.accepts(model)[0]:
+            return
+        try:
+            method.check(model, cell.settings)
+        except InputError as error:
+            first = first or error
+        else:
+            return
+    if first is not None:
+        raise first

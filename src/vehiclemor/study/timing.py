@@ -1,0 +1,256 @@
+"""The timing pass: runs interleaved in one process, medians of rounds, stored by content.
+
+Seconds stored with the results of a study are measured while others run beside them; a speed-up is
+quoted from this pass only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.report import TimingCase
+from vehiclemor.reduction.interface import ReducedModel
+from vehiclemor.registry import component
+from vehiclemor.simulation.clock import repeated
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
+from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
+from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.provenance import machine, versions
+from vehiclemor.study.scenario import Scenario, start_of
+from vehiclemor.study.store import prepare_folder, stored
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Rounds of a cost table, and of the test set of a protocol, which has many runs.
+CASE_ROUNDS, PROTOCOL_ROUNDS = 41, 7
+# Of each short run one after the other; the first warms the caches, as long ones do themselves.
+REPEATS, LONG_RUN = 4, 2e-3
+# Fits whose median counts, as long as they take no more than these seconds together; and the length
+# (s) of a fit beside which loading machine code is nothing.
+FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 10.0
+# Variable -> case against which it is the speed-up, and in words.
+SPEED_UPS = {
+    "speed_up": ("baseline", "against the paper's kind of baseline, median of rounds"),
+    "speed_up_strongest": ("strongest", "against the strongest full order, median"),
+}
+
+
+def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: str) -> xr.Dataset:
+    """Stored timing of cases on the model's nominal maneuver, from every start.
+
+    Measured first if it is missing or out of date.
+
+    Parameters
+    ----------
+    name
+        Of the file in the folder `studies`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `timed_cases`, on the dimension `start` too.
+    """
+    maneuver: Maneuver = component("maneuver", component("model", model.name).maneuver)
+    experiments = {start: case_experiments(model, cases, maneuver, start) for start in model.starts}
+    prepare_folder(folder)
+    content = [
+        [[start, case.id, case.label, made[case.id].key] for case in cases]
+        for start, made in experiments.items()
+    ]
+
+    def measure() -> xr.Dataset:
+        import xarray as xr
+
+        parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
+        return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
+
+    return stored_timing(folder, name, [content, CASE_ROUNDS], measure)
+
+
+def stored_timing(
+    folder: Path, name: str, content: object, measure: Callable[[], xr.Dataset]
+) -> xr.Dataset:
+    """What the file `studies/<name>.nc` holds for this content and machine, or else is measured."""
+    text = json.dumps([content, machine(), REPEATS])
+    key = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return stored(folder / "studies" / f"{name}.nc", "timing", key, measure)
+
+
+def case_experiments(
+    model: Model, cases: Sequence[TimingCase], maneuver: Maneuver, start: str
+) -> dict[str, Experiment]:
+    """Id of a case -> its experiment, trained on the unperturbed run."""
+    nominal = (Scenario(maneuver.perturbed(), start),)
+    test = (Scenario(maneuver, start),)
+    found: dict[str, Experiment] = {}
+    for case in cases:
+        settings = complete_settings(model, case.method, case.settings, case.preset)
+        found[case.id] = make_experiment(model, case.method, settings, nominal, test, "metrics")
+    return found
+
+
+def timed_cases(
+    model: Model,
+    cases: Sequence[TimingCase],
+    maneuver: Maneuver,
+    start: str,
+    rounds: int | None = None,
+) -> xr.Dataset:
+    """Time the cases on one run of the model.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimension `case` (ids, with `label`): median and quartiles of the seconds of a run,
+        seconds for a time point, speed-ups against the cases `baseline` and `strongest`, offline
+        seconds, counts, rank, status; errors on `output` too.
+    """
+    import xarray as xr
+
+    experiments = case_experiments(model, cases, maneuver, start)
+    kept = ["effective_rank", "offline_evaluations", "rms_error", "status", *model.counts]
+    results = [evaluate(experiment)[kept] for experiment in experiments.values()]
+    dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop")
+    dataset = dataset.drop_vars("output_unit")
+    seconds, offline = _measured(list(experiments.values()), rounds or CASE_ROUNDS)
+    dataset = dataset.assign_coords(case=list(experiments)).merge(
+        _seconds_dataset(list(experiments), seconds, offline).isel(scenario=0, drop=True)
+    )
+    tolerances = [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()]
+    columns: dict[str, tuple] = {
+        "seconds_per_sample": (dataset["seconds"].values / maneuver.samples, "s", "a time point"),
+        "tolerance": (tolerances, "1", "tolerance of the solver"),
+    }
+    for name, (against, text) in SPEED_UPS.items():
+        if against in experiments:
+            ratios = _speed_up(seconds[:, :, 0], list(experiments).index(against))
+            columns[name] = (ratios, "1", text)
+    for name, (values, unit, text) in columns.items():
+        dataset[name] = ("case", values, {"units": unit, "long_name": text})
+    dataset = dataset.assign_coords(start=start, label=("case", [case.label for case in cases]))
+    title = f"timing of {model.name}, interleaved, {len(seconds)} rounds"
+    attributes = _attributes(model, f"{title}, {maneuver.samples} time points")
+    return dataset.assign_attrs(attributes)
+
+
+def timed_tests(
+    experiments: Mapping[str, Experiment], finished: np.ndarray, rounds: int | None = None
+) -> xr.Dataset:
+    """Time experiments on their test scenarios, which are the same for all.
+
+    Parameters
+    ----------
+    finished
+        Whether a run is timed (experiments, scenarios): one that has failed is not.
+
+    Returns
+    -------
+    xarray.Dataset
+        `seconds` with quartiles on `case` and `scenario`, missing where a run is not timed;
+        `offline_seconds` on `case`.
+    """
+    seconds, offline = _measured(list(experiments.values()), rounds or PROTOCOL_ROUNDS, finished)
+    dataset = _seconds_dataset(list(experiments), seconds, offline)
+    first = next(iter(experiments.values()))
+    dataset = dataset.assign_coords(scenario=[scenario.label for scenario in first.test])
+    title = f"timing of {first.model}, test set, interleaved, {len(seconds)} rounds"
+    return dataset.assign_attrs(_attributes(model_of(first), title))
+
+
+def _seconds_dataset(ids: list[str], seconds: np.ndarray, offline: list[float]) -> xr.Dataset:
+    """Median and quartiles of rounds (rounds, cases, scenarios)."""
+    import xarray as xr
+
+    text = f"median of {len(seconds)} rounds, in the compiled loop"
+    found = {
+        "seconds": (0.5, text),
+        "seconds_lower": (0.25, "lower quartile"),
+        "seconds_upper": (0.75, "upper quartile"),
+    }
+    variables: dict[str, tuple] = {
+        name: (
+            ("case", "scenario"),
+            np.quantile(seconds, share, axis=0),
+            {"units": "s", "long_name": text},
+        )
+        for name, (share, text) in found.items()
+    }
+    text = "training simulations and fit"
+    variables["offline_seconds"] = ("case", offline, {"units": "s", "long_name": text})
+    return xr.Dataset(variables, {"case": ids})
+
+
+def _attributes(model: Model, title: str) -> dict[str, str]:
+    return {
+        "title": title,
+        "source": "vehiclemor",
+        "model": model.name,
+        "machine": machine(),
+        "versions": versions(),
+        "kernel_hash": model.kernel_hash,
+    }
+
+
+def _speed_up(seconds: np.ndarray, against: int) -> np.ndarray:
+    """Speed-up of every case (cases,) from its rounds (rounds, cases)."""
+    # Round by round, so that a burst of other load on the machine hits both alike.
+    own = np.where(seconds > 0.0, seconds, np.nan)
+    return np.median(seconds[:, [against]] / own, axis=0)
+
+
+def _measured(
+    experiments: Sequence[Experiment], rounds: int, finished: np.ndarray | None = None
+) -> tuple[np.ndarray, list[float]]:
+    """Seconds of runs (rounds, experiments, scenarios), NaN where one fails, and of fits.
+
+    All runs of a round follow one another, so that load on the machine hits all alike.
+    """
+    model = model_of(experiments[0])
+    shape = (len(experiments), len(experiments[0].test))
+    timed = np.ones(shape, dtype=bool) if finished is None else finished.copy()
+    fits = [_warm_fit(model, e, timed[index].any()) for index, e in enumerate(experiments)]
+    runs = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
+    seconds = np.full((rounds + 1, *shape), np.nan)
+    for turn in range(rounds + 1):
+        for place, (maneuver, start) in enumerate(runs):
+            for index, (reduced, _) in enumerate(fits):
+                if reduced is None or not timed[index, place]:
+                    continue
+                # The first round loads machine code, warms caches, and tells how long a run takes.
+                short = turn > 0 and seconds[0, index, place] < LONG_RUN
+                with repeated(REPEATS if short else 1):
+                    run = attempt(partial(reduced.simulate, maneuver, start))
+                if isinstance(run, Failure):
+                    timed[index, place] = False
+                else:
+                    seconds[turn, index, place] = run.seconds
+    return seconds[1:], [offline for _, offline in fits]
+
+
+def _warm_fit(
+    model: Model, experiment: Experiment, needed: bool
+) -> tuple[ReducedModel | None, float]:
+    """A fitted model, and the median seconds of fits that found their machine code loaded."""
+    fitted = kept_fit(model, experiment)
+    if isinstance(fitted, Failure):
+        return None, np.nan
+    if not needed or fitted.offline.seconds > LONG_FIT:
+        return fitted, fitted.offline.seconds
+    seconds: list[float] = []
+    while len(seconds) < FITS and sum(seconds) < FIT_SECONDS:
+        again = fresh_fit(model, experiment)
+        if isinstance(again, Failure):
+            return None, np.nan
+        seconds.append(again.offline.seconds)
+        fitted = again
+    return fitted, float(np.median(seconds))
