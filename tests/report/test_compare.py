@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from vehiclemor.report.comparison.paper import paper_comparison
-from vehiclemor.report.comparison.row import COLUMNS
 
 from vehiclemor.cli import main
 from vehiclemor.report import errors, tables
-from vehiclemor.report.costs import cost_table, costs_text
+from vehiclemor.report.comparison.paper import paper_comparison
+from vehiclemor.report.comparison.row import COLUMNS
+from vehiclemor.report.comparison.times import slower_row, time_rows
+from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.published import load_published
 from vehiclemor.report.regenerate import regenerate_figures
@@ -117,6 +118,24 @@ def test_time_of_a_vehicle_stands_beside_both_baselines(rows, model):
             assert words in reason
 
 
+def test_rows_are_found_whatever_their_labels_and_order(results_folder):
+    published = load_published()
+
+    def found(change):
+        rows = []
+        for number in published.numbers.values():
+            if number.kind == "time_reduction":
+                rows += time_rows(number, change(cost_table(number.model, results_folder)))
+        claim = published.claims["dw_fig14_six_slower_than_three"]
+        costs = change(cost_table("double_wishbone", results_folder))
+        rows.append(slower_row(claim, costs, few=3, many=6))
+        return {row.item: (row.model, row.reproduced, row.verdict, row.reason) for row in rows}
+
+    plain = found(lambda table: table)
+    assert len(plain) == 4 + 4 + 2 + 1 + 1
+    assert found(lambda table: table.assign(label="renamed").iloc[::-1]) == plain
+
+
 def test_costs_are_consistent(results_folder):
     table = cost_table("double_wishbone", results_folder).set_index("case")
     newton, strongest = table.loc["baseline"], table.loc["strongest"]
@@ -184,6 +203,7 @@ def test_command_prints_json_and_says_that_bounds_are_missed(results_folder, cap
 def test_command_prints_a_table_with_costs(results_folder, capsys):
     main(["compare", "--out", str(results_folder)])
     printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 100
     for word in ("published", "reproduced", "floor", "replay", "verdict", "break-even", "missed"):
         assert word in printed
     assert "never published" in printed

@@ -41,7 +41,7 @@ LABELS = {
 def label_of(output: str) -> Label:
     """The label of an output; of one that has no symbol its name in words."""
     words = output.replace("_", " ")
-    return LABELS.get(output, Label(words, words, output))
+    return LABELS.get(output, Label(words, words, words))
 
 
 def unit_of(dataset: xr.Dataset, output: str) -> str:

@@ -67,6 +67,7 @@ def table_text(headings: Sequence[str], rows: Iterable[Row], last_left: bool = F
 def _widths(headings: Sequence[str], rows: Sequence[Row]) -> list[int]:
     """Widths of the columns: headings are wrapped by words, cells are not but in the first."""
     widths = [max(map(len, heading.split()), default=0) for heading in headings]
+    widths[0] = len(headings[0])
     for row in rows:
         for index, cell in enumerate(row.cells):
             widths[index] = max(widths[index], len(cell))

@@ -96,7 +96,7 @@ MOST_OUTPUTS = 4
 # Kind -> drawing, what its panels show, study, caption.
 OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
     "histories": ("histories", "history", default_studies.nominal, "nominal run, as trained"),
-    "errors": ("histories", "error", default_studies.nominal, "errors of the nominal run"),
+    "errors": ("histories", "largest error", default_studies.nominal, "errors of the nominal run"),
     "map": ("error map", "", default_studies.perturbed, "errors at perturbed, untrained inputs"),
     "pareto": ("pareto", "", default_studies.unseen, "error on unseen inputs over time"),
 }
@@ -130,11 +130,13 @@ def _of_a_model(kind: str, model: str, results: Path) -> Entry:
     """One of the figures that every model has, of all registered methods."""
     drawing, content, study, caption = OF_A_MODEL[kind]
     outputs = list(printed_outputs(component("model", model)))[:MOST_OUTPUTS]
-    options: dict[str, object] = {"outputs": outputs, "methods": default_studies.legend(model)}
+    methods = default_studies.legend(model)
+    options: dict[str, object] = {"outputs": outputs, "methods": methods}
     if drawing == "histories":
         options |= {"rows": [content], "height": 1.4 + 1.8 * len(outputs)}
     elif drawing == "error map":
         options["values"] = True
+        options["methods"] = {k: text for k, text in methods.items() if k != "pod_literal"}
     return Entry(
         name=f"{kind}-{model}",
         draw=drawing,

@@ -125,8 +125,8 @@ def _write(
     for (j, i), value in np.ndenumerate(values):
         if np.isnan(value):
             continue
-        digits = f"{value:.1g}" if value < 1e-3 else f"{value:#.2g}"
+        digits = f"{value:#.2g}" if 1e-3 <= value < 100.0 else f"{value:.1g}"
         place = float(frequency[i]), float(amplitude[j])
         color = "white" if value < dark else "black"
         style: Style = {"ha": "center", "va": "center", "fontsize": 5.5, "color": color}
-        axis.text(*place, digits.replace("e-0", "e-"), **style)
+        axis.text(*place, digits.replace("e-0", "e-").replace("e+0", "e"), **style)

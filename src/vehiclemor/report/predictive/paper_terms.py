@@ -90,6 +90,6 @@ def paper_terms_text(rows: list[Row]) -> str:
                 cells = [f"  {row['method']}", fixed(1e6 * row["seconds"], 1)]
                 cells += [fixed(row[f"ratio_{name}"]) for name in ("same_integrator", "strongest")]
                 printed.append(Printed(cells, f"worst RMS errors: {errors}"))
-    heading = "fastest variant within the published errors"
+    heading = "fastest variant within the bounds"
     title = "The paper's own terms: its rank and control period, trained on the run shown"
     return f"{title}\n{table_text([heading, 'us', 'x same', 'x best'], printed)}"
