@@ -129,7 +129,7 @@ def test_rows_are_found_whatever_their_labels_and_order(results_folder):
         claim = published.claims["dw_fig14_six_slower_than_three"]
         costs = change(cost_table("double_wishbone", results_folder))
         rows.append(slower_row(claim, costs, few=3, many=6))
-        return {row.item: (row.model, row.reproduced, row.verdict, row.reason) for row in rows}
+        return {(row.model, row.item): (row.reproduced, row.verdict, row.reason) for row in rows}
 
     plain = found(lambda table: table)
     assert len(plain) == 4 + 4 + 2 + 1 + 1

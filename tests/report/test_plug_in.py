@@ -1,13 +1,18 @@
 """A plug-in's model gets what a built-in one has, from its declaration alone."""
 
 import json
+from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.models.report import paper_cases, tabled_outputs, timing_cases
 from vehiclemor.registry import component
+from vehiclemor.report.default_studies import legend, nominal, unseen
+from vehiclemor.report.errors import study_tables
 from vehiclemor.report.tables import model_tables
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
@@ -80,6 +85,20 @@ def test_figures_are_those_of_every_model(folder, tmp_path, capsys):
     written = capsys.readouterr().out.split()
     assert written == [str(tmp_path / f"figure-{n}.{s}") for n in names for s in ("svg", "png")]
     assert all(np.fromfile(path, dtype=np.uint8).size > 10_000 for path in written)
+
+
+def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
+    real = registry._entries
+    known = real("method")
+    mine = EntryPoint("mine", known["fixed_basis"].value, registry.GROUPS["method"])
+    entries = {"method": {**known, "mine": mine}}
+    monkeypatch.setattr(registry, "_entries", lambda kind: entries.get(kind) or real(kind))
+    table = study_tables(CAR, [nominal(CAR, tmp_path)], tmp_path).set_index("method")
+    for output in tabled_outputs(component("model", CAR)):
+        errors = table[f"rms_{output}"]
+        assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])
+    assert "mine" in legend(CAR)
+    assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).with_name(f"{CAR}.toml").read_text()
 
 
 def test_an_unknown_figure_of_a_model_names_the_known_ones(capsys):
