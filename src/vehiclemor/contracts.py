@@ -10,17 +10,23 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.report import timing_cases
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import validated
 from vehiclemor.reduction.training import training_runs
-from vehiclemor.registry import component
+from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 
 
+def _definition(name: str) -> ModelDefinition:
+    return component("model", name)
+
+
 def _nominal(model: Model) -> Maneuver:
-    return component("maneuver", component("model", model.name).maneuver)
+    return component("maneuver", _definition(model.name).maneuver)
 
 
 def check_model(name: str) -> None:
@@ -29,18 +35,17 @@ def check_model(name: str) -> None:
     A kinematic model closes its loops along that run, and its Jacobian is that of its residual; a
     dynamic model has finite derivatives.
     """
-    model = build(name)
-    equations = model.equations
-    for quantities in (
-        equations.coordinates,
-        getattr(equations, "speeds", ()),
-        equations.inputs,
-        equations.outputs,
-    ):
-        labels = [quantity.name for quantity in quantities]
-        assert len(set(labels)) == len(labels), f"{name}: a name occurs twice in {labels}"
+    model, definition = build(name), _definition(name)
+    for kind in ("coordinates", "speeds", "inputs", "outputs"):
+        quantities = getattr(definition, kind)
+        derived = getattr(model, kind)
+        declared = tuple(quantity.name for quantity in quantities)
+        assert derived == declared, f"{name}: {kind} {derived} are derived, not {declared}"
+        assert len(set(declared)) == len(declared), f"{name}: a name occurs twice in {declared}"
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
+    timed = {case.method for case in timing_cases(definition)}
+    assert timed <= set(names("method")), f"{name}: unknown methods among {sorted(timed)} are timed"
     maneuver = _nominal(model)
     assert maneuver.inputs == model.inputs, f"{name}: its maneuver gives other inputs"
     if isinstance(model, AlgebraicModel):
@@ -110,12 +115,12 @@ def check_method(name: str, model_name: str) -> None:
             again = reduced.simulate(test, model.starts[0])
             where = f"{name} ({preset}, {policy}) on {model_name}"
             samples = len(test.times)
-            for history, names in (
+            for history, labels in (
                 (first.coordinates, model.coordinates),
                 (first.speeds, model.speeds),
                 (first.outputs, model.outputs),
             ):
-                shape = (samples, len(names))
+                shape = (samples, len(labels))
                 assert history.shape == shape, f"{where}: a history has a wrong shape"
             assert first.status in ("ok", "diverged"), f"{where}: status {first.status!r}"
             if first.status == "ok":

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor import contracts
+from vehiclemor.models.quantities import Quantity
+from vehiclemor.models.report import ModelReport, TimingCase
 from vehiclemor.registry import component, names
 
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
@@ -61,3 +63,32 @@ def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message:
     )
     with pytest.raises(AssertionError, match=message):
         contracts.check_method("replay", KINEMATIC[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"inputs": (Quantity("s0", "m", "one"), Quantity("z", "m", "two"))}, "inputs .* derived"),
+        ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
+        (
+            {
+                "report": ModelReport(
+                    timing=(
+                        TimingCase("baseline", "one", "full_order"),
+                        TimingCase("strongest", "two", "no_such_method"),
+                    )
+                )
+            },
+            "unknown methods",
+        ),
+    ],
+)
+def test_broken_declaration_is_named(monkeypatch: pytest.MonkeyPatch, change, message: str) -> None:
+    broken = replace(component("model", KINEMATIC[0]), **change)
+    monkeypatch.setattr(
+        contracts,
+        "component",
+        lambda kind, name: broken if kind == "model" else component(kind, name),
+    )
+    with pytest.raises(AssertionError, match=message):
+        contracts.check_model(KINEMATIC[0])

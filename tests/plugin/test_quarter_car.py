@@ -121,4 +121,4 @@ def test_it_passes_the_contracts():
 def test_every_row_of_its_cost_table_can_be_run():
     for case in report.timing_cases(component("model", "quarter_car")):
         data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
-        assert data.attrs["status"] == "ok", case.id
+        assert data["status"].item() == "ok", case.id

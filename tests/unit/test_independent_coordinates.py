@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vehiclemor.maneuvers import rack_lane_change
-from vehiclemor.models.high_fidelity.independent import PLACES
+from vehiclemor.models.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.vehicle.frozen_constants import frozen_encoder, frozen_kernels
 from vehiclemor.reduction.vehicle.independent import independent_kernels
 from vehiclemor.simulation.build import build

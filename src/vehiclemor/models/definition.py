@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.errors import InputError, did_you_mean
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.models.report import ModelReport
 from vehiclemor.parameters import Declared
@@ -160,7 +160,9 @@ class ModelDefinition:
         self._known("report", (*shown, *report.bounds), outputs)
         cases = [case.id for case in report.timing]
         if cases:
-            self._known("report.timing", ("baseline", "strongest"), cases)
+            for needed in ("baseline", "strongest"):
+                if needed not in cases:
+                    raise InputError(f"model {self.name!r}: report.timing has no case {needed!r}")
         if len(set(cases)) != len(cases):
             raise InputError(f"model {self.name!r}: report.timing has an id twice")
 
@@ -168,4 +170,5 @@ class ModelDefinition:
         allowed = set(known)
         for name in names:
             if name not in allowed:
-                raise InputError(f"model {self.name!r}: {where} names {name!r}, which it has not")
+                hint = did_you_mean(name, allowed) or f"known: {', '.join(sorted(allowed))}"
+                raise InputError(f"model {self.name!r}: {where} names {name!r}; {hint}")

@@ -9,7 +9,7 @@ PAC2002.  Signs are those of ISO 8855 with a slip angle that is positive when th
 slides to the left.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -27,6 +27,23 @@ class TireForces:
     longitudinal: sp.Expr
     lateral: sp.Expr
     aligning: sp.Expr
+
+
+def tire_outputs(
+    tires: Sequence[TireForces],
+    loads: Sequence[sp.Expr],
+    slip_ratios: Sequence[sp.Expr],
+    slip_angles: Sequence[sp.Expr],
+) -> list[sp.Expr]:
+    """The outputs `TIRE_OUTPUTS` of four wheels."""
+    return [
+        *(tire.longitudinal for tire in tires),
+        *(tire.lateral for tire in tires),
+        *loads,
+        *(tire.aligning for tire in tires),
+        *slip_ratios,
+        *slip_angles,
+    ]
 
 
 def magic_formula(

@@ -4,7 +4,7 @@ from typing import cast
 
 import sympy as sp
 
-from vehiclemor.models.double_wishbone import linkage as double_wishbone_linkage
+from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.double_wishbone.points import POINTS
 from vehiclemor.models.double_wishbone.quantities import (
     COORDINATES,
@@ -73,14 +73,14 @@ def derive() -> AlgebraicEquations:
 
 def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> dict[str, g.Vector]:
     """Moving points in the chassis frame, each ball joint as seen from both of its bodies."""
-    linkage = double_wishbone_linkage.assembled(tape, q[:7], q[7], points)
+    corner = linkage.assembled(tape, q[:7], q[7], points)
     return {
-        "upper_ball_joint": linkage.upper_ball_joint,
-        "lower_ball_joint": linkage.on_carrier(tape, points["lower_ball_joint"]),
-        "lower_ball_joint_arm": linkage.on_lower_arm(tape, points["lower_ball_joint"]),
-        "tie_rod_inner": linkage.rack_end,
-        "tie_rod_outer": linkage.on_carrier(tape, points["tie_rod_outer"]),
-        "tie_rod_outer_rod": g.named(tape, linkage.rod_end),
-        "wheel_centre": linkage.on_carrier(tape, points["wheel_centre"]),
-        "axle_direction": (linkage.carrier[0][1], linkage.carrier[1][1], linkage.carrier[2][1]),
+        "upper_ball_joint": corner.upper_ball_joint,
+        "lower_ball_joint": corner.on_carrier(tape, points["lower_ball_joint"]),
+        "lower_ball_joint_arm": corner.on_lower_arm(tape, points["lower_ball_joint"]),
+        "tie_rod_inner": corner.rack_end,
+        "tie_rod_outer": corner.on_carrier(tape, points["tie_rod_outer"]),
+        "tie_rod_outer_rod": g.named(tape, corner.rod_end),
+        "wheel_centre": corner.on_carrier(tape, points["wheel_centre"]),
+        "axle_direction": (corner.carrier[0][1], corner.carrier[1][1], corner.carrier[2][1]),
     }

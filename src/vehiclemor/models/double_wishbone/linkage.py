@@ -109,7 +109,7 @@ def assembled(
     rack
         Displacement of the rack, positive to the left, in m.
     points
-        `double_wishbone_points.POINTS` of this side.
+        `points.POINTS` of this side.
     side
         1 for the left, -1 for the right side.
     """

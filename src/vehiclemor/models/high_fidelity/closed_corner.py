@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import sympy as sp
 
 from vehiclemor.models.double_wishbone.linkage import Arm, Linkage
-from vehiclemor.models.high_fidelity.corners import LinkageMotions
+from vehiclemor.models.high_fidelity.linkage_motions import LinkageMotions, relative
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.joints import STILL, Rate, along, carried, free_rate
-from vehiclemor.symbolic.mechanics import ZERO, Motion
+from vehiclemor.symbolic.mechanics import Motion
 from vehiclemor.symbolic.tape import Tape
 
 
@@ -79,7 +79,7 @@ def closed(
     rack
         Displacement of the rack, positive to the left, in m.
     points
-        `double_wishbone_points.POINTS` of this side.
+        `double_wishbone.points.POINTS` of this side.
     side
         1 for the left, -1 for the right side.
     """
@@ -218,18 +218,9 @@ def motions(
     high = carried(tape, STILL, turning, lever)
     rack_end = Motion(g.vector((0, rack[0], 0)), {}, g.vector((0, rack[1], 0)))
     carrier = _carrier_motion(tape, corner, low, high, rack_end, number)
-    outer = _less(tape, carried(tape, high, carrier, corner.outer), rack_end)
+    outer = relative(tape, carried(tape, high, carrier, corner.outer), rack_end)
     rod = _universal_joint(tape, corner.rod, outer)
     return ClosedMotions(LinkageMotions(turning, lower, carrier, rod, high, rack_end), upper, outer)
-
-
-def _less(tape: Tape, a: Motion, b: Motion) -> Motion:
-    """Motion of a point beside another one that no speed moves, or that the same speeds move."""
-    columns = {
-        k: g.named(tape, g.subtract(c, b.columns.get(k, ZERO))) for k, c in a.columns.items()
-    }
-    value, bias = g.subtract(a.value, b.value), g.subtract(a.bias, b.bias)
-    return Motion(g.named(tape, value), columns, g.named(tape, bias))
 
 
 def _upper_rate(
@@ -257,7 +248,7 @@ def _carrier_motion(
     """
     let, e, rod, arm = tape.let, corner.between, corner.rod, corner.outer
     per_length = let(1 / corner.distance)
-    line = _less(tape, low, high)
+    line = relative(tape, low, high)
     along_rod = let(corner.offset * g.dot(rod, g.named(tape, g.cross(e, corner.off))))
     inverse = let(-1 / along_rod)
 

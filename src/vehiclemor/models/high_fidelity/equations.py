@@ -14,7 +14,7 @@ import sympy as sp
 from vehiclemor.models.components import body
 from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.equations import DynamicEquations
-from vehiclemor.models.high_fidelity import corners, parts
+from vehiclemor.models.high_fidelity import corners, linkage_motions, parts
 from vehiclemor.models.high_fidelity.quantities import (
     CONSTRAINTS,
     COORDINATES,
@@ -117,9 +117,13 @@ def derive() -> DynamicEquations:
     return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program, CONSTRAINTS)
 
 
-def _motions(tape: Tape, m: _Mechanism, rates: Sequence[Rate], k: int) -> corners.LinkageMotions:
+def _motions(
+    tape: Tape, m: _Mechanism, rates: Sequence[Rate], k: int
+) -> linkage_motions.LinkageMotions:
     rack = (m.rack[1], m.rack[2])
-    return corners.linkage_motions(tape, m.linkages[k], _own(m.vehicle.q, k), _own(rates, k), rack)
+    return linkage_motions.linkage_motions(
+        tape, m.linkages[k], _own(m.vehicle.q, k), _own(rates, k), rack
+    )
 
 
 def _own(values: Sequence[Any], k: int) -> Sequence[Any]:
@@ -143,7 +147,7 @@ def _closures(
     gaps, motions = [], []
     for k in range(2):
         own = _motions(tape, m, free, k)
-        new, moving = corners.closures(tape, m.linkages[k], own, m.vehicle.points[k])
+        new, moving = linkage_motions.closures(tape, m.linkages[k], own, m.vehicle.points[k])
         gaps += new
         motions += moving
     return gaps, motions

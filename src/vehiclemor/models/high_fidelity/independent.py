@@ -1,7 +1,7 @@
 """The high-fidelity vehicle in 14 independent coordinates: an ODE without constraints.
 
 Its front corners close in closed form (`closed_corner.py`), so that these equations are the exact
-ones of `high_fidelity_equations.py` on the manifold where all constraints hold.
+ones of `equations.py` on the manifold where all constraints hold.
 """
 
 from collections.abc import Sequence
@@ -13,25 +13,26 @@ from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity import closed_corner, parts
 from vehiclemor.models.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
 from vehiclemor.models.high_fidelity.quantities import COORDINATES as ALL_COORDINATES
-from vehiclemor.models.high_fidelity.quantities import INPUTS, OUTPUTS
-from vehiclemor.models.high_fidelity.quantities import SPEEDS as ALL_SPEEDS
+from vehiclemor.models.high_fidelity.quantities import (
+    INDEPENDENT_COORDINATES,
+    INDEPENDENT_SPEEDS,
+    INPUTS,
+    OUTPUTS,
+    PLACES,
+)
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.joints import free_rate
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
 
-# Places of the independent coordinates among the 26: chassis, lower arms, rear arms, spins.
-PLACES = (*range(6), 10, 17, 20, 21, 22, 23, 24, 25)
-COORDINATES = tuple(ALL_COORDINATES[k] for k in PLACES)
-SPEEDS = tuple(ALL_SPEEDS[k] for k in PLACES)
 NUMBERS = parts.Numbers(len(PLACES), (6, 7), (8, 9), (10, 11, 12, 13))
 
 
 def derive() -> DynamicEquations:
     """Derive accelerations, outputs and the state of all 26 coordinates; parameters are symbols."""
     tape = Tape()
-    q, rates = body.symbols(COORDINATES), body.symbols(SPEEDS)
+    q, rates = body.symbols(INDEPENDENT_COORDINATES), body.symbols(INDEPENDENT_SPEEDS)
     s, s_dot, s_ddot = body.symbols(INPUTS)
     p, flat = parts.parameters()
     vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
@@ -74,7 +75,7 @@ def derive() -> DynamicEquations:
             "suspension": (_suspension(tape, vehicle, corners[0]), (3, 4)),
         },
     )
-    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program)
+    return DynamicEquations(INDEPENDENT_COORDINATES, INDEPENDENT_SPEEDS, INPUTS, OUTPUTS, program)
 
 
 def full_state(

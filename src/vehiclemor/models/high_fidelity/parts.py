@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import sympy as sp
 
 from vehiclemor.models.components import body
+from vehiclemor.models.components.tires import tire_outputs
 from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.double_wishbone.points import POINTS
 from vehiclemor.models.high_fidelity import corners
+from vehiclemor.models.high_fidelity.linkage_motions import LinkageMotions
 from vehiclemor.models.high_fidelity.quantities import PARAMETERS, SOLVED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
@@ -126,28 +128,22 @@ def design_points(tape: Tape, p: Mapping[str, sp.Expr]) -> tuple[dict[str, g.Vec
 
 
 def front_corner(
-    tape: Tape, v: Vehicle, assembled: linkage.Linkage, motions: corners.LinkageMotions, k: int
+    tape: Tape, v: Vehicle, assembled: linkage.Linkage, motions: LinkageMotions, k: int
 ) -> corners.Corner:
     """The left (k = 0) or right (1) front corner."""
-    number = v.numbers.lower_arms[k]
-    spin = _spin(v, k)
-    return corners.front_corner(
-        tape, v.chassis, assembled, motions, v.points[k], spin, v.p, number, SIDES[k]
-    )
+    place = _place(v, k, v.numbers.lower_arms[k])
+    return corners.front_corner(tape, v.chassis, assembled, motions, place, v.p)
 
 
 def rear_corner(tape: Tape, v: Vehicle, rates: Sequence[Rate], k: int) -> corners.Corner:
     """The left (k = 2) or right (3) rear corner."""
-    number = v.numbers.rear_arms[k - 2]
-    spin = _spin(v, k)
-    return corners.rear_corner(
-        tape, v.chassis, v.q[number], rates[number], v.points[k], spin, v.p, number, SIDES[k]
-    )
+    arm = v.numbers.rear_arms[k - 2]
+    return corners.rear_corner(tape, v.chassis, v.q[arm], rates[arm], _place(v, k, arm), v.p)
 
 
-def _spin(v: Vehicle, k: int) -> corners.Spin:
-    number = v.numbers.spins[k]
-    return corners.Spin(number, v.rates[number])
+def _place(v: Vehicle, k: int, arm: int) -> corners.Place:
+    spin = v.numbers.spins[k]
+    return corners.Place(v.points[k], arm, spin, v.rates[spin], SIDES[k])
 
 
 def kane(
@@ -215,15 +211,14 @@ def outputs(
     """
     q = v.q
     contacts = [corner.contact for corner in parts]
-    tires = [corner.tire for corner in parts]
     return [
         *(q[0], q[1], q[3], q[4], q[5]),
         *(speeds[0], speeds[1], v.rates[2], speeds[5]),
-        *(tire.longitudinal for tire in tires),
-        *(tire.lateral for tire in tires),
-        *(contact.load for contact in contacts),
-        *(tire.aligning for tire in tires),
-        *(contact.slip_ratio for contact in contacts),
-        *(tape.let(sp.atan(contact.tan_slip)) for contact in contacts),
+        *tire_outputs(
+            [corner.tire for corner in parts],
+            [contact.load for contact in contacts],
+            [contact.slip_ratio for contact in contacts],
+            [tape.let(sp.atan(contact.tan_slip)) for contact in contacts],
+        ),
         *(tape.let(sp.atan2(-carrier[0][1], carrier[1][1])) for carrier in carriers),
     ]

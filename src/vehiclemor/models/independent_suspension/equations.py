@@ -1,12 +1,15 @@
 """Equations of the 14-DOF vehicle: Kane's equations of its five bodies and four spinning wheels."""
 
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
 import sympy as sp
 
 from vehiclemor.models.components import body
 from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
-from vehiclemor.models.components.tires import TireForces, magic_formula
+from vehiclemor.models.components.tires import TireForces, magic_formula, tire_outputs
 from vehiclemor.models.equations import DynamicEquations
-from vehiclemor.models.independent_suspension.equilibrium import derived
+from vehiclemor.models.independent_suspension.equilibrium import Derived, derived
 from vehiclemor.models.independent_suspension.quantities import (
     COORDINATES,
     FRONT,
@@ -31,15 +34,26 @@ def derive() -> DynamicEquations:
     (delta,) = body.symbols(INPUTS)
     p = {name: sp.Symbol(f"p_{name}", real=True) for name in PARAMETERS}
     attitude = body.attitude(tape, q)
-    bodies, springs, outputs = _bodies(tape, q, nu, delta, p, attitude)
-    mass, force = mechanics.kane(tape, len(SPEEDS), bodies)
-    for wheel, spring in enumerate(springs):
-        force[6 + wheel] = tape.let(force[6 + wheel] - spring)
+    vehicle = _vehicle(tape, q, nu, delta, p, attitude)
+    sprung = _sprung_body(tape, vehicle)
+    wheels = [_wheel(tape, vehicle, number) for number in range(4)]
+    mass, force = mechanics.kane(tape, len(SPEEDS), [sprung, *(wheel.rigid for wheel in wheels)])
+    for number, wheel in enumerate(wheels):
+        force[6 + number] = tape.let(force[6 + number] - wheel.spring)
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
     order = [*range(10, 14), *range(6, 10), *range(6)]
     accelerations = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     second_order = body.in_coordinates(tape, attitude, nu, mass, force)
+    outputs = [
+        *body.outputs(q, nu),
+        *tire_outputs(
+            [wheel.tire for wheel in wheels],
+            [wheel.load for wheel in wheels],
+            [wheel.contact.slip_ratio for wheel in wheels],
+            [wheel.contact.slip_angle for wheel in wheels],
+        ),
+    ]
     n = len(COORDINATES)
     program = assemble(
         tape,
@@ -55,101 +69,119 @@ def derive() -> DynamicEquations:
     return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program)
 
 
-def _bodies(
+@dataclass(frozen=True)
+class _Vehicle:
+    """The sprung body on the road, with what its wheels need of it.
+
+    Attributes
+    ----------
+    weight
+        Acceleration of gravity, chassis components.
+    named
+        What follows from the parameters; distances, depths and preloads stand on the tape.
+    """
+
+    frame: mechanics.MovingFrame
+    attitude: body.Attitude
+    weight: g.Vector
+    q: list[sp.Symbol]
+    nu: list[sp.Symbol]
+    delta: sp.Symbol
+    p: dict[str, sp.Symbol]
+    named: Derived
+
+
+class _Wheel(NamedTuple):
+    """A wheel with what acts on it, and the force of its spring."""
+
+    rigid: mechanics.Body
+    spring: sp.Expr
+    contact: body.Contact
+    load: sp.Expr
+    tire: TireForces
+
+
+def _vehicle(
     tape: Tape,
     q: list[sp.Symbol],
     nu: list[sp.Symbol],
     delta: sp.Symbol,
     p: dict[str, sp.Symbol],
     attitude: body.Attitude,
-) -> tuple[list[mechanics.Body], list[sp.Expr], list[sp.Expr]]:
-    """Sprung body and wheels with their loads, spring forces, outputs."""
-    d, up = derived(p), attitude.road_normal
+) -> _Vehicle:
+    """The sprung body on the road."""
+    d = derived(p)
     frame = mechanics.MovingFrame(g.vector(nu[:3]), g.vector(nu[3:6]), first=0)
 
-    def named_pair(values: tuple[sp.Expr, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
+    def pair(values: tuple[sp.Expr, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
         return tape.let(values[0]), tape.let(values[1])
 
-    distance, depth, preload = map(named_pair, (d.sprung_distance, d.depth, d.preload))
-    xz = -p["product_of_inertia"]
-    inertia = (
-        g.vector((p["roll_inertia"], 0, xz)),
-        g.vector((0, p["pitch_inertia"], 0)),
-        g.vector((xz, 0, tape.let(d.yaw_inertia))),
+    named = replace(
+        d, sprung_distance=pair(d.sprung_distance), depth=pair(d.depth), preload=pair(d.preload)
     )
-    weight = g.scale(-p["gravity"], up)
-    bodies = [
-        mechanics.Body(
-            p["sprung_mass"],
-            frame.origin(tape),
-            g.scale(p["sprung_mass"], weight),
-            frame.rotation(tape, inertia),
-            inertia,
+    weight = g.scale(-p["gravity"], attitude.road_normal)
+    return _Vehicle(frame, attitude, weight, q, nu, delta, p, named)
+
+
+def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
+    xz = -v.p["product_of_inertia"]
+    inertia = (
+        g.vector((v.p["roll_inertia"], 0, xz)),
+        g.vector((0, v.p["pitch_inertia"], 0)),
+        g.vector((xz, 0, tape.let(v.named.yaw_inertia))),
+    )
+    mass = v.p["sprung_mass"]
+    origin = v.frame.origin(tape)
+    rotation = v.frame.rotation(tape, inertia)
+    return mechanics.Body(mass, origin, g.scale(mass, v.weight), rotation, inertia)
+
+
+def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
+    """A wheel of number 0 to 3 with its load, tire and spring."""
+    p, d, frame, front = v.p, v.named, v.frame, FRONT[wheel]
+    end, side = (0, "front") if front else (1, "rear")
+    travel, rate, spin = v.q[6 + wheel], v.nu[6 + wheel], v.nu[10 + wheel]
+    track = p[f"{side}_track"]
+    place = g.vector(
+        (
+            d.sprung_distance[0] if front else -d.sprung_distance[1],
+            tape.let(track / 2 if LEFT[wheel] else -track / 2),
+            tape.let(travel - d.depth[end]),
         )
-    ]
-    springs, forces, loads, slips = [], [], [], []
-    for wheel, (front, left) in enumerate(zip(FRONT, LEFT, strict=True)):
-        end = 0 if front else 1
-        track = p["front_track"] if front else p["rear_track"]
-        travel, rate, spin = q[6 + wheel], nu[6 + wheel], nu[10 + wheel]
-        place = g.vector(
-            (
-                distance[0] if front else -distance[1],
-                tape.let(track / 2 if left else -track / 2),
-                tape.let(travel - depth[end]),
-            )
-        )
-        steer = (tape.let(sp.sin(delta)), tape.let(sp.cos(delta)))
-        axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
-        centre = frame.point(
-            tape, place, joints.along(joints.free_rate(6 + wheel, rate), mechanics.UNIT[2])
-        )
-        about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
-        rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
-        contact = body.contact(
-            tape, attitude, q[2], place, axle, centre.value, rotation.value, p["slip_speed"]
-        )
-        deflection = p["tire_stiffness"] * (p["tire_radius"] - contact.height)
-        pressed = tape.let(deflection - p["tire_damping"] * contact.rise)
-        load = tape.let((pressed + sp.Abs(pressed)) / 2)
-        tire = magic_formula(
-            tape,
-            {name: p[name] for name in MAGIC_FORMULA},
-            load,
-            tape.let(d.reference_load),
-            p["tire_radius"],
-            contact.slip_ratio,
-            contact.slip_angle,
-            contact.cos_slip_angle,
-        )
-        force, moment = _loads(tape, contact, up, load, tire)
-        bodies.append(
-            mechanics.Body(
-                p["unsprung_mass"],
-                centre,
-                g.named(tape, g.add(force, g.scale(p["unsprung_mass"], weight))),
-                rotation,
-                about,
-                moment,
-            )
-        )
-        side = "front" if front else "rear"
-        springs.append(
-            tape.let(preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate)
-        )
-        forces.append(tire)
-        loads.append(load)
-        slips.append((contact.slip_ratio, contact.slip_angle))
-    outputs = [
-        *body.outputs(q, nu),
-        *(tire.longitudinal for tire in forces),
-        *(tire.lateral for tire in forces),
-        *loads,
-        *(tire.aligning for tire in forces),
-        *(slip for slip, _ in slips),
-        *(angle for _, angle in slips),
-    ]
-    return bodies, springs, outputs
+    )
+    steer = (tape.let(sp.sin(v.delta)), tape.let(sp.cos(v.delta)))
+    axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
+    upwards = joints.along(joints.free_rate(6 + wheel, rate), mechanics.UNIT[2])
+    centre = frame.point(tape, place, upwards)
+    about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
+    rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
+    contact = body.contact(
+        tape, v.attitude, v.q[2], place, axle, centre.value, rotation.value, p["slip_speed"]
+    )
+    deflection = p["tire_stiffness"] * (p["tire_radius"] - contact.height)
+    pressed = tape.let(deflection - p["tire_damping"] * contact.rise)
+    load = tape.let((pressed + sp.Abs(pressed)) / 2)
+    tire = magic_formula(
+        tape,
+        {name: p[name] for name in MAGIC_FORMULA},
+        load,
+        tape.let(d.reference_load),
+        p["tire_radius"],
+        contact.slip_ratio,
+        contact.slip_angle,
+        contact.cos_slip_angle,
+    )
+    force, moment = _loads(tape, contact, v.attitude.road_normal, load, tire)
+    mass = p["unsprung_mass"]
+    whole = g.named(tape, g.add(force, g.scale(mass, v.weight)))
+    spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
+    return _Wheel(
+        mechanics.Body(mass, centre, whole, rotation, about, moment),
+        tape.let(spring),
+        contact,
+        load,
+        tire,
+    )
 
 
 def _loads(

@@ -3,7 +3,7 @@
 In 14 coordinates the mass matrix of the chassis and the arms is taken constant, wheel places and
 axles are cubic in the arm's angle and the rack's displacement; the tires, gravity and the motion of
 the chassis stay nonlinear.  It needs no training: what is left out is small for a car, whatever the
-input.  See `models/high_fidelity_frozen_inertia.py`.
+input.  See `models/high_fidelity/frozen_inertia.py`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def fit(
 ) -> RewrittenVehicle:
     """Constants from the exact kernels at the design position; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity import frozen_inertia as frozen
+    from vehiclemor.models.high_fidelity import frozen_quantities as frozen
     from vehiclemor.reduction.vehicle.frozen_constants import frozen_encoder, frozen_kernels
 
     del training

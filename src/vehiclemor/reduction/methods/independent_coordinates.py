@@ -3,7 +3,7 @@
 Coordinate partitioning (R. Wehage, E. Haug, J. Mech. Des. 104 (1982), 247-255) with the dependent
 coordinates in closed form: each front corner closes by two equations A cos + B sin = C.  Nothing is
 approximated, and nothing is trained; no constraint is left to be stabilised.  See
-`models/high_fidelity_independent.py`.
+`models/high_fidelity/independent.py`.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def fit(
 ) -> RewrittenVehicle:
     """The exact equations; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity.independent import PLACES
+    from vehiclemor.models.high_fidelity.quantities import PLACES
     from vehiclemor.reduction.vehicle.independent import independent_kernels
 
     del training

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.models.high_fidelity import frozen_inertia as frozen
-from vehiclemor.models.high_fidelity.independent import PLACES
+from vehiclemor.models.high_fidelity import frozen_quantities as frozen
+from vehiclemor.models.high_fidelity.forms import FROZEN_INERTIA
+from vehiclemor.models.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.vehicle.independent import free_lengths, independent_kernels
 from vehiclemor.simulation.build import compiled
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -59,14 +60,14 @@ class _Exact:
 
 
 def frozen_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
-    """Kernels of `high_fidelity_frozen_inertia`, and their constants.
+    """Kernels of the vehicle with frozen inertia, and their constants.
 
     Parameters
     ----------
     model
         A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
     """
-    _, kernels, _ = compiled("high_fidelity_frozen_inertia", frozen)
+    _, kernels, _ = compiled(FROZEN_INERTIA.name, FROZEN_INERTIA)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
     flat = np.concatenate([model.parameters.flat(), free_lengths(model), fixed])
@@ -87,7 +88,7 @@ def frozen_encoder(model: DynamicModel) -> Callable[[np.ndarray, np.ndarray], np
 
 
 def frozen_constants(model: DynamicModel) -> dict[str, float]:
-    """Constants of the frozen vehicle by name, see `high_fidelity_frozen_inertia.CONSTANTS`."""
+    """Constants of the frozen vehicle by name, see `frozen_quantities.CONSTANTS`."""
     exact = _Exact(model)
     mass, _ = exact.mass()
     design = np.zeros(2 * N)

@@ -7,21 +7,21 @@ from types import ModuleType
 import numpy as np
 
 from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.high_fidelity import independent as high_fidelity_independent
+from vehiclemor.models.high_fidelity.forms import INDEPENDENT
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import compiled, hoisted_constants, solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
 
 
 def independent_kernels(model: DynamicModel) -> tuple[ModuleType, np.ndarray]:
-    """Kernels over the 14 coordinates of `high_fidelity_independent`, and their constants.
+    """Kernels over the 14 independent coordinates, and their constants.
 
     Parameters
     ----------
     model
         A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
     """
-    _, kernels, _ = compiled("high_fidelity_independent", high_fidelity_independent)
+    _, kernels, _ = compiled(INDEPENDENT.name, INDEPENDENT)
     return kernels, hoisted_constants(kernels, model.parameters, free_lengths(model))
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tests.unit.programs import function_of, pivot_shares
 from vehiclemor.models.double_wishbone import linkage as double_wishbone_linkage
 from vehiclemor.models.double_wishbone.points import POINTS, tie_rod_angles
-from vehiclemor.models.high_fidelity import corners as vehicle_corners
+from vehiclemor.models.high_fidelity import linkage_motions
 from vehiclemor.models.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -37,8 +37,8 @@ def compiled(side: int) -> Callable:
     linkage = double_wishbone_linkage.assembled(tape, q, rack[0], points, side)
     on_carrier = {name: linkage.on_carrier(tape, points[name]) for name in CARRIED}
     free = [free_rate(k, rate) for k, rate in enumerate(rates)]
-    motions = vehicle_corners.linkage_motions(tape, linkage, q, free, rack[1:])
-    gaps, closing = vehicle_corners.closures(tape, linkage, motions, points)
+    motions = linkage_motions.linkage_motions(tape, linkage, q, free, rack[1:])
+    gaps, closing = linkage_motions.closures(tape, linkage, motions, points)
     zero = (sp.Integer(0),) * 3
     results = {
         **on_carrier,
