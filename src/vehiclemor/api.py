@@ -135,7 +135,8 @@ def simulate(
         diverges is a result: its status says so.
     """
     from vehiclemor.study.evaluate import evaluate
-    from vehiclemor.study.experiment import complete_settings, make_experiment
+    from vehiclemor.study.experiment import make_experiment
+    from vehiclemor.study.method_settings import complete_settings
     from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
     ready = _model(model) if isinstance(model, str) else model

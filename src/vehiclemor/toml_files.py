@@ -25,7 +25,7 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
     FileError
         If the file is missing, unreadable, no TOML, or does not fit the schema.
     """
-    return validated(_parsed(path), schema, path)
+    return _fitting(_parsed(path), schema, path)
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise FileError(f"{path}: not a valid TOML file: {error}") from None
 
 
-def validated(content: dict[str, Any], schema: type[Schema], path: Path) -> Schema:
+def _fitting(content: dict[str, Any], schema: type[Schema], path: Path) -> Schema:
     """Content as an instance of the schema; the first thing wrong becomes the error line."""
     try:
         return schema.model_validate(content)

@@ -12,7 +12,8 @@ from vehiclemor.maneuvers import sine_travel
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import evaluate
-from vehiclemor.study.experiment import complete_settings, make_experiment
+from vehiclemor.study.experiment import make_experiment
+from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import flattened
 from vehiclemor.study.plans.study_file import load_studies

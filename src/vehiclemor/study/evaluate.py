@@ -16,8 +16,9 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.study.experiment import Experiment, Keep, Settings
+from vehiclemor.study.experiment import Experiment, Keep
 from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.method_settings import Settings, default_settings, for_method
 from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
@@ -75,7 +76,11 @@ def refusal(model: Model, experiment: Experiment) -> Failure | None:
     accepted, reason = method.accepts(model)
     if not accepted:
         return Failure("rejected", reason)
-    return attempt(lambda: method.check(model, experiment.settings))
+
+    def check() -> None:
+        method.check(model, for_method(model, experiment.method, experiment.settings))
+
+    return attempt(check)
 
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:
@@ -99,8 +104,8 @@ def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
     settings = experiment.settings
     online = {name: value for name, value in settings.items() if name in ONLINE}
-    declared = component("method", experiment.method).settings(model.kind)
-    common = settings | {name: declared[name].default for name in online}
+    defaults = default_settings(model, experiment.method)
+    common = settings | {name: defaults[name] for name in online}
     text = json.dumps(common, sort_keys=True)
     fitted: Any = _kept_fit(model, experiment.method, text, experiment.training)
     if isinstance(fitted, Failure) or not online:
@@ -124,7 +129,7 @@ def _fitted(
 
     def fit() -> ReducedModel:
         runs = [training_run(model, scenario) for scenario in training]
-        return method.fit(model, runs, settings)
+        return method.fit(model, runs, for_method(model, method_name, settings))
 
     return attempt(fit)
 

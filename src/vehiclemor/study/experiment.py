@@ -2,19 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
-from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Value, validated
-from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.model import Model
+from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.scenario import Scenario, parameters_of
 
-Settings = dict[str, Value]
 Keep = Literal["trajectories", "metrics", "errors"]
 
 
@@ -74,7 +70,7 @@ def make_experiment(
     Parameters
     ----------
     settings
-        From `complete_settings`.
+        All settings of the method, from `complete_settings`.
     """
     if keep != "errors" and len(test) != 1:
         raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
@@ -89,28 +85,3 @@ def make_experiment(
         test,
         keep,
     )
-
-
-def complete_settings(
-    model: Model,
-    method_name: str,
-    given: Mapping[str, object] | None = None,
-    preset: str = "recommended",
-) -> Settings:
-    """All settings of a method for a model, validated.
-
-    That a method refuses a model is a result: what was set for a model of another kind can't be
-    judged here, and nothing is set.
-
-    Raises
-    ------
-    InputError
-        If the preset, a name or a value is wrong.
-    """
-    method: Method = component("method", method_name)
-    if not method.accepts(model)[0]:
-        return {}
-    presets = method.presets(model)
-    if preset not in presets:
-        raise unknown(f"preset of {method_name}", preset, presets)
-    return validated(method_name, method.settings(model.kind), given or {}, presets[preset])

@@ -18,6 +18,7 @@ FILES = (
     "steering_maneuvers.py",
     "metrics.py",
     "study/scenario.py",
+    "study/method_settings.py",
     "study/failure.py",
     "study/evaluate.py",
     "study/result.py",

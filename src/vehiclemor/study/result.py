@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 FIRST_SECONDS = 10.0
 RMS = "RMS error of the output against the full-order solution"
 LARGEST = "largest absolute error of the output"
+FLOOR = "RMS error of the best approximation in the same subspaces"
+GROWTH = "largest real part of an eigenvalue of the reduced Jacobian in any window"
+EVALUATIONS = "evaluations of the full model's equations in training"
+Variable = tuple[str | tuple[str, ...], object, dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -55,21 +59,60 @@ def metrics_dataset(
         Errors by output, coordinate and speed, floors, counts, seconds and status; histories too if
         the experiment keeps trajectories.
     """
-    fitted = None if isinstance(reduced, Failure) else reduced
     if isinstance(outcome, Failure):
-        missing = _missing(model, experiment.test[0].maneuver, outcome)
-        outcome, fitted = Outcome(missing, missing), None
-    reference = outcome.reference
-    variables = _error_variables(model, outcome) | _scalars(model, outcome.trajectory, fitted)
-    variables["reference_outputs"] = (
-        ("time", "output"),
-        reference.outputs,
-        {"units": "see output_unit", "long_name": "full-order outputs for the same input"},
-    )
-    dataset = trajectory_dataset(model, outcome.trajectory, variables)
+        reduced, missing = outcome, _missing(model, experiment.test[0].maneuver, outcome)
+        outcome = Outcome(missing, missing)
+    run, full, floor = outcome.trajectory, outcome.reference, outcome.floor
+    floor = np.full(len(model.outputs), np.nan) if floor is None else floor
+    error = run.outputs - full.outputs
+    variables = {
+        "rms_error": _by("output", rms(error), RMS),
+        "max_error": _by("output", max_abs(error), LARGEST),
+        "floor_rms_error": _by("output", floor, FLOOR),
+        "signal_range": _by("output", signal_range(full.outputs), "range of the full-order output"),
+        "rms_coordinate_error": _by(
+            "coordinate", rms(run.coordinates - full.coordinates), "RMS error of the coordinate"
+        ),
+    }
+    if model.speeds:
+        speed_error = rms(run.speeds - full.speeds)
+        variables["rms_speed_error"] = _by("speed", speed_error, "RMS error of the speed")
+        growth = float(getattr(reduced, "growth_rate", np.nan))
+        variables["growth_rate"] = _scalar(growth, "1/s", GROWTH)
+    residual_at = getattr(model, "residual_at", None)
+    if residual_at is not None:
+        residual = float(np.abs(residual_at(run.coordinates, run.inputs)).max())
+        text = "largest residual of an equation"
+        variables["largest_residual"] = _scalar(residual, "m", text)
+    variables |= _of_fit(reduced, "largest number of reduced coordinates in a window")
+    text = "full-order outputs for the same input"
+    variables["reference_outputs"] = _by("output", full.outputs, text, ("time", "output"))
+    dataset = trajectory_dataset(model, run, variables)
     if experiment.keep == "metrics":
         dataset = dataset.drop_dims(["time", "input"])
     return dataset.assign_attrs(_attributes(experiment))
+
+
+def _by(
+    quantity: str, values: object, text: str, dimensions: tuple[str, ...] | None = None
+) -> Variable:
+    """Variable in the units of a group of quantities."""
+    return dimensions or quantity, values, {"units": f"see {quantity}_unit", "long_name": text}
+
+
+def _scalar(value: float, unit: str, text: str) -> Variable:
+    return (), value, {"units": unit, "long_name": text}
+
+
+def _of_fit(reduced: ReducedModel | Failure, rank_text: str) -> dict[str, Variable]:
+    """Rank, and what the fit has cost."""
+    failed = isinstance(reduced, Failure)
+    offline = Offline(np.nan, 0) if failed else reduced.offline
+    return {
+        "effective_rank": _scalar(0 if failed else reduced.effective_rank, "1", rank_text),
+        "offline_seconds": _scalar(offline.seconds, "s", "training simulations and fit"),
+        "offline_evaluations": _scalar(offline.evaluations, "1", EVALUATIONS),
+    }
 
 
 def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
@@ -87,79 +130,6 @@ def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
     )
 
 
-def _error_variables(model: Model, outcome: Outcome) -> dict[str, tuple]:
-    """Errors by output, coordinate and speed: name -> (dimension, values, attributes)."""
-    trajectory, reference = outcome.trajectory, outcome.reference
-    error = trajectory.outputs - reference.outputs
-    floor = np.full(len(model.outputs), np.nan) if outcome.floor is None else outcome.floor
-    found = [
-        ("rms_error", "output", rms(error), RMS),
-        ("max_error", "output", max_abs(error), LARGEST),
-        (
-            "floor_rms_error",
-            "output",
-            floor,
-            "RMS error of the best approximation in the same subspaces",
-        ),
-        (
-            "signal_range",
-            "output",
-            signal_range(reference.outputs),
-            "range of the full-order output",
-        ),
-        (
-            "rms_coordinate_error",
-            "coordinate",
-            rms(trajectory.coordinates - reference.coordinates),
-            "RMS error of the coordinate",
-        ),
-    ]
-    if model.speeds:
-        difference = rms(trajectory.speeds - reference.speeds)
-        found.append(("rms_speed_error", "speed", difference, "RMS error of the speed"))
-    return {
-        name: (dimension, values, {"units": f"see {dimension}_unit", "long_name": text})
-        for name, dimension, values, text in found
-    }
-
-
-def _scalars(
-    model: Model, trajectory: Trajectory, reduced: ReducedModel | None
-) -> dict[str, tuple]:
-    """Growth rate or residual, rank, and what it has cost to fit: name -> variable."""
-    found: dict[str, tuple[float, str, str]] = {}
-    if model.speeds:
-        growth = float(getattr(reduced, "growth_rate", np.nan))
-        text = "largest real part of an eigenvalue of the reduced Jacobian in any window"
-        found["growth_rate"] = (growth, "1/s", text)
-    residual_at = getattr(model, "residual_at", None)
-    if residual_at is not None:
-        residual = float(np.abs(residual_at(trajectory.coordinates, trajectory.inputs)).max())
-        found["largest_residual"] = (residual, "m", "largest residual of an equation")
-    text = "largest number of reduced coordinates in a window"
-    return _variables(found) | _fit_variables(reduced, text)
-
-
-def _fit_variables(reduced: ReducedModel | Failure | None, rank_text: str) -> dict[str, tuple]:
-    fitted = None if isinstance(reduced, Failure) else reduced
-    offline = fitted.offline if fitted else Offline(np.nan, 0)
-    text = "evaluations of the full model's equations in training"
-    return _variables(
-        {
-            "effective_rank": (fitted.effective_rank if fitted else 0, "1", rank_text),
-            "offline_seconds": (offline.seconds, "s", "training simulations and fit"),
-            "offline_evaluations": (offline.evaluations, "1", text),
-        }
-    )
-
-
-def _variables(found: dict[str, tuple[float, str, str]]) -> dict[str, tuple]:
-    return {
-        name: ((), value, {"units": unit, "long_name": text})
-        for name, (value, unit, text) in found.items()
-    }
-
-
 def errors_dataset(
     model: Model,
     experiment: Experiment,
@@ -172,33 +142,27 @@ def errors_dataset(
     """
     import xarray as xr
 
-    ended = [
-        o if isinstance(o, Outcome) and o.trajectory.status == "ok" else None for o in outcomes
-    ]
+    ends = [o if isinstance(o, Failure) else o.trajectory for o in outcomes]
+    compared = [None if isinstance(o, Failure) else o for o in outcomes]
+    finished = [o if o and o.trajectory.status == "ok" else None for o in compared]
     missing = (np.full(len(model.outputs), np.nan),) * 3
-    errors = zip(*[_errors(o) if o else missing for o in ended], strict=True)
-    texts = {
-        "rms_error": RMS,
-        "max_error": LARGEST,
-        "largest_output": f"largest absolute value in the first {FIRST_SECONDS:g} s",
+    largest = f"largest absolute value in the first {FIRST_SECONDS:g} s"
+    errors = zip(*[_errors(o) if o else missing for o in finished], strict=True)
+    names = {"rms_error": RMS, "max_error": LARGEST, "largest_output": largest}
+    variables = {
+        name: _by("output", np.array(values), text, ("scenario", "output"))
+        for (name, text), values in zip(names.items(), errors, strict=True)
     }
-    variables: dict[str, tuple] = {}
-    for (name, text), values in zip(texts.items(), errors, strict=True):
-        attributes = {"units": "see output_unit", "long_name": text}
-        variables[name] = (("scenario", "output"), np.array(values), attributes)
     for name, text in model.counts.items():
-        values = np.array([o.trajectory.counts.get(name, 0) if o else 0 for o in ended])
+        values = np.array([o.trajectory.counts.get(name, 0) if o else 0 for o in finished])
         variables[name] = ("scenario", values, {"units": "1", "long_name": text})
-    variables["seconds"] = (
-        "scenario",
-        np.array([o.trajectory.seconds if o else np.nan for o in ended]),
-        {"units": "s", "long_name": "time in the compiled loop, not repeated"},
-    )
-    ends = [o.trajectory if isinstance(o, Outcome) else o for o in outcomes]
+    seconds = np.array([o.trajectory.seconds if o else np.nan for o in finished])
+    attributes = {"units": "s", "long_name": "time in the compiled loop, not repeated"}
+    variables["seconds"] = ("scenario", seconds, attributes)
     for name, text in (("status", "ok, or why there is no result"), ("message", "what failed")):
         values = np.array([getattr(end, name) for end in ends], dtype=object)
         variables[name] = ("scenario", values, {"long_name": text})
-    variables |= _fit_variables(reduced, "reduced coordinates")
+    variables |= _of_fit(reduced, "reduced coordinates")
     outputs = model.equations.outputs
     coordinates = {
         "scenario": [scenario.label for scenario in experiment.test],

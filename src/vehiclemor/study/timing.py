@@ -16,17 +16,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.report import TimingCase
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.clock import repeated
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
-from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
+from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.scenario import Scenario, start_of
 from vehiclemor.study.store import prepare_folder, stored
+from vehiclemor.models.report import TimingCase
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,41 +62,44 @@ def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: s
         As of `timed_cases`, on the dimension `start` too.
     """
     maneuver: Maneuver = component("maneuver", component("model", model.name).maneuver)
-    experiments = {start: case_experiments(model, cases, maneuver, start) for start in model.starts}
-    prepare_folder(folder)
     content = [
-        [[start, case.id, case.label, made[case.id].key] for case in cases]
-        for start, made in experiments.items()
+        [start, case.label, identifier, experiment.key]
+        for start in model.starts
+        for case, (identifier, experiment) in zip(
+            cases, case_experiments(model, cases, maneuver, start).items(), strict=True
+        )
     ]
 
-    def measure() -> xr.Dataset:
+    def every_start() -> xr.Dataset:
         import xarray as xr
 
         parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    return stored_timing(folder, name, [content, CASE_ROUNDS], measure)
+    prepare_folder(folder)
+    return stored_timing(folder, name, [content, CASE_ROUNDS], every_start)
 
 
 def stored_timing(
-    folder: Path, name: str, content: object, measure: Callable[[], xr.Dataset]
+    folder: Path, name: str, content: object, make: Callable[[], xr.Dataset]
 ) -> xr.Dataset:
-    """What the file `studies/<name>.nc` holds for this content and machine, or else is measured."""
+    """What the file `studies/<name>.nc` holds for this content and machine, or else is made."""
     text = json.dumps([content, machine(), REPEATS])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return stored(folder / "studies" / f"{name}.nc", "timing", key, measure)
+    return stored(folder / "studies" / f"{name}.nc", "timing", key, make)
 
 
 def case_experiments(
     model: Model, cases: Sequence[TimingCase], maneuver: Maneuver, start: str
 ) -> dict[str, Experiment]:
     """Id of a case -> its experiment, trained on the unperturbed run."""
-    nominal = (Scenario(maneuver.perturbed(), start),)
-    test = (Scenario(maneuver, start),)
+    nominal, test = Scenario(maneuver.perturbed(), start), Scenario(maneuver, start)
     found: dict[str, Experiment] = {}
     for case in cases:
         settings = complete_settings(model, case.method, case.settings, case.preset)
-        found[case.id] = make_experiment(model, case.method, settings, nominal, test, "metrics")
+        found[case.id] = make_experiment(
+            model, case.method, settings, (nominal,), (test,), "metrics"
+        )
     return found
 
 
@@ -121,26 +125,26 @@ def timed_cases(
     kept = ["effective_rank", "offline_evaluations", "rms_error", "status", *model.counts]
     results = [evaluate(experiment)[kept] for experiment in experiments.values()]
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop")
-    dataset = dataset.drop_vars("output_unit")
-    seconds, offline = _measured(list(experiments.values()), rounds or CASE_ROUNDS)
-    dataset = dataset.assign_coords(case=list(experiments)).merge(
-        _seconds_dataset(list(experiments), seconds, offline).isel(scenario=0, drop=True)
-    )
+    dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
+    seconds, offline = _rounds(list(experiments.values()), rounds or CASE_ROUNDS)
+    points = f"{maneuver.samples} time points"
+    timed = _dataset(experiments, seconds, offline, points).isel(scenario=0, drop=True)
+    dataset = dataset.merge(timed)
     tolerances = [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()]
     columns: dict[str, tuple] = {
-        "seconds_per_sample": (dataset["seconds"].values / maneuver.samples, "s", "a time point"),
+        "seconds_per_sample": (timed["seconds"].values / maneuver.samples, "s", "for a time point"),
         "tolerance": (tolerances, "1", "tolerance of the solver"),
     }
+    # Round by round, so that a burst of other load on the machine hits both alike.
+    own = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
     for name, (against, text) in SPEED_UPS.items():
         if against in experiments:
-            ratios = _speed_up(seconds[:, :, 0], list(experiments).index(against))
-            columns[name] = (ratios, "1", text)
+            baseline = seconds[:, [list(experiments).index(against)], 0]
+            columns[name] = (np.median(baseline / own, axis=0), "1", text)
     for name, (values, unit, text) in columns.items():
         dataset[name] = ("case", values, {"units": unit, "long_name": text})
     dataset = dataset.assign_coords(start=start, label=("case", [case.label for case in cases]))
-    title = f"timing of {model.name}, interleaved, {len(seconds)} rounds"
-    attributes = _attributes(model, f"{title}, {maneuver.samples} time points")
-    return dataset.assign_attrs(attributes)
+    return dataset.assign_attrs(timed.attrs)
 
 
 def timed_tests(
@@ -159,56 +163,42 @@ def timed_tests(
         `seconds` with quartiles on `case` and `scenario`, missing where a run is not timed;
         `offline_seconds` on `case`.
     """
-    seconds, offline = _measured(list(experiments.values()), rounds or PROTOCOL_ROUNDS, finished)
-    dataset = _seconds_dataset(list(experiments), seconds, offline)
-    first = next(iter(experiments.values()))
-    dataset = dataset.assign_coords(scenario=[scenario.label for scenario in first.test])
-    title = f"timing of {first.model}, test set, interleaved, {len(seconds)} rounds"
-    return dataset.assign_attrs(_attributes(model_of(first), title))
+    seconds, offline = _rounds(list(experiments.values()), rounds or PROTOCOL_ROUNDS, finished)
+    return _dataset(experiments, seconds, offline, "test set")
 
 
-def _seconds_dataset(ids: list[str], seconds: np.ndarray, offline: list[float]) -> xr.Dataset:
+def _dataset(
+    experiments: Mapping[str, Experiment], seconds: np.ndarray, offline: list[float], what: str
+) -> xr.Dataset:
     """Median and quartiles of rounds (rounds, cases, scenarios)."""
     import xarray as xr
 
     text = f"median of {len(seconds)} rounds, in the compiled loop"
-    found = {
+    quantiles = {
         "seconds": (0.5, text),
         "seconds_lower": (0.25, "lower quartile"),
         "seconds_upper": (0.75, "upper quartile"),
     }
-    variables: dict[str, tuple] = {
-        name: (
-            ("case", "scenario"),
-            np.quantile(seconds, share, axis=0),
-            {"units": "s", "long_name": text},
-        )
-        for name, (share, text) in found.items()
-    }
+    variables: dict[str, tuple] = {}
+    for name, (share, text) in quantiles.items():
+        values = np.quantile(seconds, share, axis=0)
+        variables[name] = (("case", "scenario"), values, {"units": "s", "long_name": text})
     text = "training simulations and fit"
     variables["offline_seconds"] = ("case", offline, {"units": "s", "long_name": text})
-    return xr.Dataset(variables, {"case": ids})
-
-
-def _attributes(model: Model, title: str) -> dict[str, str]:
-    return {
-        "title": title,
+    first = next(iter(experiments.values()))
+    labels = {"case": list(experiments), "scenario": [scenario.label for scenario in first.test]}
+    attributes = {
+        "title": f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}",
         "source": "vehiclemor",
-        "model": model.name,
+        "model": first.model,
         "machine": machine(),
         "versions": versions(),
-        "kernel_hash": model.kernel_hash,
+        "kernel_hash": first.kernel,
     }
+    return xr.Dataset(variables, labels, attributes)
 
 
-def _speed_up(seconds: np.ndarray, against: int) -> np.ndarray:
-    """Speed-up of every case (cases,) from its rounds (rounds, cases)."""
-    # Round by round, so that a burst of other load on the machine hits both alike.
-    own = np.where(seconds > 0.0, seconds, np.nan)
-    return np.median(seconds[:, [against]] / own, axis=0)
-
-
-def _measured(
+def _rounds(
     experiments: Sequence[Experiment], rounds: int, finished: np.ndarray | None = None
 ) -> tuple[np.ndarray, list[float]]:
     """Seconds of runs (rounds, experiments, scenarios), NaN where one fails, and of fits.
@@ -216,20 +206,20 @@ def _measured(
     All runs of a round follow one another, so that load on the machine hits all alike.
     """
     model = model_of(experiments[0])
-    shape = (len(experiments), len(experiments[0].test))
+    tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
+    shape = (len(experiments), len(tests))
     timed = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     fits = [_warm_fit(model, e, timed[index].any()) for index, e in enumerate(experiments)]
-    runs = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
     seconds = np.full((rounds + 1, *shape), np.nan)
     for turn in range(rounds + 1):
-        for place, (maneuver, start) in enumerate(runs):
+        for place, test in enumerate(tests):
             for index, (reduced, _) in enumerate(fits):
                 if reduced is None or not timed[index, place]:
                     continue
                 # The first round loads machine code, warms caches, and tells how long a run takes.
                 short = turn > 0 and seconds[0, index, place] < LONG_RUN
                 with repeated(REPEATS if short else 1):
-                    run = attempt(partial(reduced.simulate, maneuver, start))
+                    run = attempt(partial(reduced.simulate, *test))
                 if isinstance(run, Failure):
                     timed[index, place] = False
                 else:
@@ -248,9 +238,8 @@ def _warm_fit(
         return fitted, fitted.offline.seconds
     seconds: list[float] = []
     while len(seconds) < FITS and sum(seconds) < FIT_SECONDS:
-        again = fresh_fit(model, experiment)
-        if isinstance(again, Failure):
+        fitted = fresh_fit(model, experiment)
+        if isinstance(fitted, Failure):
             return None, np.nan
-        seconds.append(again.offline.seconds)
-        fitted = again
+        seconds.append(fitted.offline.seconds)
     return fitted, float(np.median(seconds))

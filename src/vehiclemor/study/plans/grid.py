@@ -13,7 +13,8 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
+from vehiclemor.study.experiment import Experiment, make_experiment
+from vehiclemor.study.method_settings import complete_settings, default_settings, for_method
 from vehiclemor.study.plans.study_file import FACTORS, StudyFile, values
 from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
@@ -61,11 +62,8 @@ def expand(name: str, study: StudyFile) -> Grid:
 
 def _declared_settings(model: Model, study: StudyFile) -> dict[str, set[str]]:
     """Label of a method -> names of its settings."""
-    found: dict[str, set[str]] = {}
-    for label, entry in study.labelled.items():
-        method: Method = component("method", entry.method)
-        found[label] = set(method.settings(model.kind))
-    return found
+    methods = study.labelled.items()
+    return {label: set(default_settings(model, entry.method)) for label, entry in methods}
 
 
 def _dimensions(model: Model, study: StudyFile, settings: set[str]) -> dict[str, list[Any]]:
@@ -139,7 +137,7 @@ def _some_fits(model: Model, cells: list[Experiment]) -> None:
         if not method.accepts(model)[0]:
             return
         try:
-            method.check(model, cell.settings)
+            method.check(model, for_method(model, cell.method, cell.settings))
         except InputError as error:
             first = first or error
         else:

@@ -13,7 +13,8 @@ from vehiclemor.registry import component, unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
+from vehiclemor.study.experiment import Experiment, make_experiment
+from vehiclemor.study.method_settings import Settings, complete_settings
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml

@@ -1,0 +1,47 @@
+"""Settings of methods as studies store them: plain values by name, complete and validated."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import Value, validated
+from vehiclemor.registry import component, unknown
+from vehiclemor.simulation.model import Model
+
+Settings = dict[str, Value]
+
+
+def complete_settings(
+    model: Model,
+    method_name: str,
+    given: Mapping[str, object] | None = None,
+    preset: str = "recommended",
+) -> Settings:
+    """All settings of a method for a model, validated.
+
+    That a method refuses a model is a result: what was set for a model of another kind can't be
+    judged here, and nothing is set.
+
+    Raises
+    ------
+    InputError
+        If the preset, a name or a value is wrong.
+    """
+    method: Method = component("method", method_name)
+    if not method.accepts(model)[0]:
+        return {}
+    presets = method.presets(model)
+    if preset not in presets:
+        raise unknown(f"preset of {method_name}", preset, presets)
+    return validated(method_name, method.settings(model.kind), given or {}, presets[preset])
+
+
+def for_method(model: Model, method_name: str, settings: Settings) -> Any:  # noqa: ARG001
+    """Complete settings as `check` and `fit` of the method take them."""
+    return settings
+
+
+def default_settings(model: Model, method_name: str) -> Settings:
+    """Declared names and defaults; none for a kind of model that the method doesn't know."""
+    declared = component("method", method_name).settings(model.kind)
+    return {name: setting.default for name, setting in declared.items()}

@@ -1,0 +1,82 @@
+"""One rule for failures, whether a study is a grid or a protocol."""
+
+import json
+
+import pytest
+
+from vehiclemor.errors import ConvergenceError, FileError, InputError, UnreachableError
+from vehiclemor.reduction.methods import fixed_basis
+from vehiclemor.study import evaluate, timing
+from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.run import run_studies
+
+GRID = """
+title = "for the tests"
+model = "double_wishbone"
+
+[[methods]]
+method = "full_order"
+
+[[methods]]
+method = "fixed_basis"
+"""
+RAISED = [
+    (InputError("asks for too much"), "rejected", "asks for too much"),
+    (UnreachableError("too high"), "unreachable", "too high"),
+    (ConvergenceError("after 9\niterations"), "diverged", "after 9 iterations"),
+    (ZeroDivisionError("in a plug-in"), "error", "ZeroDivisionError: in a plug-in"),
+]
+
+
+@pytest.fixture(params=RAISED, ids=lambda raised: raised[1])
+def raised(request, monkeypatch):
+    """Status and message of what every fit of one method raises."""
+    error, status, message = request.param
+
+    def broken(*_):
+        raise error
+
+    evaluate._kept_fit.cache_clear()
+    monkeypatch.setattr(fixed_basis, "fit", broken)
+    monkeypatch.setattr(timing, "PROTOCOL_ROUNDS", 1)
+    yield status, message
+    evaluate._kept_fit.cache_clear()
+
+
+def test_what_a_fit_raises_is_a_result_in_a_grid(raised, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(GRID)
+    cells = run_studies(str(path), tmp_path)["mine"].squeeze()
+    broken, full = cells.sel({"method": "fixed_basis"}), cells.sel({"method": "full_order"})
+    assert (broken["status"].item(), broken["message"].item()) == raised
+    assert full["status"].item() == "ok"
+
+
+def test_what_a_fit_raises_is_a_result_in_a_protocol(raised, tmp_path, protocol_text):
+    (tmp_path / "small.toml").write_text(protocol_text)
+    path = tmp_path / "mine.toml"
+    path.write_text(f'title = "mine"\nprotocols = {json.dumps([str(tmp_path / "small.toml")])}\n')
+    rows = run_studies(str(path), tmp_path)["predictive-small"]
+    broken = rows.sel(row="fixed basis")
+    assert set(broken["status"].values) == {raised[0]}
+    assert set(broken["message"].values) == {raised[1]}
+    assert set(rows["status"].sel(row="newton 1e-12").values) == {"ok"}
+
+
+def test_what_is_wrong_with_a_file_ends_the_study():
+    def broken():
+        raise FileError("no such file")
+
+    with pytest.raises(FileError):
+        attempt(broken)
+
+
+def test_only_what_was_not_asked_for_is_put_down_to_the_reference():
+    def failing(error):
+        def run():
+            raise error
+
+        return attempt(run, "the reference: ")
+
+    assert failing(ConvergenceError("stuck")) == Failure("diverged", "the reference: stuck")
+    assert failing(UnreachableError("too high")) == Failure("unreachable", "too high")

@@ -1,0 +1,82 @@
+"""The timing pass: cases are known by their ids, and nothing is measured twice."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vehiclemor.maneuvers import sine_travel
+from vehiclemor.simulation.build import build
+from vehiclemor.study import timing
+from vehiclemor.study.scenario import Scenario, input_hash
+from vehiclemor.study.timing import timed_cases, timed_model
+from vehiclemor.models.report import TimingCase
+
+CASES = (
+    TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
+    TimingCase("strongest", "the best", "full_order", "strongest"),
+    TimingCase("replay", "replay", "replay"),
+    TimingCase("baseline", "Newton", "full_order"),
+)
+
+
+@pytest.fixture(scope="module")
+def suspension():
+    return build("double_wishbone")
+
+
+def test_speed_ups_are_against_ids_wherever_they_stand(suspension):
+    data = timed_cases(suspension, CASES, sine_travel, "equilibrium", 3)
+    assert list(data["case"].values) == ["pod_r3", "strongest", "replay", "baseline"]
+    assert list(data["label"].values) == ["pod r=3", "the best", "replay", "Newton"]
+    assert float(data["speed_up"].sel(case="baseline")) == 1.0
+    assert float(data["speed_up_strongest"].sel(case="strongest")) == 1.0
+    assert float(data["speed_up"].sel(case="strongest")) > 1.0
+    assert np.isnan(float(data["speed_up"].sel(case="replay")))
+    assert (data["seconds_lower"] <= data["seconds"]).all()
+    assert (data["seconds"] <= data["seconds_upper"]).all()
+    assert float(data["offline_seconds"].sel(case="pod_r3")) > 0.0
+    assert float(data["offline_seconds"].sel(case="baseline")) == 0.0
+    assert int(data["iterations"].sel(case="replay")) == 0
+    assert (data["status"] == "ok").all()
+
+
+def test_without_baselines_there_are_seconds_but_no_speed_ups(suspension):
+    data = timed_cases(suspension, CASES[:1], sine_travel, "equilibrium", 1)
+    assert "speed_up" not in data
+    assert float(data["seconds"].item()) > 0.0
+
+
+def test_a_case_that_fails_has_no_seconds(suspension):
+    stuck = TimingCase("stuck", "stuck", "full_order", settings={"tolerance": 1e-300})
+    data = timed_cases(suspension, (CASES[3], stuck), sine_travel, "equilibrium", 2)
+    assert data["status"].values.tolist() == ["ok", "diverged"]
+    assert np.isfinite(data["seconds"]).values.tolist() == [True, False]
+
+
+def test_what_was_measured_is_measured_again_only_if_it_has_changed(
+    suspension, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(timing, "CASE_ROUNDS", 2)
+    first = timed_model(suspension, CASES, tmp_path, "mine")
+    assert dict(first.sizes) == {"start": 1, "case": 4, "output": len(suspension.outputs)}
+    path = tmp_path / "studies" / "mine.nc"
+    written = path.stat().st_mtime_ns
+    again = timed_model(suspension, CASES, tmp_path, "mine")
+    assert path.stat().st_mtime_ns == written
+    np.testing.assert_array_equal(again["seconds"], first["seconds"])
+    other = (replace(CASES[0], settings={"rank": 4}), *CASES[1:])
+    timed_model(suspension, other, tmp_path, "mine")
+    assert path.stat().st_mtime_ns > written
+
+
+def test_minus_zero_and_zero_are_one_input():
+    def signed(sign):
+        def signal(times, frequency, amplitude):
+            return np.full((len(times), 2), sign * 0.0 * frequency * amplitude)
+
+        return replace(sine_travel, signal=signal)
+
+    runs = [Scenario(signed(sign), "equilibrium").run_key for sign in (1.0, -1.0)]
+    assert runs[0] == runs[1]
+    assert runs[0][0] != input_hash(sine_travel)

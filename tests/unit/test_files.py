@@ -1,0 +1,65 @@
+"""Files are written whole or not at all."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from vehiclemor.errors import FileError
+from vehiclemor.files import TEMPORARY, make_folder, remove_leftovers, write_text, write_whole
+
+# Above any process number of the kernel.
+NO_PROCESS = 2**30
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_write_that_breaks_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "file.txt", "old")
+
+    def broken(temporary: Path) -> None:
+        temporary.write_text("half of the n")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_whole(path, broken)
+    assert path.read_text() == "old"
+    assert names_in(tmp_path) == ["file.txt"]
+
+
+def test_the_old_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "file.txt", "old")
+    seen = []
+
+    def write(temporary: Path) -> None:
+        temporary.write_text("new")
+        seen.append(path.read_text())
+        assert temporary.suffix == ".txt"
+
+    write_whole(path, write)
+    assert seen == ["old"]
+    assert path.read_text() == "new"
+
+
+def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
+    def full(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(FileError, match=r"file\.txt: can't be written \(No space left on device\)"):
+        write_whole(tmp_path / "file.txt", full)
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "file", "")
+    with pytest.raises(FileError, match="not a folder"):
+        make_folder(path / "below")
+
+
+def test_leftovers_of_dead_processes_alone_are_removed(tmp_path: Path) -> None:
+    names = [f"{TEMPORARY}{process}-1-a.nc" for process in (NO_PROCESS, os.getpid())]
+    for name in (*names, "a.nc"):
+        (tmp_path / name).touch()
+    remove_leftovers(tmp_path)
+    assert names_in(tmp_path) == sorted([names[1], "a.nc"])
