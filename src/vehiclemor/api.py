@@ -200,7 +200,8 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     ----------
     what
         `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
-        not seen, beside full-order integrators.
+        not seen, beside full-order integrators.  The name of a model: every method that fits it,
+        nominal, perturbed and on unseen inputs, with costs.
     out
         Results folder.
     jobs
@@ -210,18 +211,12 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     -------
     pandas.DataFrame
         Of `paper` the columns model, item, published, reproduced, unit, floor, replay, verdict
-        (`met`, `missed` or `not_comparable`), reason; those of `predictive` are described at
-        `vehiclemor.report.predictive.predictive_comparison`.
+        (`met`, `missed` or `not_comparable`), reason; those of the others are described at
+        `predictive_comparison` and `model_comparison` in `vehiclemor.report`.
     """
-    if what == "predictive":
-        from vehiclemor.report.predictive import predictive_comparison
+    from vehiclemor.report.comparison.kinds import comparison
 
-        return predictive_comparison(Path(out), jobs)
-    if what != "paper":
-        raise registry.unknown("comparison", what, ["paper", "predictive"])
-    from vehiclemor.report.compare import comparison
-
-    return comparison(Path(out), jobs)
+    return comparison(what, Path(out), jobs)
 
 
 def figures(
@@ -235,7 +230,8 @@ def figures(
     Parameters
     ----------
     only
-        Figure names such as `6`; all by default.
+        Figure names such as `6`, or `histories-`, `errors-`, `map-` or `pareto-` and the name of a
+        model; the paper's by default.
     out
         Folder of the figures.
     results

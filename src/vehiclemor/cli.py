@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,7 +15,6 @@ from vehiclemor import __version__, api
 from vehiclemor.errors import InputError, VehiclemorError
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from rich.progress import TaskID
 
@@ -190,29 +190,24 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     return 0
 
 
-class _progress:  # noqa: N801 - reads as a function
+@contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
     """Progress bar on a terminal, a line for each study elsewhere."""
+    from rich.console import Console
+    from rich.progress import Progress
 
-    def __enter__(self):  # noqa: ANN204
-        from rich.console import Console
-        from rich.progress import Progress
+    console = Console(stderr=True)
+    tasks: dict[str, TaskID] = {}
+    with Progress(console=console, disable=not console.is_terminal) as bar:
 
-        console = Console(stderr=True)
-        self._quiet = not console.is_terminal
-        self._bar = Progress(console=console, disable=not console.is_terminal)
-        self._bar.start()
-        self._tasks: dict[str, TaskID] = {}
-        return self._update
+        def update(study: str, done: int, total: int) -> None:
+            if study not in tasks:
+                if done < total and not console.is_terminal:
+                    print(f"{study}: {total - done} of {total} cells to compute", file=sys.stderr)
+                tasks[study] = bar.add_task(study, total=total)
+            bar.update(tasks[study], completed=done)
 
-    def _update(self, study: str, done: int, total: int) -> None:
-        if study not in self._tasks and self._quiet and done < total:
-            print(f"{study}: {total - done} of {total} cells to compute", file=sys.stderr)
-        if study not in self._tasks:
-            self._tasks[study] = self._bar.add_task(study, total=total)
-        self._bar.update(self._tasks[study], completed=done)
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        yield update
 
 
 @app.command
@@ -230,8 +225,8 @@ def compare(
     Parameters
     ----------
     what
-        The comparison: paper (published beside reproduced), or predictive (reduced models on inputs
-        that they have not seen).
+        The comparison: paper (published beside reproduced), predictive (reduced models on inputs
+        that they have not seen), or the name of a model (every method that fits it).
     json_output
         Print JSON.
     out
@@ -243,22 +238,12 @@ def compare(
     if json_output:
         print(rows.to_json(orient="records", indent=2))
     else:
-        _print_comparison(what, rows, out)
-    return MISSED if "missed" in set(rows["verdict"]) else 0
+        from vehiclemor.report.comparison.kinds import comparison_text
 
-
-def _print_comparison(what: str, rows: pd.DataFrame, out: Path) -> None:
-    if what == "predictive":
-        from vehiclemor.report import predictive_text
-
-        print(predictive_text.printed(rows))
-        return
-    from vehiclemor.report.compare import printed
-    from vehiclemor.report.costs import printed_costs
-
-    print(printed(rows))
-    print()
-    print(printed_costs(out))
+        print(comparison_text(what, rows, out))
+    # The comparison of a model judges nothing that was published.
+    judged = what in ("paper", "predictive")
+    return MISSED if judged and "missed" in set(rows["verdict"]) else 0
 
 
 @app.command
@@ -274,7 +259,8 @@ def figures(
     Parameters
     ----------
     only
-        Names of figures, separated by commas; all by default.
+        Names of figures, separated by commas: those of the paper, such as 6, or histories-,
+        errors-, map- or pareto- and the name of a model.  The paper's by default.
     out
         Folder of the figures.
     results
@@ -304,25 +290,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         status = app(given, exit_on_error=False, print_error=False, result_action="return_value")
-    except CycloptsError as error:
-        return _fail(str(error))
-    except VehiclemorError as error:
-        return _fail(str(error))
+    except (CycloptsError, VehiclemorError) as error:
+        print("vehiclemor: " + " ".join(str(error).split()), file=sys.stderr)
+        return WRONG_INPUT
     except KeyboardInterrupt:
-        print(
-            "vehiclemor: interrupted; finished cells are stored, run again to resume",
-            file=sys.stderr,
-        )
+        text = "vehiclemor: interrupted; finished cells are stored, run again to resume"
+        print(text, file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
         return 0
     return int(status or 0)
-
-
-def _fail(message: str) -> int:
-    print("vehiclemor: " + " ".join(message.split()), file=sys.stderr)
-    return WRONG_INPUT
 
 
 if __name__ == "__main__":

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from vehiclemor.cli import main
-from vehiclemor.report import tables
-from vehiclemor.report.compare import COLUMNS, comparison
+from vehiclemor.report import errors, tables
+from vehiclemor.report.comparison.paper import paper_comparison
+from vehiclemor.report.comparison.row import COLUMNS
+from vehiclemor.report.comparison.times import slower_row, time_rows
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.published import load_published
@@ -47,7 +49,7 @@ method = "pod"
 
 @pytest.fixture(scope="module")
 def rows(results_folder):
-    return comparison(results_folder)
+    return paper_comparison(results_folder)
 
 
 def test_every_published_number_has_a_row(rows):
@@ -116,9 +118,27 @@ def test_time_of_a_vehicle_stands_beside_both_baselines(rows, model):
             assert words in reason
 
 
+def test_rows_are_found_whatever_their_labels_and_order(results_folder):
+    published = load_published()
+
+    def found(change):
+        rows = []
+        for number in published.numbers.values():
+            if number.kind == "time_reduction":
+                rows += time_rows(number, change(cost_table(number.model, results_folder)))
+        claim = published.claims["dw_fig14_six_slower_than_three"]
+        costs = change(cost_table("double_wishbone", results_folder))
+        rows.append(slower_row(claim, costs, few=3, many=6))
+        return {(row.model, row.item): (row.reproduced, row.verdict, row.reason) for row in rows}
+
+    plain = found(lambda table: table)
+    assert len(plain) == 4 + 4 + 2 + 1 + 1
+    assert found(lambda table: table.assign(label="renamed").iloc[::-1]) == plain
+
+
 def test_costs_are_consistent(results_folder):
-    table = cost_table("double_wishbone", results_folder).set_index("contestant")
-    newton, strongest = table.loc["full order, Newton"], table.loc["full order, strongest"]
+    table = cost_table("double_wishbone", results_folder).set_index("case")
+    newton, strongest = table.loc["baseline"], table.loc["strongest"]
     assert newton["speed_up"] == 1.0
     assert strongest["speed_up_strongest"] == 1.0
     assert strongest["residual_evaluations"] < 1.1 * 1001
@@ -144,20 +164,20 @@ def test_break_even_is_the_training_over_what_a_run_saves(results_folder, model)
 
 @pytest.mark.parametrize(
     ("model", "reduced", "share", "yaw"),
-    [(VEHICLES[0], "pod r=3", 0.25, 3e-4), (VEHICLES[1], "pod r=1", 0.1, 1e-3)],
+    [(VEHICLES[0], "pod_r3", 0.25, 3e-4), (VEHICLES[1], "pod_r1", 0.1, 1e-3)],
 )
 def test_counts_of_a_vehicle(results_folder, model, reduced, share, yaw):
     table = cost_table(model, results_folder)
     for start, part in table.groupby("start"):
-        rows = part.set_index("contestant")
-        explicit, best = rows.loc["full order, explicit"], rows.loc["full order, strongest"]
+        rows = part.set_index("case")
+        explicit, best = rows.loc["baseline"], rows.loc["strongest"]
         assert rows.loc[reduced, "rhs_calls"] < share * explicit["rhs_calls"], start
         assert best["rhs_calls"] < 0.05 * explicit["rhs_calls"], start
         assert best["rms_yaw"] < yaw, start
 
 
 def test_errors_of_a_vehicle_by_groups_of_quantities(results_folder):
-    table = tables.quantity_table("high_fidelity_vehicle", results_folder)
+    table = errors.quantity_table("high_fidelity_vehicle", results_folder)
     assert set(table["group"]) == {"coordinate", "speed", "output", "constraint"}
     exact = table[table["method"] == "replay"]
     assert (exact[exact["group"] != "constraint"]["rms"] == 0.0).all()
@@ -183,6 +203,7 @@ def test_command_prints_json_and_says_that_bounds_are_missed(results_folder, cap
 def test_command_prints_a_table_with_costs(results_folder, capsys):
     main(["compare", "--out", str(results_folder)])
     printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 100
     for word in ("published", "reproduced", "floor", "replay", "verdict", "break-even", "missed"):
         assert word in printed
     assert "never published" in printed
@@ -192,7 +213,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
     # The whole study of settings has hundreds of cells: a few stand in for them.
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
-    monkeypatch.setattr(tables, "SETTINGS", {str(path): ("pitch", "yaw")})
+    monkeypatch.setattr(tables, "settings_studies", lambda: {str(path): ("pitch", "yaw")})
     names = ["5", "8", "10"]
     contents = []
     for turn in ("first", "second"):
@@ -200,7 +221,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
         paths = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)
         contents.append({path.name: path.read_bytes() for path in paths})
-    assert len(contents[0]) == 2 * len(names) + 3 * 13
+    assert len(contents[0]) == 2 * len(names) + 3 * 16
     assert contents[0] == contents[1]
     assert all(contents[0].values())
 
@@ -241,11 +262,10 @@ def test_tables_escape_what_their_format_reserves():
     assert r"5 \% | x\_1 \& y" in latex(table)
 
 
-def test_table_of_settings_records_what_does_not_fit(tmp_path, monkeypatch):
+def test_table_of_settings_records_what_does_not_fit(tmp_path):
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
-    monkeypatch.setattr(tables, "SETTINGS", {str(path): ("pitch", "yaw")})
-    table = tables.settings_table(str(path), tmp_path / "results")
+    table = errors.settings_table(str(path), ("pitch", "yaw"), tmp_path / "results")
     table = table.set_index(["formulation", "rank"])
     assert len(table) == 4
     assert (table.xs(7, level="rank")["status"] == "rejected").all()

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from vehiclemor.report.predictive_text import printed
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
-from vehiclemor.report.predictive_text import printed
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose

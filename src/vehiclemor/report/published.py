@@ -140,6 +140,12 @@ def load_published(path: Path | None = None) -> Published:
     return Published(content.paper, numbers, _by_id(content.claim, "claim", path))
 
 
+def rms_numbers(model: str) -> dict[str, Number]:
+    """Published RMS errors of a model by the output that they are about; none for a plug-in's."""
+    numbers = load_published().numbers.values()
+    return {n.quantity: n for n in numbers if n.model == model and n.kind == "rms_error"}
+
+
 def _by_id(entries: list[Entry], kind: str, path: Path) -> dict[str, Entry]:
     found: dict[str, Entry] = {}
     for entry in entries:

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.files import make_folder, write_text, write_whole
-from vehiclemor.registry import unknown
 from vehiclemor.study.run import run_studies
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 FORMATS = ("svg", "png")
@@ -28,7 +28,7 @@ def regenerate_figures(
     out
         Folder of the figures.
     only
-        Names of figures; those of the paper if empty.
+        Names of figures, see `figures/catalogue.py`; those of the paper if empty.
     jobs
         Number of processes for missing studies.
 
@@ -47,30 +47,29 @@ def regenerate_figures(
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS
+    from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
 
-    for name in only:
-        if name not in FIGURES:
-            raise unknown("figure", name, FIGURES)
-    chosen = {
-        name: entry for name, entry in FIGURES.items() if (name in only if only else entry.default)
-    }
+    defaults = [name for name, entry in FIGURES.items() if entry.default]
+    chosen = {name: find(name, results) for name in only or defaults}
     make_folder(out)
-    needed = dict.fromkeys(study for entry in chosen.values() for study in entry.studies)
-    data = {study: run_studies(study, results, jobs)[study] for study in needed}
+    data: dict[str, xr.Dataset] = {}
+    for study in dict.fromkeys(study for entry in chosen.values() for study in entry.studies):
+        data |= run_studies(study, results, jobs)
     written: list[Path] = []
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
         with plt.style.context(Path(__file__).with_name("style.mplstyle")):
-            figure = entry.draw({study: data[study] for study in entry.studies})
+            figure = entry.draw(data)
             for suffix in FORMATS:
                 path = out / f"figure-{name}.{suffix}"
                 _save(figure, path)
                 written.append(path)
             plt.close(figure)
-        hashes = sorted({str(data[study].attrs["kernel_hash"]) for study in entry.studies})
-        origin = f"Studies: {', '.join(entry.studies)}; kernels {', '.join(hashes)}."
-        index += [f"- figure-{name}: {entry.caption} {origin if entry.studies else ''}".rstrip()]
+        origin = ""
+        if entry.studies:
+            hashes = sorted({str(data[study].attrs["kernel_hash"]) for study in entry.names})
+            origin = f"Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
+        index.append(f"- figure-{name}: {entry.caption} {origin}".rstrip())
     if not only:
         written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
     return written

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.linalg import subspace_angles
@@ -32,18 +33,15 @@ from vehiclemor.simulation.build import build
 SIMILAR_SUBSPACES = 0.1
 # The end of the simulation: the last fifth.
 END = 0.8
-DISPLACEMENT, ANGLE = "spindle_y", "second_euler_angle"
+BOTH = DISPLACEMENT, ANGLE = "spindle_y", "second_euler_angle"
+Criterion = Callable[[Results, str], Finding]
 
 
-def nearly_identical(results: Results, label: str) -> Finding:
-    """Figure 6: original and reduced outputs can't be told apart."""
-    point = at_point(results["figures-6-7"], label, rank=3)
-    return not_visible(point, (DISPLACEMENT, ANGLE), INDISTINGUISHABLE)
-
-
-def displacement_unaffected(results: Results, label: str) -> Finding:
-    """Figure 11: the displacement follows at frequency +20 %."""
-    return not_visible(at_point(results["figure-11"], label, rank=3), (DISPLACEMENT,))
+def _agree(study: str, outputs: tuple[str, ...], bound: float) -> Criterion:
+    """Criterion that outputs deviate by less than a share of their ranges, r = 3."""
+    return lambda results, label: not_visible(
+        at_point(results[study], label, rank=3), outputs, bound
+    )
 
 
 def angle_diverges_at_end(results: Results, label: str) -> Finding:
@@ -82,11 +80,6 @@ def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
     return Finding(worst, 1.0 - SMALLEST_CHANGE, worst < 1.0 - SMALLEST_CHANGE, text)
 
 
-def no_divergence(results: Results, label: str) -> Finding:
-    """Figure 12: neither output deviates visibly at amplitude +20 %."""
-    return not_visible(at_point(results["figure-12"], label, rank=3), (DISPLACEMENT, ANGLE))
-
-
 def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     """Figure 12: training at amplitude +20 % gives nearly the same subspaces."""
     del results, label
@@ -112,7 +105,8 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     return Finding(largest, SIMILAR_SUBSPACES, largest < SIMILAR_SUBSPACES, text)
 
 
-def _not_monotone(results: Results, study: str, factor: str, label: str) -> Finding:
+def _not_monotone(study: str, factor: str, results: Results, label: str) -> Finding:
+    """Figure 13: a larger perturbation of the input need not give a larger error."""
     factors = results[study][factor].values
     falls: dict[str, float] = {}
     for output in (DISPLACEMENT, ANGLE):
@@ -133,16 +127,6 @@ def _not_monotone(results: Results, study: str, factor: str, label: str) -> Find
 def _from_first(errors: np.ndarray) -> np.ndarray:
     """Errors from the first that is not zero on: replay is exact at the nominal input."""
     return errors[np.argmax(errors > 0.0) :]
-
-
-def not_monotone_frequency(results: Results, label: str) -> Finding:
-    """Figure 13, top: a larger frequency perturbation need not give a larger error."""
-    return _not_monotone(results, "figure-13-frequency", "frequency_factor", label)
-
-
-def not_monotone_amplitude(results: Results, label: str) -> Finding:
-    """Figure 13, bottom: a larger amplitude perturbation need not give a larger error."""
-    return _not_monotone(results, "figure-13-amplitude", "amplitude_factor", label)
 
 
 def angle_more_sensitive(results: Results, label: str) -> Finding:
@@ -205,15 +189,19 @@ def more_robust_to_amplitude(results: Results, label: str) -> Finding:
     return Finding(share, 0.5, share > 0.5, text)
 
 
-CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
-    "dw_fig6_nearly_identical": nearly_identical,
-    "dw_fig11_displacement_unaffected": displacement_unaffected,
+CRITERIA: dict[str, Criterion] = {
+    "dw_fig6_nearly_identical": _agree("figures-6-7", BOTH, INDISTINGUISHABLE),
+    "dw_fig11_displacement_unaffected": _agree("figure-11", (DISPLACEMENT,), VISIBLE),
     "dw_fig11_angle_diverges_at_end": angle_diverges_at_end,
     "dw_fig11_shorter_period_reduces_deviation": shorter_period_reduces_deviation,
-    "dw_fig12_no_divergence": no_divergence,
+    "dw_fig12_no_divergence": _agree("figure-12", BOTH, VISIBLE),
     "dw_fig12_basis_insensitive_to_amplitude": basis_insensitive_to_amplitude,
-    "dw_fig13_not_monotone_frequency": not_monotone_frequency,
-    "dw_fig13_not_monotone_amplitude": not_monotone_amplitude,
+    "dw_fig13_not_monotone_frequency": partial(
+        _not_monotone, "figure-13-frequency", "frequency_factor"
+    ),
+    "dw_fig13_not_monotone_amplitude": partial(
+        _not_monotone, "figure-13-amplitude", "amplitude_factor"
+    ),
     "dw_fig13_angle_more_sensitive": angle_more_sensitive,
     "dw_fig14_three_states_fail": three_states_fail,
     "dw_fig14_six_states_follow": six_states_follow,

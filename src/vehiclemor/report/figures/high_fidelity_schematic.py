@@ -14,8 +14,7 @@ from vehiclemor.models.high_fidelity import quantities as vehicle
 from vehiclemor.models.high_fidelity.definition import DEFINITION
 from vehiclemor.models.high_fidelity.equilibrium import wheel_places
 from vehiclemor.parameters import load_parameters
-from vehiclemor.report.figures import mechanism
-from vehiclemor.report.figures.lines import Results
+from vehiclemor.report.figures import suspension_schematic
 from vehiclemor.report.figures.space import (
     SIZES,
     draw_box,
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLORS = {
-    **mechanism.COLORS,
+    **suspension_schematic.COLORS,
     "road": "#777777",
     "trailing arm": "#E69F00",
     "front wheel": "#999999",
@@ -72,9 +71,8 @@ _FRONT = ("upper_", "lower_", "tie_rod_", "wheel_", "front_spring_")
 Point = np.ndarray
 
 
-def figure_8(results: Results) -> Figure:
+def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, and the graph of its bodies and joints."""
-    del results
     parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: parameters[name] for name in vehicle.PARAMETERS}
     # Placed by hand: the style's automatic layout can't deal with axes in space.
@@ -139,7 +137,7 @@ def _draw_vehicle(axis: Any, p: Mapping[str, Any], height: float) -> None:
 
 def _front_corner(axis: Any, at: Mapping[str, Point], named: bool) -> None:
     upper, lower, outer = (at[n] for n in ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer"))
-    for name, points in mechanism.linkage(at).items():
+    for name, points in suspension_schematic.linkage(at).items():
         label = name if named else None
         axis.plot(*np.array(points).T, color=COLORS[name], linewidth=2.0, label=label)
         if len(points) > 2:
@@ -221,7 +219,7 @@ def _draw_graph(axis: Axes) -> None:
         ("chassis", "trailing arm", "R  $a$"),
         ("trailing arm", "rear wheel", f"R  {spin}"),
     ]
-    mechanism.draw_graph(axis, NODES, edges, COLORS)
+    suspension_schematic.draw_graph(axis, NODES, edges, COLORS)
     for end, (x, y, width, height) in CORNERS.items():
         outline = {"edgecolor": SIZES, "facecolor": "none", "linestyle": ":", "linewidth": 0.9}
         axis.add_patch(Rectangle((x, y), width, height, **outline))

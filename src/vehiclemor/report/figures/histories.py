@@ -1,151 +1,269 @@
-"""Time histories and their errors: figures 6, 7, 11, 12 and 14."""
+"""Time histories and paths of any model: full order beside reduced models, and their errors."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from vehiclemor.report.figures.lines import (
-    DEFAULT,
+    CROSS,
     FULL,
-    LITERAL,
-    REPLAY,
     Results,
+    Style,
     legend_above,
+    letter,
     point,
+    styles,
 )
+from vehiclemor.report.labels import axis_label, error_label
+from vehiclemor.report.published import rms_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LABELS = {
-    "spindle_y": "spindle displacement y (m)",
-    "second_euler_angle": r"second Euler angle $\eta$ (rad)",
-}
+PUBLISHED = "published RMS error"
+STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
 
 
-def _panels() -> tuple[Figure, list[Axes]]:
-    figure, axes = plt.subplots(2, 1, sharex=True)
-    for axis, letter, label in zip(axes, "ab", LABELS.values(), strict=True):
-        axis.set_title(f"({letter})")
-        axis.set_ylabel(label)
-    axes[1].set_xlabel("time (s)")
-    axes[1].set_xlim(0.0, 10.0)
-    return figure, list(axes)
+class Line(NamedTuple):
+    """A method in a study: its label there, its text in the legend and its style."""
+
+    method: str
+    text: str
+    style: Style
 
 
-def _control_periods(axis: Axes) -> None:
-    axis.axvline(5.0, color="#999999", linewidth=0.8, linestyle=(0, (1, 3)))
+class Panel(NamedTuple):
+    """One output of a study from one start, and the reduced models that are drawn."""
+
+    dataset: xr.Dataset
+    output: str
+    lines: Sequence[Line]
 
 
-def _comparison(dataset: xr.Dataset, replay: bool) -> Figure:
-    figure, axes = _panels()
-    full = point(dataset, "full_order", rank=3)
-    for axis, output in zip(axes, LABELS, strict=True):
-        axis.plot(full.time, full["outputs"].sel(output=output), label="full order", **FULL)
-        for label, text, style in (
-            ("pod", "POD, r = 3 (least squares)", DEFAULT),
-            ("pod_literal", "POD, r = 3 (literal)", LITERAL),
-        ):
-            reduced = point(dataset, label, rank=3)["outputs"].sel(output=output)
-            axis.plot(full.time, reduced, label=text, **style)
-        if replay:
-            recorded = point(dataset, "replay", rank=3)["outputs"].sel(output=output)
-            axis.plot(full.time, recorded, label="replay", **REPLAY)
-        _control_periods(axis)
-    legend_above(figure, axes[0])
-    return figure
+def figure_histories(
+    results: Results,
+    *,
+    outputs: Sequence[str],
+    methods: Mapping[str, str],
+    rows: Sequence[str] = ("history",),
+    place: Mapping[str, object] | None = None,
+    shown: float | None = None,
+    marks: Sequence[float] = (),
+    whole: bool = False,
+    limits: Sequence[float] | None = None,
+    height: float = 4.4,
+    columns: int = 4,
+) -> Figure:
+    """Rows of panels for each output, one column for each start.
 
-
-def figure_6(results: Results) -> Figure:
-    """Nominal input, r = 3."""
-    return _comparison(results["figures-6-7"], replay=False)
-
-
-def figure_7(results: Results) -> Figure:
-    """Errors of figure 6."""
-    figure, axes = _panels()
-    dataset = results["figures-6-7"]
-    for axis, output in zip(axes, LABELS, strict=True):
-        for label, text, style in (
-            ("pod", "POD, r = 3 (least squares)", DEFAULT),
-            ("pod_literal", "POD, r = 3 (literal: Galerkin)", LITERAL),
-        ):
-            reduced = point(dataset, label, rank=3)
-            error = reduced["outputs"] - reduced["reference_outputs"]
-            axis.plot(reduced.time, error.sel(output=output), label=text, **style)
-        floor = float(point(dataset, "pod", rank=3)["floor_rms_error"].sel(output=output))
-        axis.axhspan(
-            -floor, floor, color="#BBBBBB", alpha=0.5, label="RMS of the best approximation"
-        )
-        _control_periods(axis)
-    axes[0].set_ylabel("error of y (m)")
-    axes[1].set_ylabel(r"error of $\eta$ (rad)")
-    legend_above(figure, axes[0])
-    return figure
-
-
-def figure_11(results: Results) -> Figure:
-    """Frequency +20 %."""
-    return _comparison(results["figure-11"], replay=True)
-
-
-def figure_12(results: Results) -> Figure:
-    """Amplitude +20 %."""
-    return _comparison(results["figure-12"], replay=True)
-
-
-def figure_14(results: Results) -> Figure:
-    """Frequency +100 %: r = 3 above, r = 6 with its spread and r = 4 below."""
-    figure, axes = plt.subplots(2, 1, sharex=True, figsize=(6.7, 5.2))
-    dataset, spread = results["figure-14"], results["figure-14-spread"]
-    full = point(dataset, "full_order", rank=3)["outputs"].sel(output="second_euler_angle")
-    for axis in axes:
-        axis.plot(full.time, full, label="full order", **FULL)
-        axis.set_ylabel(LABELS["second_euler_angle"])
-        _control_periods(axis)
-    replay = point(dataset, "replay", rank=3)["outputs"].sel(output="second_euler_angle")
-    for label, text, style in (
-        ("pod", "POD, r = 3 (least squares)", DEFAULT),
-        ("pod_literal", "POD, r = 3 (literal)", LITERAL),
+    Parameters
+    ----------
+    methods
+        Label of a reduced model in the study -> text of the legend.
+    rows
+        What each output has a row of: `history`, `error` (over the time, beside the RMS error of
+        the best approximation) or `largest error` (in each control period, beside the published).
+    place
+        Place in the study's grid.
+    shown
+        Time up to which the runs are shown, in s.
+    marks
+        Times of vertical lines, in s.
+    whole
+        Draw lines in full, instead of up to where they leave the full-order signal's range.
+    limits
+        Of the axes of the largest errors.
+    height
+        Of the figure, in inches.
+    columns
+        Of the legend.
+    """
+    (dataset,) = results.values()
+    dataset = dataset.sel(dict(place or {}))
+    lines = _lines(dataset, methods)
+    starts = [str(start) for start in dataset["start"].values]
+    shape = len(outputs) * len(rows), len(starts)
+    figure, axes = plt.subplots(*shape, sharex=True, squeeze=False, figsize=(6.7, height))
+    ended: dict[str, str] = {}
+    contents = [
+        (output, content, start) for output in outputs for content in rows for start in starts
+    ]
+    for number, (axis, (output, content, start)) in enumerate(
+        zip(axes.flat, contents, strict=True)
     ):
-        reduced = point(dataset, label, rank=3)["outputs"].sel(output="second_euler_angle")
-        axes[0].plot(full.time, reduced, label=text, **style)
-    axes[0].plot(full.time, replay, label="replay", **REPLAY)
-    six = point(spread, "pod_literal", rank=6)["outputs"].sel(output="second_euler_angle")
-    six = six.transpose("rounding_seed", "time").values
-    lowest, highest = np.nanmin(six, axis=0), np.nanmax(six, axis=0)
-    span: dict[str, Any] = {"color": "#D55E00", "alpha": 0.3, "linewidth": 0.0}
-    axes[1].fill_between(
-        full.time, lowest, highest, label="POD, r = 6 (literal), spread (leaves the axes)", **span
-    )
-    uncut = point(spread, "pod_uncut", rank=6)["outputs"].sel(output="second_euler_angle")
-    uncut = uncut.transpose("rounding_seed", "time").values
-    axes[1].fill_between(
-        full.time,
-        np.nanmin(uncut, axis=0),
-        np.nanmax(uncut, axis=0),
-        label="POD, r = 6 (least squares), spread (thinner than a line)",
-        color="#0072B2",
-        alpha=0.6,
-        linewidth=0.0,
-    )
-    axes[1].plot(full.time, six[0], label="POD, r = 6 (literal), as computed", **LITERAL)
-    four = point(dataset, "pod", rank=4)["outputs"].sel(output="second_euler_angle")
-    axes[1].plot(
-        full.time, four, label="POD, r = 4 (least squares)", color="#009E73", linestyle="--"
-    )
+        panel = Panel(dataset.sel(start=start), output, lines)
+        if content == "history":
+            ended |= _draw_history(axis, panel, whole)
+        elif content == "error":
+            _draw_errors(axis, panel)
+        else:
+            ended |= _draw_largest_errors(axis, panel, limits)
+        for moment in marks:
+            axis.axvline(moment, color="#999999", linewidth=0.8, linestyle=(0, (1, 3)))
+        several = f" {STARTS.get(start, start)}" if len(starts) > 1 else ""
+        axis.set_title(letter(number) + several)
+    last = float(dataset["time"][-1])
+    for axis in axes[-1]:
+        part = f", first {shown:g} s of {last:g} s" if shown else ""
+        axis.set_xlabel(f"time (s){part}")
+        axis.set_xlim(0.0, shown or last)
+    for text, color in ended.items():
+        axes[0, 0].plot([], [], color=color, label=text, **CROSS)
+    if "history" in rows and "largest error" in rows:
+        # The legend is that of the first panel.
+        axes[0, 0].plot([], [], color="black", linestyle=":", label=PUBLISHED)
+    legend_above(figure, axes[0, 0], columns)
+    return figure
+
+
+def _lines(dataset: xr.Dataset, methods: Mapping[str, str]) -> list[Line]:
+    known = [method for method in methods if method in dataset["method"].values]
+    return [Line(m, methods[m], style) for m, style in styles(known).items()]
+
+
+def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
+    """One output of the full and the reduced models; what the crosses mean -> their colour."""
+    dataset, output, lines = panel
+    full = point(dataset, "full_order")["outputs"].sel(output=output)
+    axis.plot(full.time, full, label="full order", **FULL)
+    axis.set_ylabel(axis_label(dataset, output))
     low, high = float(full.min()), float(full.max())
-    margin = 0.35 * (high - low)
-    axes[1].set_ylim(low - margin, high + margin)
-    axes[0].set_title("(a)")
-    axes[1].set_title("(b)")
-    axes[0].legend(loc="lower center", bbox_to_anchor=(0.53, 1.0), ncols=4)
-    axes[1].legend(loc="lower center", bbox_to_anchor=(0.53, 1.0), ncols=2)
-    axes[1].set_xlabel("time (s)")
-    axes[1].set_xlim(0.0, 10.0)
+    margin = 0.25 * (high - low)
+    if not whole and margin > 0.0:
+        axis.set_ylim(low - margin, high + margin)
+    left: dict[str, str] = {}
+    for method, text, style in lines:
+        history = point(dataset, method)["outputs"].sel(output=output)
+        if whole:
+            axis.plot(full.time, history, label=text, **style)
+        elif _plot_until_it_leaves(axis, history, text, style):
+            left["leaves the axes"] = style["color"]
+    axis.ticklabel_format(style="plain")
+    if not whole:
+        axis.locator_params(axis="y", nbins=5)
+    return left
+
+
+def _plot_until_it_leaves(axis: Axes, history: xr.DataArray, text: str, style: Style) -> bool:
+    """Draw a history up to the first point outside the axes, and a cross there."""
+    low, high = axis.get_ylim()
+    time, values = history["time"].values, history.values.copy()
+    outside = np.flatnonzero(~((values >= low) & (values <= high)))
+    if outside.size:
+        first = int(outside[0])
+        # A run that has diverged ends without a value.
+        seen = first if np.isfinite(values[first]) else max(first - 1, 0)
+        place = (time[seen], np.clip(values[seen], low, high))
+        axis.plot(*place, color=style["color"], clip_on=False, **CROSS)
+        values[first + 1 :] = np.nan
+    axis.plot(time, values, label=text, **style)
+    return bool(outside.size)
+
+
+def _draw_errors(axis: Axes, panel: Panel) -> None:
+    """Errors over the time, and the RMS error of the best approximation by the first method."""
+    dataset, output, lines = panel
+    for method, text, style in lines:
+        run = point(dataset, method)
+        error = (run["outputs"] - run["reference_outputs"]).sel(output=output)
+        axis.plot(run.time, error, label=text, **style)
+    floors = (point(dataset, line.method)["floor_rms_error"].sel(output=output) for line in lines)
+    floor = next((float(value) for value in floors if np.isfinite(value)), None)
+    if floor is not None:
+        shade = {"color": "#BBBBBB", "alpha": 0.5, "label": "RMS of the best approximation"}
+        axis.axhspan(-floor, floor, **shade)
+    axis.set_ylabel(error_label(dataset, "error", output))
+
+
+def _draw_largest_errors(
+    axis: Axes, panel: Panel, limits: Sequence[float] | None
+) -> dict[str, str]:
+    """Largest error in each of the published control periods; the meaning of crosses."""
+    dataset, output, lines = panel
+    published = rms_numbers(str(dataset.attrs["model"])).get(output)
+    last = float(dataset["time"][-1])
+    period = published.control_period if published else None
+    ended: dict[str, str] = {}
+    for method, text, style in lines:
+        run = point(dataset, method)
+        error = abs(run["outputs"] - run["reference_outputs"]).sel(output=output)
+        edges, largest = _largest(error, period or last / 50.0)
+        axis.semilogy(edges, largest, label=text, drawstyle="steps-post", **style)
+        missing = np.flatnonzero(np.isnan(largest))
+        if missing.size:
+            ended["has diverged"] = style["color"]
+            place = edges[missing[0]], largest[max(missing[0] - 1, 0)]
+            axis.plot(*place, color=style["color"], **CROSS)
+    if published:
+        axis.axhline(published.value, color="black", linestyle=":", label=PUBLISHED)
+    if limits:
+        axis.set_ylim(*limits)
+    axis.set_ylabel(error_label(dataset, "largest error", output).replace(" of ", "\nof "))
+    return ended
+
+
+def _largest(error: xr.DataArray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Starts of the periods (n,) in s and the largest error in each."""
+    # A sample between two periods belongs to the one that ends there.
+    window = np.maximum(np.ceil(error["time"].values / period - 1e-9).astype(int) - 1, 0)
+    starts = np.unique(window)
+    return period * starts, np.array([np.fmax.reduce(error.values[window == k]) for k in starts])
+
+
+def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequence[float]) -> Figure:
+    """Path in the plane from equilibrium, one panel for each length (m) that is shown."""
+    (dataset,) = results.values()
+    figure, axes = plt.subplots(len(shown), 1)
+    for number, (axis, furthest) in enumerate(zip(axes, shown, strict=True)):
+        for method, text, style in _lines(dataset, {"full_order": "full order", **methods}):
+            path = point(dataset, method, start="equilibrium")["outputs"]
+            x, y = (path.sel(output=f"{way}_position") for way in ("longitudinal", "lateral"))
+            axis.plot(x, y, label=text, **style)
+        axis.set_xlim(0.0, furthest)
+        axis.set_ylabel("Y (m)")
+        axis.set_title(letter(number))
+    axes[-1].set_xlabel("X (m), not to the scale of Y")
+    legend_above(figure, axes[0])
+    return figure
+
+
+def figure_replayed_paths(
+    results: Results,
+    *,
+    methods: Mapping[str, str],
+    beside_replay: bool = False,
+    columns: int = 4,
+) -> Figure:
+    """Lateral position over the time without steering, bases from a lane change.
+
+    Parameters
+    ----------
+    beside_replay
+        Whether a second panel shows what sets the reduced models apart from replay.
+    """
+    (dataset,) = results.values()
+    panels, output = 2 if beside_replay else 1, "lateral_position"
+    size = (6.7, 4.8 if beside_replay else 3.2)
+    figure, axes = plt.subplots(panels, 1, sharex=True, squeeze=False, figsize=size)
+    upper, lower = axes[0, 0], axes[-1, 0]
+    replay = point(dataset, "replay", start="equilibrium")["outputs"].sel(output=output)
+    for method, text, style in _lines(dataset, methods):
+        run = point(dataset, method, start="equilibrium")["outputs"].sel(output=output)
+        upper.plot(run.time, run, label=text, **style)
+        if beside_replay and method not in ("full_order", "replay"):
+            lower.plot(run.time, 1e3 * (run - replay), label=text, **style)
+    upper.set_xlim(0.0, float(dataset["time"][-1]))
+    upper.set_ylabel(axis_label(dataset, output))
+    if beside_replay:
+        upper.set_title("(a)")
+        lower.set_title("(b)")
+        lower.set_ylabel("Y minus replay's Y (mm)")
+    lower.set_xlabel("time (s)")
+    legend_above(figure, upper, columns)
     return figure

@@ -1,8 +1,9 @@
-"""Lines and legends that figures share: one style for each contestant."""
+"""Lines, legends and selections that figures share: one style for each method."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,15 +12,45 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Results = Mapping[str, "xr.Dataset"]
-FULL: dict[str, Any] = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
-DEFAULT: dict[str, Any] = {"color": "#0072B2", "linestyle": "--"}
-LITERAL: dict[str, Any] = {"color": "#D55E00", "linestyle": "-."}
-REPLAY: dict[str, Any] = {"color": "#666666", "linestyle": ":", "linewidth": 1.2}
+Style = dict[str, Any]
+# Colour-blind safe (M. Okabe, K. Ito).
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+FULL: Style = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
+# Gaps of an upper line show the lower one where both coincide.
+DEFAULT: Style = {"color": "#0072B2", "linestyle": (0, (3, 3)), "zorder": 2.5}
+LITERAL: Style = {"color": "#D55E00", "linestyle": "-."}
+REPLAY: Style = {"color": "#666666", "linestyle": ":", "linewidth": 1.2}
+OTHER: Style = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
+CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
+# Label of a method in a study -> its style.
+STYLES = {
+    "full_order": FULL,
+    "replay": REPLAY,
+    "pod": DEFAULT,
+    "pod_literal": LITERAL,
+    "pod_state": OTHER,
+    "pod_r3": OTHER,
+    "fixed_basis": OTHER,
+}
+
+
+def styles(methods: Iterable[str]) -> dict[str, Style]:
+    """Style of each method by its label: its own, or a colour that no other line has."""
+    methods = list(methods)
+    taken = {STYLES[method]["color"] for method in methods if method in STYLES}
+    free = cycle([color for color in COLORS if color not in taken] or list(COLORS))
+    return {m: STYLES.get(m) or {"color": next(free), "linestyle": "--"} for m in methods}
 
 
 def point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
     """One method at one place of the grid."""
+    # A dictionary: `method` is also the name of an argument of `sel`.
     return dataset.sel({"method": label, **place}).squeeze(drop=True)
+
+
+def letter(number: int) -> str:
+    """Letter of a panel, counted from 0."""
+    return f"({'abcdefghijklmnopqrstuvwxyz'[number]})"
 
 
 def legend_above(figure: Figure, axis: Axes, columns: int = 4) -> None:

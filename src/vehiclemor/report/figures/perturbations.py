@@ -1,150 +1,121 @@
-"""Errors over perturbations of the input: figure 13 and its map."""
+"""Errors of any model over perturbations of its input: curves and maps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import NullFormatter
 
-from vehiclemor.report.figures.lines import DEFAULT, LITERAL, REPLAY, Results, legend_above
-from vehiclemor.report.published import load_published
+from vehiclemor.report.figures.lines import Results, Style, legend_above, letter, styles
+from vehiclemor.report.labels import error_label
+from vehiclemor.report.published import rms_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-OUTPUTS = {
-    "spindle_y": "RMS error of y (m)",
-    "second_euler_angle": r"RMS error of $\eta$ (rad)",
-}
 MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
-ONE_BASIS: dict[str, Any] = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
-FLOOR: dict[str, Any] = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
-NUMBERS = {"spindle_y": "dw_rms_spindle_y", "second_euler_angle": "dw_rms_second_euler_angle"}
+FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
+FACTORS = ("frequency_factor", "amplitude_factor")
 
 
-def figure_13(results: Results) -> Figure:
-    """RMS errors against frequency (top) and amplitude (bottom) perturbations."""
-    figure, axes = plt.subplots(2, 2, figsize=(6.7, 5.2))
-    published = load_published().numbers
-    for row, (study, factor) in enumerate(
-        (("figure-13-frequency", "frequency_factor"), ("figure-13-amplitude", "amplitude_factor"))
-    ):
-        dataset = results[study]
+def figure_error_curves(
+    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str]
+) -> Figure:
+    """RMS errors against one perturbed factor: a row for each study, a column for each output."""
+    shape = len(results), len(outputs)
+    figure, axes = plt.subplots(*shape, squeeze=False, figsize=(6.7, 2.6 * len(results)))
+    for row, dataset in enumerate(results.values()):
+        factor = max(FACTORS, key=lambda name: dataset.sizes[name])
+        published = rms_numbers(str(dataset.attrs["model"]))
         percent = 100.0 * (dataset[factor].values - 1.0)
-        for column, (output, label) in enumerate(OUTPUTS.items()):
+        for column, output in enumerate(outputs):
             axis = axes[row, column]
             chosen = dataset.sel(output=output)
-            for method, text, style in (
-                ("pod", "POD, r = 3 (least squares)", DEFAULT),
-                ("pod_literal", "POD, r = 3 (literal: Galerkin)", LITERAL),
-                ("fixed_basis", "one basis for the run, r = 3", ONE_BASIS),
-                ("replay", "replay", REPLAY),
-            ):
+            for method, style in styles(methods).items():
                 errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
                 # Replay is exact at the nominal input: no point on a logarithmic axis.
                 errors = np.where(errors > 0.0, errors, np.nan)
-                axis.semilogy(
-                    percent, errors, label=text, marker=MARKERS[method], markersize=3, **style
-                )
+                marked = {"label": methods[method], "marker": MARKERS.get(method, "^")}
+                axis.semilogy(percent, errors, markersize=3, **marked, **style)
             floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
             axis.semilogy(percent, floor, label="best approximation, control periods", **FLOOR)
-            axis.axhline(
-                published[NUMBERS[output]].value,
-                color="black",
-                linewidth=0.8,
-                label="published, nominal",
-            )
-            axis.set_ylabel(label)
+            if output in published:
+                line: Style = {"color": "black", "linewidth": 0.8, "label": "published, nominal"}
+                axis.axhline(published[output].value, **line)
+            axis.set_ylabel(error_label(dataset, "RMS error", output))
             axis.set_xlabel(f"{factor.split('_')[0]} perturbation (%)")
-            axis.set_title(f"({'abcd'[2 * row + column]})")
+            axis.set_title(letter(len(outputs) * row + column))
     legend_above(figure, axes[0, 0], columns=3)
     return figure
 
 
-def figure_13_map(results: Results) -> Figure:
-    """RMS errors over both perturbations, for POD and for replay."""
-    return error_map(results["perturbation-grid"], OUTPUTS, NUMBERS)
-
-
-def error_map(
-    dataset: xr.Dataset,
-    outputs: Mapping[str, str],
-    numbers: Mapping[str, str],
-    values_in_cells: bool = False,
-    rank: int = 3,
+def figure_error_map(
+    results: Results,
+    *,
+    outputs: Sequence[str],
+    methods: Mapping[str, str],
+    values: bool = False,
 ) -> Figure:
-    """RMS errors over frequency and amplitude perturbations, POD beside replay.
+    """RMS errors over frequency and amplitude perturbations, one column for each method.
 
     Parameters
     ----------
-    dataset
-        Grid of both factors.
     outputs
-        Output -> label of its colours; one row of panels each.
-    numbers
-        Output -> id of the published number that is drawn as a white line, if there is one.
-    values_in_cells
-        Write the error into each cell; the colours then leave the nominal input out, whose error
-        is far below all others.
-    rank
-        That of POD, for its title.
+        One row of panels each.  A published number is drawn as a white line.
+    methods
+        Label of a method in the study -> title of its column.
+    values
+        Write the error into each cell instead; the colours then leave the nominal input out,
+        whose error is far below all others.
     """
-    figure, axes = plt.subplots(2, 2, sharex=True, sharey=True, figsize=(6.7, 5.6))
-    published = load_published().numbers
-    frequency = 100.0 * (dataset["frequency_factor"].values - 1.0)
-    amplitude = 100.0 * (dataset["amplitude_factor"].values - 1.0)
+    (dataset,) = results.values()
+    shape = len(outputs), len(methods)
+    size = ((3.35 if len(methods) < 4 else 2.4) * len(methods), 2.8 * len(outputs))
+    figure, axes = plt.subplots(*shape, sharex=True, sharey=True, squeeze=False, figsize=size)
+    published = rms_numbers(str(dataset.attrs["model"]))
+    frequency, amplitude = (100.0 * (dataset[factor].values - 1.0) for factor in FACTORS)
     nominal = np.isclose(amplitude, 0.0)[:, None] & np.isclose(frequency, 0.0)
-    for row, (output, label) in enumerate(outputs.items()):
-        errors = {
-            method: dataset["rms_error"]
-            .sel({"method": method, "output": output})
-            .squeeze(drop=True)
-            .transpose("amplitude_factor", "frequency_factor")
-            .values
-            for method in ("pod", "replay")
-        }
-        shown = [e[~nominal] if values_in_cells else e for e in errors.values()]
-        lowest = min(float(np.nanmin(e[e > 0.0])) for e in shown)
-        highest = max(float(np.nanmax(e)) for e in shown)
-        norm = LogNorm(lowest, highest)
-        meshes = []
-        for column, (method, values) in enumerate(errors.items()):
+    for row, output in enumerate(outputs):
+        errors = {method: _errors(dataset, method, output) for method in methods}
+        shown = np.array([e[~nominal] if values else e for e in errors.values()])
+        norm = LogNorm(float(np.nanmin(shown[shown > 0.0])), float(np.nanmax(shown)))
+        assert norm.vmin is not None
+        assert norm.vmax is not None
+        mesh = None
+        for column, (method, found) in enumerate(errors.items()):
             axis = axes[row, column]
-            mesh = axis.pcolormesh(
-                frequency,
-                amplitude,
-                np.maximum(values, 0.5 * lowest) if values_in_cells else values,
-                norm=norm,
-                cmap="cividis",
-                shading="nearest",
-                rasterized=True,
-            )
-            meshes.append(mesh)
-            if output in numbers:
-                bound = published[numbers[output]].value
-                axis.contour(
-                    frequency, amplitude, values, levels=[bound], colors="white", linewidths=1.2
-                )
-            if values_in_cells:
-                _write(axis, frequency, amplitude, values, np.sqrt(lowest * highest))
+            cells = np.maximum(found, 0.5 * norm.vmin) if values else found
+            style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
+            mesh = axis.pcolormesh(frequency, amplitude, cells, norm=norm, **style)
+            if values:
+                _write(axis, frequency, amplitude, found, np.sqrt(norm.vmin * norm.vmax))
+            elif output in published:
+                bound = [published[output].value]
+                white: Style = {"colors": "white", "linewidths": 1.2}
+                axis.contour(frequency, amplitude, found, levels=bound, **white)
             axis.grid(visible=False)
-            name = f"POD, r = {rank}" if method == "pod" else "replay"
-            axis.set_title(f"({'abcd'[2 * row + column]}) {name}")
-            if column == 0:
-                axis.set_ylabel("amplitude perturbation (%)")
-            if row == 1:
-                axis.set_xlabel("frequency perturbation (%)")
-        extend = "min" if values_in_cells else "neither"
-        bar = figure.colorbar(meshes[-1], ax=axes[row, :], label=label, extend=extend)
-        if values_in_cells:
+            axis.set_title(f"{letter(len(methods) * row + column)} {methods[method]}")
+        axes[row, 0].set_ylabel("amplitude perturbation (%)")
+        assert mesh is not None
+        extend, label = "min" if values else "neither", error_label(dataset, "RMS error", output)
+        bar = figure.colorbar(mesh, ax=axes[row, :], label=label, extend=extend)
+        if values:
             bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    for axis in axes[-1]:
+        axis.set_xlabel("frequency perturbation (%)")
     return figure
+
+
+def _errors(dataset: xr.Dataset, method: str, output: str) -> np.ndarray:
+    """RMS errors (amplitudes, frequencies)."""
+    chosen = dataset["rms_error"].sel({"method": method, "output": output})
+    return chosen.squeeze(drop=True).transpose(*reversed(FACTORS)).values
 
 
 def _write(
@@ -152,13 +123,10 @@ def _write(
 ) -> None:
     """Errors with two digits, in white where they are below `dark`."""
     for (j, i), value in np.ndenumerate(values):
-        digits = f"{value:.1g}" if value < 1e-3 else f"{value:#.2g}"
-        axis.text(
-            float(frequency[i]),
-            float(amplitude[j]),
-            digits.replace("e-0", "e-"),
-            ha="center",
-            va="center",
-            fontsize=5.5,
-            color="white" if value < dark else "black",
-        )
+        if np.isnan(value):
+            continue
+        digits = f"{value:#.2g}" if 1e-3 <= value < 100.0 else f"{value:.1g}"
+        place = float(frequency[i]), float(amplitude[j])
+        color = "white" if value < dark else "black"
+        style: Style = {"ha": "center", "va": "center", "fontsize": 5.5, "color": color}
+        axis.text(*place, digits.replace("e-0", "e-").replace("e+0", "e"), **style)

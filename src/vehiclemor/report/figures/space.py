@@ -9,7 +9,7 @@ import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike
 
-from vehiclemor.report.figures.mechanism import rim
+from vehiclemor.report.figures.suspension_schematic import rim
 
 SIZES = "#555555"
 GREEK = ("alpha", "beta", "gamma", "zeta", "eta", "theta", "xi", "phi", "psi")

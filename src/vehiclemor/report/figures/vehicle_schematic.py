@@ -12,8 +12,6 @@ from vehiclemor.models.independent_suspension.definition import DEFINITION
 from vehiclemor.models.independent_suspension.equilibrium import derived
 from vehiclemor.models.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
-from vehiclemor.report.figures.lines import Results
-from vehiclemor.report.figures.mechanism import draw_graph
 from vehiclemor.report.figures.space import (
     CAPTIONS,
     SIZES,
@@ -25,6 +23,7 @@ from vehiclemor.report.figures.space import (
     frame_space,
     symbol,
 )
+from vehiclemor.report.figures.suspension_schematic import draw_graph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,9 +36,8 @@ HALF_WIDTH, BOTTOM, TOP, OVERHANG = 0.45, 0.50, 0.92, 0.15
 DRAWN_STEER = np.deg2rad(20.0)
 
 
-def figure_1(results: Results) -> Figure:
+def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, in the chassis frame moved to the road, and the graph."""
-    del results
     parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: float(parameters[name]) for name in vehicle.PARAMETERS}
     # Placed by hand: the style's automatic layout can't deal with axes in space.

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.report.paper_terms import paper_terms_rows
-from vehiclemor.report.predictive_targets import Row, error_columns, ratio, target_rows
+from vehiclemor.report.predictive.paper_terms import paper_terms_rows
+from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
 from vehiclemor.study.plans.choice import scores
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_file import ProtocolFile
@@ -37,13 +37,15 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
     import pandas as pd
 
     rows: list[Row] = []
+    models: list[str] = []
     for dataset in run_studies(study, folder, jobs).values():
         protocol = protocol_of(dataset)
+        models.append(protocol.model)
         methods = method_rows(dataset, protocol)
         rows += methods + outside_rows(dataset, protocol)
         rows += target_rows(dataset, protocol, methods)
     if study == STUDY:
-        rows += paper_terms_rows(folder)
+        rows += paper_terms_rows(models, folder)
     return pd.DataFrame(rows)
 
 

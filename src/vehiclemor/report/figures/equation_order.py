@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from vehiclemor.report.figures.lines import legend_above
-from vehiclemor.report.figures.perturbations import NUMBERS, OUTPUTS
-from vehiclemor.report.published import load_published
+from vehiclemor.report.figures.lines import Results, legend_above, letter
+from vehiclemor.report.labels import error_label
+from vehiclemor.report.published import rms_numbers
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
 
 VARIANTS = {
@@ -22,12 +20,16 @@ VARIANTS = {
 }
 
 
-def figure_equation_order(results: Mapping[str, xr.Dataset]) -> Figure:
+OUTPUTS = ("spindle_y", "second_euler_angle")
+
+
+def figure_equation_order(results: Results) -> Figure:
     """Sorted errors of all variants, on a logarithmic axis."""
     dataset = results["equation-order"]
     figure, axes = plt.subplots(1, 2, figsize=(6.7, 3.4))
-    published = load_published().numbers
-    for axis, (output, label), letter in zip(axes, OUTPUTS.items(), "ab", strict=True):
+    numbers = rms_numbers(str(dataset.attrs["model"]))
+    for panel, (axis, output) in enumerate(zip(axes, OUTPUTS, strict=True)):
+        published = numbers[output].value
         for method, (text, color, marker, shift) in VARIANTS.items():
             chosen = dataset["rms_error"].sel({"method": method, "output": output})
             values = chosen.squeeze(drop=True).values
@@ -52,12 +54,12 @@ def figure_equation_order(results: Mapping[str, xr.Dataset]) -> Figure:
         nominal = results["figures-6-7"].sel({"method": "pod", "rank": 3, "output": output})
         least_squares = float(nominal["rms_error"].squeeze())
         axis.axhline(least_squares, color="#0072B2", linestyle="--", label="least squares")
-        axis.axhline(published[NUMBERS[output]].value, color="black", linewidth=0.8)
-        axis.text(0.6, published[NUMBERS[output]].value * 1.2, "published", fontsize=7)
+        axis.axhline(published, color="black", linewidth=0.8)
+        axis.text(0.6, published * 1.2, "published", fontsize=7)
         axis.set_ylim(1e-7, 0.2)
         axis.text(25.5, 0.085, "x: diverged, no error", fontsize=7, ha="right")
-        axis.set_ylabel(label)
+        axis.set_ylabel(error_label(dataset, "RMS error", output))
         axis.set_xlabel("variant, sorted by error")
-        axis.set_title(f"({letter})")
+        axis.set_title(letter(panel))
     legend_above(figure, axes[0])
     return figure

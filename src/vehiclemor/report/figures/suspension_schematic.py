@@ -13,7 +13,6 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -46,9 +45,8 @@ EDGES = (
 )
 
 
-def figure_5(results: Mapping[str, xr.Dataset]) -> Figure:
+def figure_suspension() -> Figure:
     """Mechanism at design, with its positions at +-0.1 m of travel, and the graph."""
-    del results
     model = build("double_wishbone")
     assert isinstance(model, AlgebraicModel)
     # Placed by hand: the style's automatic layout can't deal with axes in space.

@@ -1,0 +1,1 @@
+"""Published beside reproduced: numbers, times and claims of the paper."""

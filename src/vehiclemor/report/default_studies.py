@@ -1,0 +1,152 @@
+"""Studies of a model by its declaration: nominal, perturbed and unseen inputs, every method.
+
+What the model declares, or the package has, is taken; else a study file is written beside the
+results, so that it runs, resumes and can be read and changed like any other.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.files import write_text
+from vehiclemor.models.report import default_rank, tabled_outputs
+from vehiclemor.registry import component, names
+from vehiclemor.report.published import rms_numbers
+from vehiclemor.resources import data_names
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
+
+# Share of a signal's range within which two curves lie on top of each other: the bound of an output
+# for which there is no published error.
+INDISTINGUISHABLE = 0.01
+FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
+TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
+# Full order under both of its presets, the paper's methods, and what is measured against them.
+FIRST = {
+    "full_order": ("full_order", "recommended"),
+    "full_order_strongest": ("full_order", "strongest"),
+    "replay": ("replay", "recommended"),
+    "pod": ("pod", "recommended"),
+    "pod_literal": ("pod", "literal"),
+    "fixed_basis": ("fixed_basis", "recommended"),
+}
+# Points [frequency factor, amplitude factor] of the sets of a protocol.
+POINTS = {
+    "training": [[1.0, 1.0], [0.7, 0.6]],
+    "validation": [[1.2, 0.8], [0.8, -0.9]],
+    "test": [[0.9, 1.0], [1.3, 1.0], [1.0, 0.5], [1.0, -1.0], [1.0, 0.0]],
+    "outside": [[1.0, 1.2], [1.6, 1.0]],
+}
+
+
+def nominal(name: str, results: Path) -> str:
+    """Study of the nominal run, that the methods are trained on."""
+    return _study(name, "nominal", results, 'training = "matched"', "")
+
+
+def perturbed(name: str, results: Path) -> str:
+    """Study over perturbations of both factors, trained on the nominal input."""
+    head = 'training = "nominal"\nkeep = "metrics"'
+    grid = f"frequency_factor = {list(FACTORS)}\namplitude_factor = {list(FACTORS)}\n"
+    return _study(name, "perturbed", results, head, grid)
+
+
+def unseen(name: str, results: Path) -> str:
+    """Study of inputs that no method has seen: the package's protocol, or one by default."""
+    study = f"predictive-{name}"
+    if study in data_names("studies"):
+        return study
+    protocol = write_text(results / "studies" / f"{name}.toml", _protocol(build(name)))
+    text = f'title = "Unseen inputs: {name}"\nprotocols = [{json.dumps(str(protocol))}]\n'
+    return str(write_text(results / "studies" / f"{study}.toml", text))
+
+
+def methods(model: Model) -> dict[str, tuple[str, str]]:
+    """Label -> (method, preset) of every registered method that accepts the model."""
+    found: dict[str, tuple[str, str]] = {}
+    for name in names("method"):
+        try:
+            method = component("method", name)
+        except InputError:
+            # A broken plug-in is named by `vehiclemor list`, and harmless elsewhere.
+            continue
+        if method.accepts(model)[0]:
+            found[name] = (name, "recommended")
+    presets = {
+        label: entry
+        for label, entry in FIRST.items()
+        if entry[0] in found and entry[1] in component("method", entry[0]).presets(model)
+    }
+    return presets | found
+
+
+def legend(name: str) -> dict[str, str]:
+    """Label of each reduced model in the studies by default -> its text in a legend."""
+    labels = [label for label in methods(build(name)) if not label.startswith("full_order")]
+    return {label: label.replace("pod", "POD").replace("_", " ") for label in labels}
+
+
+def bounds(model: Model) -> dict[str, float]:
+    """Largest RMS errors that count as good: published, declared, or a share of the range."""
+    published = rms_numbers(model.name)
+    if published:
+        return {output: number.value for output, number in published.items()}
+    definition = component("model", model.name)
+    if definition.report.bounds:
+        return dict(definition.report.bounds)
+    outputs = model.simulate(component("maneuver", definition.maneuver)).outputs
+    ranges = dict(zip(model.outputs, np.ptp(outputs, axis=0), strict=True))
+    shown = [output for output in tabled_outputs(definition) if ranges[output] > 0.0]
+    return {output: INDISTINGUISHABLE * float(ranges[output]) for output in shown}
+
+
+def _study(name: str, kind: str, results: Path, head: str, grid: str) -> str:
+    """Path of a study file of every method; methods with a rank get the model's default one."""
+    model = build(name)
+    lines = [f'title = "{name}: {kind} input, every method"', f'model = "{name}"', head]
+    # The map of perturbations has one start.
+    starts = model.starts if not grid else model.starts[:1]
+    lines += [f"start = {json.dumps(list(starts))}", "", "[grid]", grid]
+    for label, (method, preset) in methods(model).items():
+        lines += ["[[methods]]", f'method = "{method}"', f'label = "{label}"']
+        lines += [f'preset = "{preset}"', f"settings = {_inline(_rank(model, method))}", ""]
+    return str(write_text(results / "studies" / f"{name}-{kind}.toml", "\n".join(lines)))
+
+
+def _rank(model: Model, method: str) -> dict[str, int]:
+    """The rank of a default row, for a method whose own default the model is too small for."""
+    declared = component("method", method).settings(model.kind)
+    rank = default_rank(component("model", model.name))
+    own = declared["rank"].default if "rank" in declared else 0
+    return {"rank": rank} if own > rank else {}
+
+
+def _inline(table: Mapping[str, object]) -> str:
+    return "{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in table.items()) + " }"
+
+
+def _protocol(model: Model) -> str:
+    """Protocol of a model: full order at several tolerances, then every method."""
+    maneuver = component("model", model.name).maneuver
+    lines = [f'title = "{model.name}: inputs that a reduced model has not seen"']
+    lines += [f'model = "{model.name}"', "", "[bounds]"]
+    lines += [f'{o} = {{ measure = "rms", bound = {b!r} }}' for o, b in bounds(model).items()]
+    for purpose, points in POINTS.items():
+        lines += ["", f"[[{purpose}]]", f'maneuver = "{maneuver}"', f"points = {points}"]
+        lines += [f"start = {json.dumps(list(model.starts))}"]
+    tolerances: list[dict[str, object]] = [{"tolerance": value} for value in TOLERANCES]
+    for label, (method, preset) in methods(model).items():
+        if label == "pod_literal":
+            continue
+        candidates = tolerances if label == "full_order" else [{}]
+        role = {"full_order": "full order", "replay": "baseline"}.get(method, "contender")
+        chosen = [{"preset": preset, **_rank(model, method), **entry} for entry in candidates]
+        words = label.replace("full_order_", "").replace("_", " ")
+        lines += ["", "[[contestants]]", f'label = "{words}"', f'method = "{method}"']
+        lines += [f'role = "{role}"', f"candidates = [{', '.join(map(_inline, chosen))}]"]
+    return "\n".join(lines) + "\n"
