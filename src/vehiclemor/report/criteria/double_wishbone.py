@@ -87,7 +87,7 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     assert isinstance(model, AlgebraicModel)
     maneuver = component("maneuver", component("model", model.name).maneuver)
     settings = validated(pod.METHOD, model.kind, {"rank": 3})
-    edges = window_edges(maneuver.duration, float(settings["control_period"]))
+    edges = window_edges(maneuver.duration, settings.control_period)
     bases = {}
     for name, factors in {"nominal": (1, 1), "amplitude": (1, 1.2), "frequency": (1.2, 1)}.items():
         runs = training_runs(model, maneuver.perturbed(*factors), model.starts[0], "matched")
