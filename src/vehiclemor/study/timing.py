@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.report import TimingCase
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.clock import repeated
@@ -27,7 +28,6 @@ from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.provenance import machine, versions
 from vehiclemor.study.scenario import Scenario, start_of
 from vehiclemor.study.store import prepare_folder, stored
-from vehiclemor.models.report import TimingCase
 
 if TYPE_CHECKING:
     import xarray as xr
