@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import sine_travel
+from vehiclemor.models.report import TimingCase
 from vehiclemor.simulation.build import build
 from vehiclemor.study import timing
 from vehiclemor.study.scenario import Scenario, input_hash
 from vehiclemor.study.timing import timed_cases, timed_model
-from vehiclemor.models.report import TimingCase
 
 CASES = (
     TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),

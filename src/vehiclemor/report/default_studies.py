@@ -20,6 +20,7 @@ from vehiclemor.report.published import rms_numbers
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
+from vehiclemor.study.method_settings import complete_settings, default_settings
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.
@@ -77,12 +78,16 @@ def methods(model: Model) -> dict[str, tuple[str, str]]:
             continue
         if method.accepts(model)[0]:
             found[name] = (name, "recommended")
-    presets = {
-        label: entry
-        for label, entry in FIRST.items()
-        if entry[0] in found and entry[1] in component("method", entry[0]).presets(model)
-    }
+    presets = {label: e for label, e in FIRST.items() if e[0] in found and _has(model, *e)}
     return presets | found
+
+
+def _has(model: Model, method: str, preset: str) -> bool:
+    try:
+        complete_settings(model, method, preset=preset)
+    except InputError:
+        return False
+    return True
 
 
 def legend(name: str) -> dict[str, str]:
@@ -120,10 +125,9 @@ def _study(name: str, kind: str, results: Path, head: str, grid: str) -> str:
 
 def _rank(model: Model, method: str) -> dict[str, int]:
     """The rank of a default row, for a method whose own default the model is too small for."""
-    declared = component("method", method).settings(model.kind)
     rank = default_rank(component("model", model.name))
-    own = declared["rank"].default if "rank" in declared else 0
-    return {"rank": rank} if own > rank else {}
+    own = default_settings(model, method).get("rank")
+    return {"rank": rank} if isinstance(own, int) and own > rank else {}
 
 
 def _inline(table: Mapping[str, object]) -> str:
