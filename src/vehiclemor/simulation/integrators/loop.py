@@ -201,7 +201,9 @@ def over_span(problem, t, end, h, method, control, work, samples, sample, path, 
             factor = min(1.0, factor)
             rejected = False
         for i in range(len(y)):
-            y[i], f[i] = work.new[i], work.f_new[i]
+            y[i] = work.new[i]
+        for i in range(len(f)):
+            f[i] = work.f_new[i]
         whole = t + 1.0001 * h <= end
         t += h
         # A step that was cut at the end of the span says nothing against longer ones.
