@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 
 from vehiclemor.errors import UnreachableError
-
-if TYPE_CHECKING:
-    from vehiclemor.simulation.algebraic import AlgebraicModel
 
 # Steps of the continuation (m): larger Newton steps can jump to another branch beyond the fold.
 FIRST_STEP = 5e-4
@@ -21,7 +18,22 @@ TOLERANCE = 1e-11
 LARGEST_CHANGE = 0.1
 
 
-def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[float, float]:
+class Mechanism(Protocol):
+    """What the continuation needs of a kinematic model."""
+
+    name: str
+    design: np.ndarray
+
+    def jacobian(self, q: Any, u: Any) -> np.ndarray:
+        """Derivative (n, n) of the residual equations."""
+        ...
+
+    def newton_step(self, q: Any, u: Any) -> np.ndarray:
+        """Jacobian^-1 times the residual (n,)."""
+        ...
+
+
+def reachable_range(model: Mechanism, rack: float, limit: float) -> tuple[float, float]:
     """Lowest and highest reachable height (m) at a rack displacement.
 
     Parameters
@@ -55,7 +67,7 @@ def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[f
     return _limit(model, q, rack, -limit), _limit(model, q, rack, limit)
 
 
-def _limit(model: AlgebraicModel, q: np.ndarray, rack: float, limit: float) -> float:
+def _limit(model: Mechanism, q: np.ndarray, rack: float, limit: float) -> float:
     direction = 1.0 if limit > 0.0 else -1.0
     step, travelled = FIRST_STEP, 0.0
     sign = _orientation(model, q, np.array([0.0, rack]))
@@ -72,11 +84,11 @@ def _limit(model: AlgebraicModel, q: np.ndarray, rack: float, limit: float) -> f
     return direction * travelled
 
 
-def _orientation(model: AlgebraicModel, q: np.ndarray, u: np.ndarray) -> float:
+def _orientation(model: Mechanism, q: np.ndarray, u: np.ndarray) -> float:
     return float(np.linalg.slogdet(model.jacobian(q, u)).sign)
 
 
-def _solve(model: AlgebraicModel, start: np.ndarray, u: np.ndarray) -> np.ndarray | None:
+def _solve(model: Mechanism, start: np.ndarray, u: np.ndarray) -> np.ndarray | None:
     q = start
     for _ in range(ITERATIONS):
         step = model.newton_step(q, u)

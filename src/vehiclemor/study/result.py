@@ -12,7 +12,8 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import Offline, ReducedModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset
+from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.provenance import attributes

@@ -13,8 +13,8 @@ from vehiclemor.simulation.trajectory import (
     ALGEBRAIC_COUNTS,
     DYNAMIC_COUNTS,
     Trajectory,
-    trajectory_dataset,
 )
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
 
 def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: Trajectory) -> None:
