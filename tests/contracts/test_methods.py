@@ -187,7 +187,7 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
 
 
 def test_runs_are_labelled(pair: Pair) -> None:
-    dataset = trajectory_dataset(pair.model, pair.run(pair.fit()))
+    dataset = trajectory_dataset(pair.model.definition, pair.run(pair.fit()))
     assert tuple(dataset["coordinate"].values) == pair.model.coordinates
     assert tuple(dataset["output"].values) == pair.model.outputs
     assert tuple(dataset["input"].values) == pair.model.inputs

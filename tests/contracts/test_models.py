@@ -43,7 +43,7 @@ def test_definition_describes_itself(name: str) -> None:
 
 
 def test_quantities_have_unique_names_units_and_meanings(any_model: AlgebraicModel) -> None:
-    equations = any_model.equations
+    equations = any_model.definition
     kinds: tuple[tuple[Quantity, ...], ...] = (
         equations.coordinates,
         equations.inputs,
@@ -97,7 +97,7 @@ def test_nominal_maneuver_can_be_solved(any_model: AlgebraicModel, its_maneuver:
     assert run.outputs.shape == (its_maneuver.samples, len(any_model.outputs))
     assert np.abs(any_model.residual_at(run.coordinates, run.inputs)).max() < 1e-11
     assert np.isfinite(run.outputs).all()
-    dataset = trajectory_dataset(any_model, run)
+    dataset = trajectory_dataset(any_model.definition, run)
     assert tuple(dataset["coordinate"].values) == any_model.coordinates
     assert tuple(dataset["output"].values) == any_model.outputs
 

@@ -15,7 +15,7 @@ from vehiclemor.codegen import derivation as kept
 from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation, derived
 from vehiclemor.codegen.kernel_text import operation_counts, reference_source
-from vehiclemor.models import equations
+from vehiclemor.models import definition
 from vehiclemor.models.quantities import Quantity
 
 NAME = standard_problems.NAME
@@ -33,7 +33,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """One entry for each time that the plug-in model was derived."""
     made, real = [], standard_problems.derive
 
-    def derive() -> equations.DynamicEquations:
+    def derive() -> Program:
         made.append("derived")
         return real()
 
@@ -44,7 +44,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def fetch(name: str = NAME, definition: object = standard_problems) -> Derivation:
     """As in a process of its own, which remembers nothing."""
     kept._read.cache_clear()
-    return kept.derivation(name, definition)
+    return kept.derivation(name, definition.derive)
 
 
 def test_a_model_is_derived_once_and_read_back_as_it_was(folder: Path, calls: list) -> None:
@@ -63,7 +63,7 @@ def test_a_model_is_derived_once_and_read_back_as_it_was(folder: Path, calls: li
 
 
 def test_a_derivation_describes_its_equations(folder: Path) -> None:
-    program = standard_problems.derive().program
+    program = standard_problems.derive()
     for made in (fetch(), fetch()):
         assert [q.name for q in made.coordinates] == ["angle", "tracked"]
         assert [q.name for q in made.inputs] == ["torque", "target", "target_rate"]
@@ -101,10 +101,10 @@ def test_the_source_read_back_computes_what_the_model_says(folder: Path, standar
 def test_the_same_process_reads_the_file_once(folder: Path, calls: list) -> None:
     kept._read.cache_clear()
     try:
-        first = kept.derivation(NAME, standard_problems)
+        first = kept.derivation(NAME, standard_problems.derive)
         (path,) = folder.iterdir()
         path.unlink()
-        assert kept.derivation(NAME, standard_problems) is first
+        assert kept.derivation(NAME, standard_problems.derive) is first
         assert calls == ["derived"]
     finally:
         kept._read.cache_clear()
@@ -202,7 +202,7 @@ def test_no_unfinished_file_is_left(folder: Path, calls: list) -> None:
 
 
 def test_what_cant_be_derived_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def derive() -> equations.DynamicEquations:
+    def derive() -> Program:
         raise ZeroDivisionError
 
     monkeypatch.setattr(standard_problems, "derive", derive)
@@ -233,7 +233,7 @@ def test_another_source_is_another_derivation(
 
 PLUG_IN = """
 import sympy as sp
-from vehiclemor.models.equations import DynamicEquations
+
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
@@ -246,7 +246,7 @@ def derive():
     x, p = sp.symbols("x p", real=True)
     q = (Quantity("x", "1", "x"),)
     results = {"derivative": ([FACTOR * p * x], (1,))}
-    return DynamicEquations(q, (), (), q, assemble(Tape(), {"x": [x]}, [p], results))
+    return assemble(Tape(), {"x": [x]}, [p], results)
 """
 
 
@@ -342,10 +342,10 @@ def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
     layers = ("models",)
-    assert sources.source_digest(layers, (), (equations,)) == sources.source_digest(layers, (), ())
+    assert sources.source_digest(layers, (), (definition.ModelDefinition,)) == sources.source_digest(layers, (), ())
     plugged = sources.source_digest(layers, (), (standard_problems,))
     assert plugged != sources.source_digest(layers, (), ())
 
 
 def test_derived_is_what_derivation_keeps(folder: Path) -> None:
-    assert fetch() == derived(NAME, standard_problems.derive())
+    assert fetch() == derived(standard_problems.derive())

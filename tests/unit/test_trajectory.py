@@ -18,7 +18,7 @@ from vehiclemor.simulation.trajectory import (
 
 
 def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: Trajectory) -> None:
-    dataset = trajectory_dataset(model, full)
+    dataset = trajectory_dataset(model.definition, full)
     eta = dataset["coordinates"].sel(coordinate="eta")
     np.testing.assert_array_equal(eta, full.coordinates[:, model.coordinates.index("eta")])
     angle = dataset["outputs"].sel(output="second_euler_angle")
@@ -41,7 +41,9 @@ def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: T
 
 
 def test_further_variables_are_added(model: AlgebraicModel, full: Trajectory) -> None:
-    dataset = trajectory_dataset(model, full, {"extra": ("output", np.arange(6.0), {"units": "1"})})
+    dataset = trajectory_dataset(
+        model.definition, full, {"extra": ("output", np.arange(6.0), {"units": "1"})}
+    )
     assert list(dataset["extra"].values) == [0, 1, 2, 3, 4, 5]
 
 
@@ -53,17 +55,17 @@ def test_states_of_a_kinematic_model_are_its_coordinates(full: Trajectory) -> No
 def test_speeds_and_counts_of_a_dynamic_model_are_written(
     model: AlgebraicModel, full: Trajectory
 ) -> None:
-    equations = SimpleNamespace(
-        coordinates=model.equations.coordinates,
+    definition = SimpleNamespace(
+        kind="ode",
+        coordinates=model.definition.coordinates,
         speeds=(Quantity("forward", "m/s", "speed to the front"),),
-        inputs=model.equations.inputs,
-        outputs=model.equations.outputs,
+        inputs=model.definition.inputs,
+        outputs=model.definition.outputs,
     )
-    dynamic = SimpleNamespace(equations=equations, speeds=("forward",), counts=DYNAMIC_COUNTS)
     speeds = np.linspace(0.0, 1.0, 1001)[:, None]
     run = replace(full, speeds=speeds, counts=dict.fromkeys(DYNAMIC_COUNTS, 7))
     np.testing.assert_array_equal(run.states, np.hstack((full.coordinates, speeds)))
-    dataset = trajectory_dataset(dynamic, run)
+    dataset = trajectory_dataset(definition, run)
     forward = dataset["speeds"].sel(speed="forward")
     np.testing.assert_array_equal(forward, speeds[:, 0])
     assert str(forward["speed_unit"].item()) == "m/s"

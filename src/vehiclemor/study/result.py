@@ -87,7 +87,7 @@ def metrics_dataset(
     variables |= _of_fit(reduced, "largest number of reduced coordinates in a window")
     text = "full-order outputs for the same input"
     variables["reference_outputs"] = _by("output", full.outputs, text, ("time", "output"))
-    dataset = trajectory_dataset(model, run, variables)
+    dataset = trajectory_dataset(model.definition, run, variables)
     if experiment.keep == "metrics":
         dataset = dataset.drop_dims(["time", "input"])
     return dataset.assign_attrs(_attributes(experiment))
@@ -163,7 +163,7 @@ def errors_dataset(
         values = np.array([getattr(end, name) for end in ends], dtype=object)
         variables[name] = ("scenario", values, {"long_name": text})
     variables |= _of_fit(reduced, "reduced coordinates")
-    outputs = model.equations.outputs
+    outputs = model.definition.outputs
     coordinates = {
         "scenario": [scenario.label for scenario in experiment.test],
         "output": [quantity.name for quantity in outputs],

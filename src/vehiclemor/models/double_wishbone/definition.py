@@ -11,15 +11,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.double_wishbone import quantities
 from vehiclemor.models.double_wishbone.points import POINTS, design_coordinates
-from vehiclemor.models.double_wishbone.quantities import COORDINATES, EQUATIONS, INPUTS, OUTPUTS
 from vehiclemor.models.report import ALGEBRAIC_BASELINES, ModelReport, TimingCase
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import AlgebraicEquations
+    from vehiclemor.symbolic.program import Program
 
 
-def derive() -> AlgebraicEquations:
+def derive() -> Program:
     """Derive residual, analytic Jacobian and outputs; the hard points stay symbols."""
     from vehiclemor.models.double_wishbone import equations
 
@@ -48,10 +48,11 @@ DEFINITION = ModelDefinition(
     kind="ae",
     summary="double-wishbone suspension, kinematics, 8 joint coordinates (algebraic equations)",
     maneuver="sine_travel",
-    coordinates=COORDINATES,
-    inputs=INPUTS,
-    outputs=OUTPUTS,
-    equations=EQUATIONS,
+    coordinates=quantities.COORDINATES,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    equations=quantities.EQUATIONS,
+    joints=quantities.JOINTS,
     parameters=POINTS,
     derive=derive,
     design_coordinates=design_coordinates,

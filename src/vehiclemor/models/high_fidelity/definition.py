@@ -9,25 +9,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.high_fidelity import quantities
 from vehiclemor.models.high_fidelity.equilibrium import check, solve_equilibrium, starts
-from vehiclemor.models.high_fidelity.quantities import (
-    CONSTRAINTS,
-    COORDINATES,
-    FRONT,
-    INPUTS,
-    OUTPUTS,
-    PARAMETERS,
-    SOLVED,
-    SPEEDS,
-)
 from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
 from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, TimingCase
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import DynamicEquations
+    from vehiclemor.symbolic.program import Program
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
     from vehiclemor.models.high_fidelity import equations
 
@@ -70,29 +61,29 @@ DEFINITION = ModelDefinition(
     kind="dae",
     summary="vehicle with 26 coordinates and 12 constraints, double wishbones, Fiala tires (DAE)",
     maneuver="rack_lane_change",
-    coordinates=COORDINATES,
-    speeds=SPEEDS,
-    inputs=INPUTS,
-    outputs=OUTPUTS,
-    constraints=CONSTRAINTS,
-    parameters=PARAMETERS,
+    coordinates=quantities.COORDINATES,
+    speeds=quantities.SPEEDS,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    constraints=quantities.CONSTRAINTS,
+    parameters=quantities.PARAMETERS,
     derive=derive,
     check=check,
     starts=starts,
-    solved=SOLVED,
+    solved=quantities.SOLVED,
     solve_equilibrium=solve_equilibrium,
     cyclic=("x", "y", *(f"gamma_{wheel}" for wheel in WHEELS)),
     planar=("x", "y", "psi"),
     heading_pairs=(("x", "y"), ("x_dot", "y_dot")),
     # A heading that is off integrates to a lateral position that is off: no other error matters
     # as much.
-    error_scale=dict.fromkeys([q.name for q in (*COORDINATES, *SPEEDS)], 10.0)
+    error_scale=dict.fromkeys([q.name for q in (*quantities.COORDINATES, *quantities.SPEEDS)], 10.0)
     | {"psi": 1.0, "psi_dot": 1.0},
     # Slips need forward motion.  At 1.3 rad of steering the linkage locks; another branch lies
     # beyond.
     validity={
         "longitudinal_speed": FORWARD,
-        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in FRONT},
+        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in quantities.FRONT},
         **UPRIGHT,
     },
     loads=TIRE_LOADS,

@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from vehiclemor.models.components import body
-from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity import closed_corner, frozen_wheels, independent, parts
 from vehiclemor.models.high_fidelity.frozen_quantities import (
     CONSTANTS,
@@ -33,11 +32,11 @@ from vehiclemor.models.quantities import WHEELS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import ZERO
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive the derivatives and the full vehicle's state; parameters and constants are symbols."""
     tape = Tape()
     q, nu = body.symbols(COORDINATES), body.symbols(SPEEDS)
@@ -63,7 +62,7 @@ def derive() -> DynamicEquations:
     changes = _changes(tape, c, p, nu, wheels, angles, attitude.road_normal)
     own = [tape.let(nu[10 + k] - wheel.turn) for k, wheel in enumerate(wheels)]
     derivative = [*chassis, *nu[6:10], *own, *changes, *(wheel.spin for wheel in wheels)]
-    program = assemble(
+    return assemble(
         tape,
         {"x": [*q, *nu], "u": rack},
         [*flat, *c.values()],
@@ -75,7 +74,6 @@ def derive() -> DynamicEquations:
             ),
         },
     )
-    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, (), program)
 
 
 def _full_state(

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import sympy as sp
 
 from vehiclemor.models.components import body
-from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.high_fidelity import closed_corner, parts
 from vehiclemor.models.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
 from vehiclemor.models.high_fidelity.quantities import COORDINATES as ALL_COORDINATES
@@ -23,13 +22,13 @@ from vehiclemor.models.high_fidelity.quantities import (
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.joints import free_rate
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 NUMBERS = parts.Numbers(len(PLACES), (6, 7), (8, 9), (10, 11, 12, 13))
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive accelerations, outputs and the state of all 26 coordinates; parameters are symbols."""
     tape = Tape()
     q, rates = body.symbols(INDEPENDENT_COORDINATES), body.symbols(INDEPENDENT_SPEEDS)
@@ -59,7 +58,7 @@ def derive() -> DynamicEquations:
     zero = sp.Integer(0)
     outputs = [*parts.outputs(tape, vehicle, whole, speeds, carriers), zero, zero]
     n = NUMBERS.total
-    program = assemble(
+    return assemble(
         tape,
         {"x": [*q, *rates], "u": [s, s_dot, s_ddot]},
         flat,
@@ -75,7 +74,6 @@ def derive() -> DynamicEquations:
             "suspension": (_suspension(tape, vehicle, corners[0]), (3, 4)),
         },
     )
-    return DynamicEquations(INDEPENDENT_COORDINATES, INDEPENDENT_SPEEDS, INPUTS, OUTPUTS, program)
 
 
 def full_state(

@@ -11,22 +11,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.independent_suspension import quantities
 from vehiclemor.models.independent_suspension.equilibrium import check, starts
-from vehiclemor.models.independent_suspension.quantities import (
-    COORDINATES,
-    INPUTS,
-    OUTPUTS,
-    PARAMETERS,
-    SPEEDS,
-)
 from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
 from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, TimingCase
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import DynamicEquations
+    from vehiclemor.symbolic.program import Program
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     from vehiclemor.models.independent_suspension import equations
 
@@ -58,11 +52,11 @@ DEFINITION = ModelDefinition(
     kind="ode",
     summary="vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)",
     maneuver="lane_change",
-    coordinates=COORDINATES,
-    speeds=SPEEDS,
-    inputs=INPUTS,
-    outputs=OUTPUTS,
-    parameters=PARAMETERS,
+    coordinates=quantities.COORDINATES,
+    speeds=quantities.SPEEDS,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    parameters=quantities.PARAMETERS,
     derive=derive,
     check=check,
     starts=starts,
