@@ -16,7 +16,8 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import STATUSES, Trajectory, trajectory_dataset
+from vehiclemor.simulation.trajectory import STATUSES, Trajectory
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
 METHODS = names("method")
 
@@ -187,7 +188,7 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
 
 
 def test_runs_are_labelled(pair: Pair) -> None:
-    dataset = trajectory_dataset(pair.model.definition, pair.run(pair.fit()))
+    dataset = trajectory_dataset(pair.model, pair.run(pair.fit()))
     assert tuple(dataset["coordinate"].values) == pair.model.coordinates
     assert tuple(dataset["output"].values) == pair.model.outputs
     assert tuple(dataset["input"].values) == pair.model.inputs

@@ -8,7 +8,7 @@ from vehiclemor.models.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.trajectory import trajectory_dataset
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
 SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m", "1"} | {
     "kg",
@@ -97,7 +97,7 @@ def test_nominal_maneuver_can_be_solved(any_model: AlgebraicModel, its_maneuver:
     assert run.outputs.shape == (its_maneuver.samples, len(any_model.outputs))
     assert np.abs(any_model.residual_at(run.coordinates, run.inputs)).max() < 1e-11
     assert np.isfinite(run.outputs).all()
-    dataset = trajectory_dataset(any_model.definition, run)
+    dataset = trajectory_dataset(any_model, run)
     assert tuple(dataset["coordinate"].values) == any_model.coordinates
     assert tuple(dataset["output"].values) == any_model.outputs
 

@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from vehiclemor.models.definition import ModelDefinition
 
 # A named initial condition of a model, or a state (n,).
 Start = str | np.ndarray
@@ -72,44 +66,3 @@ class Trajectory:
     def states(self) -> np.ndarray:
         """Coordinates and speeds side by side (samples, n)."""
         return np.hstack((self.coordinates, self.speeds))
-
-
-def trajectory_dataset(
-    definition: ModelDefinition, trajectory: Trajectory, further: dict[str, tuple] | None = None
-) -> xr.Dataset:
-    """Labelled dataset of a trajectory: histories, counts, seconds and status, with units.
-
-    Parameters
-    ----------
-    further
-        Name -> (dimensions, values, attributes) of variables to add.
-    """
-    import xarray as xr
-
-    variables: dict[str, tuple] = {}
-    coordinates: dict[str, tuple] = {
-        "time": ("time", trajectory.time, {"units": "s", "long_name": "time"})
-    }
-    for name in ("coordinates", "outputs", "inputs", "speeds"):
-        quantities, label = getattr(definition, name), name.removesuffix("s")
-        if not quantities:
-            continue
-        attributes = {"long_name": name, "units": f"see {label}_unit"}
-        variables[name] = (("time", label), getattr(trajectory, name), attributes)
-        for key, values, text in (
-            (label, [q.name for q in quantities], "name"),
-            (f"{label}_unit", [q.unit for q in quantities], "SI unit"),
-        ):
-            coordinates[key] = label, values, {"long_name": f"{text} of the {label}"}
-    for name, long_name in COUNTS[definition.kind].items():
-        attributes = {"units": "1", "long_name": long_name}
-        variables[name] = ((), trajectory.counts.get(name, 0), attributes)
-    seconds = {"units": "s", "long_name": "time spent in the compiled loop"}
-    variables["seconds"] = ((), trajectory.seconds, seconds)
-    for name, long_name in (
-        ("status", f"one of {', '.join(STATUSES)}"),
-        ("message", "why the status is not ok"),
-        ("remark", "what else there is to know"),
-    ):
-        variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
-    return xr.Dataset(variables | (further or {}), coordinates)

@@ -12,7 +12,8 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import Offline, ReducedModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset
+from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.provenance import attributes
@@ -87,7 +88,7 @@ def metrics_dataset(
     variables |= _of_fit(reduced, "largest number of reduced coordinates in a window")
     text = "full-order outputs for the same input"
     variables["reference_outputs"] = _by("output", full.outputs, text, ("time", "output"))
-    dataset = trajectory_dataset(model.definition, run, variables)
+    dataset = trajectory_dataset(model, run, variables)
     if experiment.keep == "metrics":
         dataset = dataset.drop_dims(["time", "input"])
     return dataset.assign_attrs(_attributes(experiment))

@@ -36,8 +36,8 @@ class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
     solver: Annotated[str, one_of(tuple(INTEGRATORS))] = Field(
-        "explicit",
-        description="explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
+        "dopri5",
+        description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
         "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; etdrk4: exponential "
         "method of order 4, with the same",
     )

@@ -32,6 +32,7 @@ from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR, polynomial_features
 from vehiclemor.reduction.vehicle.linear_vehicle import HEADING, MARGIN, PLACE
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
@@ -89,7 +90,7 @@ def fit(
     basis = mirror_basis(deviations, mirror(shape), settings.rank)
     k, inputs = len(basis.odd), u.shape[1]
     features = polynomial_features(k, inputs, settings.degree)
-    values = features.at(deviations @ basis.encoding.T, u, np.zeros(0))
+    values = feature_columns(features, deviations @ basis.encoding.T, u, np.zeros(0))
     # Straight running is an equilibrium: the only constant is that of U.
     goals = np.column_stack([rates @ basis.encoding.T, motion - [0.0, shape.speed, 0.0]])
     c, groups = _inferred(basis.odd, values, goals, inputs, settings)

@@ -29,6 +29,7 @@ from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -111,7 +112,7 @@ def _fitted_on_rates(
     k, inputs = len(modes.rates), u.shape[1]
     odd, even = table.odd, table.even
     odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
-    columns = table.features.at(np.column_stack([z, speed]), u, table.parameters)
+    columns = feature_columns(table.features, np.column_stack([z, speed]), u, table.parameters)
     slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
     linear = z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
     c = np.zeros((len(table.features.terms), k + 1 + PLANAR))
@@ -138,7 +139,7 @@ def _fitted_on_rates(
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
         np.concatenate([3.0 * largest(z), [10.0, 1.0, 10.0, 10.0]]),
         Offline(),
-        "explicit",
+        "dopri5",
         REFIT_TOLERANCE,
         modes.symmetric,
     )
@@ -175,7 +176,9 @@ def _with_heading(
         path = reduced.path(run.maneuver, run.start)
         if path is None:
             continue
-        columns = reduced.features.at(path[:, :k], true.inputs, reduced.parameters)[:, odd]
+        columns = feature_columns(reduced.features, path[:, :k], true.inputs, reduced.parameters)[
+            :, odd
+        ]
         steps = np.diff(true.time)[:, None]
         sums = np.cumsum(0.5 * steps * (columns[1:] + columns[:-1]), axis=0)
         integrals.append(np.vstack([np.zeros(len(odd)), sums]))

@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable
@@ -58,7 +59,7 @@ def pruned(
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
     # The symmetric equations are fitted to rates; each counts by its nonlinear part.
     inputs = np.concatenate([goal.inputs for goal in goals])
-    values = reduced.features.at(slow, inputs, reduced.parameters)[:, even]
+    values = feature_columns(reduced.features, slow, inputs, reduced.parameters)[:, even]
     symmetric = c[np.ix_(even, [k, k + 2])]
     sizes = np.mean((values @ symmetric) ** 2, axis=0)
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)

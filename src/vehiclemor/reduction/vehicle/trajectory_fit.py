@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
@@ -174,7 +175,7 @@ def _sensitivities(
     """Derivatives (samples / STRIDE, states + 3, free coefficients) of a reduced run."""
     k, c = reduced.features.states, reduced.coefficients
     z, heading = path[:, :k], path[:, k]
-    columns = reduced.features.at(z, goal.inputs, reduced.parameters)
+    columns = feature_columns(reduced.features, z, goal.inputs, reduced.parameters)
     values = columns @ c
     dim, samples = k + PLANAR, len(path)
     cosine, sine = np.cos(heading), np.sin(heading)
@@ -188,7 +189,9 @@ def _sensitivities(
         width = DIFFERENCE * max(1.0, float(np.abs(z[:, j]).max()))
         shifted = z.copy()
         shifted[:, j] += width
-        change = reduced.features.at(shifted, goal.inputs, reduced.parameters) @ c - values
+        change = (
+            feature_columns(reduced.features, shifted, goal.inputs, reduced.parameters) @ c - values
+        )
         jacobian[:, :, j] = np.einsum("nij,nj->ni", spread, change / width)
     forward, sideward = values[:, k + 1], values[:, k + 2]
     jacobian[:, k + 1, k] = -forward * sine - sideward * cosine

@@ -18,12 +18,10 @@ DERIVATIVE, FULL = 28, 52
 STRAIGHT = np.zeros(3)
 
 
-def caller(kernels, constants) -> Callable[[str, np.ndarray, np.ndarray, int], np.ndarray]:
-    work = np.zeros(kernels.WORK)
-
+def caller(made, constants) -> Callable[[str, np.ndarray, np.ndarray, int], np.ndarray]:
     def call(function, x, u, size):
         result = np.empty(size)
-        getattr(kernels, function)(np.array(x), np.array(u), constants, work, result)
+        made.kernels.call(function, np.array(x), np.array(u), constants, result)
         return result
 
     return call

@@ -26,7 +26,7 @@ VEHICLES = {
 }
 EVERY_MODE = {"modal_truncation": {"fastest": 1e4}, "balanced_truncation": {"rank": 10}}
 FOUR = {"modal_truncation": {"fastest": 45.0}, "balanced_truncation": {"rank": 4}}
-EXACT = {"solver": "explicit", "tolerance": 1e-9}
+EXACT = {"solver": "dopri5", "tolerance": 1e-9}
 
 
 @pytest.fixture(scope="module", params=VEHICLES)

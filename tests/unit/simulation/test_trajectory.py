@@ -13,12 +13,12 @@ from vehiclemor.simulation.trajectory import (
     ALGEBRAIC_COUNTS,
     DYNAMIC_COUNTS,
     Trajectory,
-    trajectory_dataset,
 )
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
 
 def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: Trajectory) -> None:
-    dataset = trajectory_dataset(model.definition, full)
+    dataset = trajectory_dataset(model, full)
     eta = dataset["coordinates"].sel(coordinate="eta")
     np.testing.assert_array_equal(eta, full.coordinates[:, model.coordinates.index("eta")])
     angle = dataset["outputs"].sel(output="second_euler_angle")
@@ -41,9 +41,7 @@ def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: T
 
 
 def test_further_variables_are_added(model: AlgebraicModel, full: Trajectory) -> None:
-    dataset = trajectory_dataset(
-        model.definition, full, {"extra": ("output", np.arange(6.0), {"units": "1"})}
-    )
+    dataset = trajectory_dataset(model, full, {"extra": ("output", np.arange(6.0), {"units": "1"})})
     assert list(dataset["extra"].values) == [0, 1, 2, 3, 4, 5]
 
 
@@ -56,7 +54,6 @@ def test_speeds_and_counts_of_a_dynamic_model_are_written(
     model: AlgebraicModel, full: Trajectory
 ) -> None:
     definition = SimpleNamespace(
-        kind="ode",
         coordinates=model.definition.coordinates,
         speeds=(Quantity("forward", "m/s", "speed to the front"),),
         inputs=model.definition.inputs,
@@ -65,7 +62,8 @@ def test_speeds_and_counts_of_a_dynamic_model_are_written(
     speeds = np.linspace(0.0, 1.0, 1001)[:, None]
     run = replace(full, speeds=speeds, counts=dict.fromkeys(DYNAMIC_COUNTS, 7))
     np.testing.assert_array_equal(run.states, np.hstack((full.coordinates, speeds)))
-    dataset = trajectory_dataset(definition, run)
+    dynamic = SimpleNamespace(definition=definition, counts=DYNAMIC_COUNTS)
+    dataset = trajectory_dataset(dynamic, run)
     forward = dataset["speeds"].sel(speed="forward")
     np.testing.assert_array_equal(forward, speeds[:, 0])
     assert str(forward["speed_unit"].item()) == "m/s"

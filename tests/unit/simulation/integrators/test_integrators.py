@@ -55,7 +55,7 @@ def driven_error(model, solver, times, tolerance, longest_step=None) -> float:
 # Orders
 
 
-ORDERS = {"explicit": 5, "rodas4": 4, "ros34pw2": 3, "etdrk4": 4}
+ORDERS = {"dopri5": 5, "rodas4": 4, "ros34pw2": 3, "etdrk4": 4}
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -136,7 +136,7 @@ def test_counts_follow_from_the_steps(model, solver, tolerance):
     counts = integrate(model, corners, solver, tolerance, corners.times).counts
     spans, states = 3, 4
     attempts = counts["steps"] + counts["rejected_steps"]
-    if solver == "explicit":
+    if solver == "dopri5":
         expected = spans + 6 * attempts, 0, 0, 0
     elif solver == "rodas4":
         # One Jacobian by differences (and one more call for the time derivative) in each place.
@@ -154,7 +154,7 @@ def test_counts_follow_from_the_steps(model, solver, tolerance):
 
 def test_the_calls_that_are_counted_are_the_calls_that_are_allowed(model, monkeypatch):
     monkeypatch.setattr("vehiclemor.simulation.system.MOST_CALLS", 100)
-    found = integrate(model, DRIVEN, "explicit", 1e-9, DRIVEN.times)
+    found = integrate(model, DRIVEN, "dopri5", 1e-9, DRIVEN.times)
     assert found.status == "diverged"
     assert "evaluations of the right-hand side" in found.message
     assert 100 < found.counts["rhs_calls"] <= 106

@@ -9,9 +9,14 @@ from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation.input_polynomials import Signal, signal_of
+from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
+from vehiclemor.simulation.integrators.structures import Signal
 
 LANE_CHANGE = component("maneuver", "lane_change")
+
+
+def signal_of(maneuver: Maneuver) -> Signal:
+    return ready_signal_of(maneuver).bundle
 
 
 def value(signal: Signal, t: float, segment: int | None = None) -> np.ndarray:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vehiclemor.simulation.w_method_loops import turn
 
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.integrators.step_grid import rotate
 
 # Place of the heading, then pairs of places.
 TURNING = np.array([2, 0, 1, 6, 4])
@@ -22,7 +22,7 @@ def model() -> DynamicModel:
 
 def turned(vector: np.ndarray, angle: float, turning: np.ndarray = TURNING) -> np.ndarray:
     result = vector.copy()
-    assert turn(result, turning, np.cos(angle), np.sin(angle)) is None
+    assert rotate(result, turning, np.cos(angle), np.sin(angle)) is None
     return result
 
 
@@ -56,7 +56,7 @@ def test_without_pairs_all_stays(vector, angle):
 @settings(max_examples=20)
 @given(angle=st.floats(-3.0, 3.0))
 def test_a_vehicle_that_heads_elsewhere_moves_alike(model, angle):
-    """What `turn` is for: position and velocity turn with the heading, all else stays."""
+    """What `rotate` is for: position and velocity turn with the heading, all else stays."""
     x = model.initial["dropped"].copy()
     x[26:48] += np.linspace(-0.5, 0.5, 22)
     u = np.array([0.01, 0.05, -0.2])

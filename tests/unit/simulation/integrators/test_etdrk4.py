@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 
 from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.vehicle.feature_kernels import diagonal_blocks
+from vehiclemor.reduction.vehicle.feature_system import feature_system
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.simulation.integrators.exponential_functions import (
     exponential_tables,
     phi_functions,
 )
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver
 
 
 def augmented(matrix: np.ndarray) -> list[np.ndarray]:
@@ -72,12 +74,15 @@ def system(diagonal: tuple[int, ...]):
     c[4:6, 3:] = [[1.0, 0.5, -0.4], [1.0, 0.3, 0.7]]
     c[3, 0], c[4, 0], c[5, 1], c[5, 2] = 0.6, 0.9, -0.8, 0.7
     features = replace(FEATURES, diagonal=diagonal)
-    return features.system(np.zeros(0), c, np.ones(6), np.zeros(3))
+    return feature_system(features, np.zeros(0), c, np.ones(6), np.zeros(3))
 
 
 def path(built, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     run = built.run(
-        lane_change, np.array([0.1, -0.2, 0.05, 0, 0, 0]), whole_space(6), "etdrk4", tolerance
+        lane_change,
+        np.array([0.1, -0.2, 0.05, 0, 0, 0]),
+        whole_space(6),
+        Solver("etdrk4", tolerance),
     )
     assert not run.failure
     return run.path, run.counts
@@ -85,7 +90,7 @@ def path(built, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_step_as_one_kernel_is_the_step_of_the_loops():
     blocks = system((2, 1))
-    dense = replace(blocks, diagonal=())
+    dense = replace(blocks, fused={})
     frozen = dense.frozen_jacobian
     assert np.abs(frozen[3:]).max() < 1e-9
     for tolerance in (1e-2, 1e-4):
