@@ -6,13 +6,13 @@ Timings are reported, never gated.  Counts and operation counts stand beside the
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import lane_change
 from vehiclemor.models.independent_suspension import definition as independent_suspension_vehicle
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.steering_maneuvers import lane_change
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

@@ -163,7 +163,6 @@ DAMAGES = {
     "an empty object": replaced({}),
     "no sources": without_an_entry("sources"),
     "no operations": without_an_entry("operations"),
-    "no constraints": without_an_entry("constraints"),
     "an entry that is none of its own": with_an_entry(coordinates=[]),
     "shapes that are a list": with_an_entry(shapes=[]),
     "shapes that are null": with_an_entry(shapes=None),

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.vehicle.feature_kernels import diagonal_blocks
 from vehiclemor.reduction.vehicle.feature_system import feature_system
 from vehiclemor.reduction.vehicle.features import Features
@@ -20,6 +19,7 @@ from vehiclemor.simulation.integrators.exponential_functions import (
 )
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
+from vehiclemor.steering_maneuvers import lane_change
 
 
 def augmented(matrix: np.ndarray) -> list[np.ndarray]:
