@@ -42,7 +42,10 @@ def check_model(name: str) -> None:
         assert len(set(declared)) == len(declared), f"{name}: a name occurs twice in {declared}"
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
     equations = "residual" if model.kind == "ae" else "derivative"
-    for function, size in ((equations, len(definition.states)), ("outputs", len(definition.outputs))):
+    for function, size in (
+        (equations, len(definition.states)),
+        ("outputs", len(definition.outputs)),
+    ):
         derived = model.equations.shapes[function]
         assert derived == (size,), f"{name}: {function} has shape {derived}, not ({size},)"
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"

@@ -42,7 +42,7 @@ def derive() -> Program:
         sp.asin(axle[2]),
         q[7],
     ]
-    step = eliminate(tape, jacobian, residual, PIVOTS)
+    (step,) = eliminate(tape, jacobian, [residual], PIVOTS)
     augmented = [e for row, phi in zip(jacobian, residual, strict=True) for e in [*row, phi]]
     n = len(quantities.COORDINATES)
     return assemble(

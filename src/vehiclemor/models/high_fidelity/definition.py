@@ -12,7 +12,7 @@ from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.models.high_fidelity import quantities
 from vehiclemor.models.high_fidelity.equilibrium import check, solve_equilibrium, starts
 from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, TimingCase
+from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -41,17 +41,12 @@ REPORT = ModelReport(
     printed_outputs=("lateral_speed", "vertical_speed", "lateral_position"),
     timing=(
         *DYNAMIC_BASELINES,
-        TimingCase("pod_r1", "pod r=1", "pod", settings={"rank": 1}),
-        TimingCase("pod_r1_1e-4", "pod r=1, 1e-4", "pod", settings={"rank": 1, "tolerance": 1e-4}),
-        TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
-        TimingCase(
-            "pod_coordinates_r3",
-            "pod coordinates r=3",
-            "pod",
-            settings={"rank": 3, "formulation": "coordinates"},
-        ),
-        TimingCase("pod_literal_r1", "pod literal r=1", "pod", "literal", {"rank": 1}),
-        TimingCase("fixed_basis_r3", "fixed basis r=3", "fixed_basis", settings={"rank": 3}),
+        reduced_case("pod", 1),
+        reduced_case("pod", 1, tolerance=1e-4),
+        reduced_case("pod", 3),
+        reduced_case("pod", 3, formulation="coordinates"),
+        reduced_case("pod", 1, "literal"),
+        reduced_case("fixed_basis", 3),
     ),
     bounds={"lateral_speed": "hfv_rms_lateral_speed", "vertical_speed": "hfv_rms_vertical_speed"},
     paper_fixed={"rank": 1, "control_period": 0.1},

@@ -16,7 +16,7 @@ from vehiclemor.models.double_wishbone import linkage
 from vehiclemor.models.high_fidelity import corners, linkage_motions, parts, quantities
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
-from vehiclemor.symbolic.elimination import eliminate_several
+from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.joints import Rate, free_rate
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
@@ -156,7 +156,7 @@ def _bound_rates(
         lower, pair = LOWER_ARMS[k], closures[2 * k : 2 * k + 2]
         dependent = [j for j in CORNER[k] if j != lower]
         driving = [-row[0] for row in _rows(pair, [lower])]
-        follow, bias = eliminate_several(
+        follow, bias = eliminate(
             tape, _rows(pair, dependent), [driving, gamma[6 * k : 6 * k + 6]], PIVOTS
         )
         for place, j in enumerate(dependent):
