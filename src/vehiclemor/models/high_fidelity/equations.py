@@ -13,7 +13,7 @@ import sympy as sp
 
 from vehiclemor.models.components import body
 from vehiclemor.models.double_wishbone import linkage
-from vehiclemor.models.high_fidelity import corners, linkage_motions, parts, quantities
+from vehiclemor.models.high_fidelity import assembly, corners, linkage_motions, parts, quantities
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate
@@ -24,7 +24,7 @@ from vehiclemor.symbolic.tape import Tape
 # Places of the front corners' coordinates, and of the arms that carry the springs.
 CORNER = (range(6, 13), range(13, 20))
 LOWER_ARMS = (10, 17)
-NUMBERS = parts.Numbers(len(quantities.COORDINATES), LOWER_ARMS, (20, 21), (22, 23, 24, 25))
+NUMBERS = parts.Numbers(len(quantities.COORDINATES), (*LOWER_ARMS, 20, 21), (22, 23, 24, 25))
 # Pivots (closure, coordinate of the six without the lower arm's) at the design position.
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
 
@@ -65,13 +65,13 @@ def derive() -> Program:
 
     bound = _bound_rates(tape, motions, gamma, free)
     closed = _corners(tape, mechanism, bound)
-    solved = parts.solved(tape, vehicle, closed)
+    solved = assembly.solved(tape, vehicle, closed)
     accelerations = [
-        *parts.chassis_accelerations(tape, attitude, solved, speeds),
+        *assembly.chassis_accelerations(tape, attitude, solved, speeds),
         *_joint_accelerations(tape, bound, solved)[6:],
     ]
 
-    mass, force = parts.kane(tape, vehicle, _corners(tape, mechanism, free))
+    mass, force = assembly.kane(tape, vehicle, _corners(tape, mechanism, free))
     zero = g.vector((0, 0, 0))
     open_form = body.in_coordinates(tape, attitude, speeds, mass, force, velocity_bias=zero)
     n = len(quantities.COORDINATES)
@@ -166,10 +166,10 @@ def _bound_rates(
 
 def _corners(tape: Tape, m: _Mechanism, rates: Sequence[Rate]) -> list[corners.Corner]:
     front = [
-        parts.front_corner(tape, m.vehicle, m.linkages[k], _motions(tape, m, rates, k), k)
+        corners.front_corner(tape, m.vehicle, k, m.linkages[k], _motions(tape, m, rates, k))
         for k in range(2)
     ]
-    return [*front, *(parts.rear_corner(tape, m.vehicle, rates, k) for k in (2, 3))]
+    return [*front, *(corners.rear_corner(tape, m.vehicle, k, rates) for k in (2, 3))]
 
 
 def _joint_accelerations(
@@ -199,7 +199,7 @@ def _outputs(
 
     carriers = [part.carrier for part in m.linkages]
     return [
-        *parts.outputs(tape, m.vehicle, corner_parts, speeds, carriers),
+        *assembly.outputs(tape, m.vehicle, corner_parts, speeds, carriers),
         norm(gaps),
         norm(gap_rates),
     ]

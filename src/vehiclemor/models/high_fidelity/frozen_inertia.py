@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from vehiclemor.models.components import body
-from vehiclemor.models.high_fidelity import closed_corner, frozen_wheels, independent, parts
+from vehiclemor.models.high_fidelity import frozen_wheels, independent, parts
 from vehiclemor.models.high_fidelity.frozen_quantities import (
     CONSTANTS,
     COORDINATES,
@@ -86,17 +86,8 @@ def _full_state(
 ) -> list[sp.Expr]:
     """State of the full vehicle with the same independent coordinates and speeds."""
     points = parts.design_points(tape, p)
-    turning = g.vector(nu[3:6])
-    corners, motions, turns = [], [], []
-    for k in range(2):
-        corner = closed_corner.closed(tape, q[6 + k], rack[0], points[k], parts.SIDES[k])
-        moved = (rack[1], rack[2])
-        motion = closed_corner.motions(tape, corner, 6 + k, nu[6 + k], moved, points[k])
-        axle = g.vector([row[1] for row in corner.linkage.carrier])
-        turns.append(g.dot(axle, g.add(turning, motion.bodies.carrier.value)))
-        corners.append(corner)
-        motions.append(motion)
-    turns += [turning[1] + nu[8], turning[1] + nu[9]]
+    corners, motions = independent.closed_corners(tape, q, nu, rack, points)
+    turns = independent.carrier_turns(g.vector(nu[3:6]), corners, motions, nu)
     spins = [tape.let(nu[10 + k] - turn) for k, turn in enumerate(turns)]
     rates = [*chassis, *nu[6:10], *spins]
     return independent.full_state(tape, q, rates, corners, motions)
