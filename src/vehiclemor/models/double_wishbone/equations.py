@@ -27,10 +27,10 @@ def derive() -> Program:
     position = _positions(tape, q, points)
 
     closures = [
-        *g.subtract(position["lower_ball_joint"], position["lower_ball_joint_arm"]),
-        *g.subtract(position["tie_rod_outer"], position["tie_rod_outer_rod"]),
+        *position["lower_ball_joint"] - position["lower_ball_joint_arm"],
+        *position["tie_rod_outer"] - position["tie_rod_outer_rod"],
     ]
-    centre = g.subtract(position["wheel_centre"], points["wheel_centre"])
+    centre = position["wheel_centre"] - points["wheel_centre"]
     residual = [tape.let(e) for e in [*closures, centre[2] - u[0], q[7] - u[1]]]
     jacobian = tape.jacobian(residual, q)
     axle = position["axle_direction"]
@@ -73,5 +73,5 @@ def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> d
         "tie_rod_outer": corner.on_carrier(tape, points["tie_rod_outer"]),
         "tie_rod_outer_rod": g.named(tape, corner.rod_end),
         "wheel_centre": corner.on_carrier(tape, points["wheel_centre"]),
-        "axle_direction": (corner.carrier[0][1], corner.carrier[1][1], corner.carrier[2][1]),
+        "axle_direction": g.column(corner.carrier, 1),
     }

@@ -58,7 +58,7 @@ def chassis_accelerations(
     turning = g.vector(speeds[3:6])
     position = g.rotate(tape, attitude.rotation, g.vector([solved[k] for k in range(3)]))
     bias = body.angle_bias(tape, attitude, turning)
-    change = g.named(tape, g.subtract(g.vector([solved[k] for k in range(3, 6)]), bias))
+    change = g.named(tape, g.vector([solved[k] for k in range(3, 6)]) - bias)
     return [*position, *body.angle_rates(tape, attitude, change)]
 
 

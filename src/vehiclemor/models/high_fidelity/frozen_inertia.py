@@ -108,37 +108,33 @@ def _changes(
     force = g.named(tape, [sp.Add(*[wheel.force[i] for wheel in wheels]) for i in range(3)])
     moment = [sp.Add(*[wheel.moment[i] for wheel in wheels]) for i in range(3)]
     # The acceleration that everything has, beside which the others are small.
-    common = g.named(tape, g.scale(let(1 / c["total_mass"]), force))
+    common = g.named(tape, force * let(1 / c["total_mass"]))
 
     arms = []
     moved = ZERO
     for k, (wheel, (angle, rate)) in enumerate(zip(wheels, angles, strict=True)):
         end, side = ENDS[k // 2], parts.SIDES[k]
         first, second = (
-            (
-                c[f"{end}_{order}_x"],
-                side * c[f"{end}_{order}_y"],
-                c[f"{end}_{order}_z"],
-            )
+            Vector(c[f"{end}_{order}_x"], side * c[f"{end}_{order}_y"], c[f"{end}_{order}_z"])
             for order in ("first", "second")
         )
-        moved = g.add(moved, g.scale(angle, first))
+        moved = moved + first * angle
         pull = _spring(tape, c, p, end, angle, rate)
-        arms.append(let(wheel.arm + pull - angle * let(g.dot(second, common))))
+        arms.append(let(wheel.arm + pull - angle * let(second @ common)))
     moved = g.named(tape, moved)
 
     # Inertial forces of the rigid vehicle.
     offset = g.vector((c["offset_x"], 0, c["offset_z"]))
-    swept = g.named(tape, g.cross(turning, offset))
+    swept = g.named(tape, turning.cross(offset))
     tensor = (
-        (c["tensor_xx"], sp.Integer(0), c["tensor_xz"]),
-        (sp.Integer(0), c["tensor_yy"], sp.Integer(0)),
-        (c["tensor_xz"], sp.Integer(0), c["tensor_zz"]),
+        g.vector((c["tensor_xx"], 0, c["tensor_xz"])),
+        g.vector((0, c["tensor_yy"], 0)),
+        g.vector((c["tensor_xz"], 0, c["tensor_zz"])),
     )
-    momentum = g.named(tape, [g.dot(row, turning) for row in tensor])
+    momentum = g.named(tape, [row @ turning for row in tensor])
     loads = [
-        *g.subtract(force, g.cross(turning, swept)),
-        *g.subtract(g.vector(moment), g.add(g.cross(turning, momentum), g.cross(moved, common))),
+        *force - turning.cross(swept),
+        *g.vector(moment) - (turning.cross(momentum) + moved.cross(common)),
     ]
     loads = [let(load) for load in loads]
     result: dict[int, sp.Expr] = {}
@@ -153,8 +149,8 @@ def _changes(
         result |= dict(zip(places, rows[:3], strict=True))
         halves.append(rows[3:])
     # Gravity and the turning axes accelerate the chassis' speeds alike.
-    falling = g.add(g.cross(turning, g.vector(nu[:3])), g.scale(p["gravity"], up))
-    linear = g.subtract(g.vector([result[i] for i in range(3)]), falling)
+    falling = turning.cross(g.vector(nu[:3])) + up * p["gravity"]
+    linear = g.vector([result[i] for i in range(3)]) - falling
     even, odd = halves
     return [
         *g.named(tape, linear),

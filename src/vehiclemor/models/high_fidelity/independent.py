@@ -104,8 +104,8 @@ def carrier_turns(
     """
     turns = []
     for corner, motion in zip(corners, motions, strict=True):
-        axle = g.vector([row[1] for row in corner.linkage.carrier])
-        turns.append(g.dot(axle, g.add(turning, motion.bodies.carrier.value)))
+        axle = g.column(corner.linkage.carrier, 1)
+        turns.append(axle @ (turning + motion.bodies.carrier.value))
     return [*turns, *(turning[1] + rates[number] for number in NUMBERS.arms[2:])]
 
 
@@ -132,7 +132,7 @@ def _joints(
     """zeta, eta, xi, theta_u, alpha, beta of a corner, and their rates."""
     let, linkage = tape.let, corner.linkage
     rows, (x, y, z) = linkage.carrier, linkage.rod_direction
-    first = (rows[0][0], rows[1][0], rows[2][0])
+    first = g.column(rows, 0)
     flat = let(first[0] ** 2 + first[1] ** 2)
     level = let(sp.sqrt(flat))
     turn = linkage.upper.angle
@@ -177,19 +177,19 @@ def _suspension(tape: Tape, vehicle: parts.Vehicle, corner: ClosedCorner) -> lis
     angle = vehicle.q[NUMBERS.arms[2]]
 
     def behind(name: str) -> g.Vector:
-        lever = g.named(tape, g.subtract(rear[name], rear["rear_arm_pivot"]))
+        lever = g.named(tape, rear[name] - rear["rear_arm_pivot"])
         turned = g.rotate_about_axis(tape, lever, mechanics.UNIT[1], angle)
-        return g.named(tape, g.add(rear["rear_arm_pivot"], turned))
+        return g.named(tape, rear["rear_arm_pivot"] + turned)
 
     def spring(end: g.Vector, fixed: g.Vector) -> sp.Expr:
-        return g.length(tape, g.named(tape, g.subtract(end, fixed)))
+        return g.length(tape, g.named(tape, end - fixed))
 
     lever = linkage.lower.lever(tape, front["front_spring_arm_point"])
     return [
         *linkage.on_carrier(tape, front["wheel_centre"]),
-        spring(g.add(linkage.lower.rear, lever), front["front_spring_chassis_point"]),
+        spring(linkage.lower.rear + lever, front["front_spring_chassis_point"]),
         *behind("rear_wheel_centre"),
         spring(behind("rear_spring_arm_point"), rear["rear_spring_chassis_point"]),
-        *(row[1] for row in linkage.carrier),
+        *g.column(linkage.carrier, 1),
         sp.Integer(0),
     ]

@@ -96,7 +96,7 @@ def vehicle(
         g.vector(speeds[:3]),
         g.vector(speeds[3:6]),
         first=0,
-        acceleration=g.named(tape, g.scale(p["gravity"], up)),
+        acceleration=g.named(tape, up * p["gravity"]),
     )
     points = design_points(tape, p)
     return Vehicle(frame, up, points, q, rates, p, numbers), attitude, speeds
@@ -119,13 +119,13 @@ def design_points(tape: Tape, p: Mapping[str, sp.Expr]) -> tuple[dict[str, g.Vec
         return g.vector([p[f"{name}_{axis}"] for axis in "xyz"])
 
     origin = vector("chassis_centre")
-    front = g.named(tape, g.subtract(vector("front_frame_origin"), origin))
-    rear = g.named(tape, g.subtract(vector("rear_wheel_centre"), origin))
-    left = {name: g.named(tape, g.add(vector(name), front)) for name in FRONT_POINTS}
-    behind = {name: g.named(tape, g.add(vector(name), rear)) for name in REAR_POINTS}
+    front = g.named(tape, vector("front_frame_origin") - origin)
+    rear = g.named(tape, vector("rear_wheel_centre") - origin)
+    left = {name: g.named(tape, vector(name) + front) for name in FRONT_POINTS}
+    behind = {name: g.named(tape, vector(name) + rear) for name in REAR_POINTS}
     behind["rear_wheel_centre"] = rear
 
     def mirrored(points: dict[str, g.Vector]) -> dict[str, g.Vector]:
-        return {name: (x, -y, z) for name, (x, y, z) in points.items()}
+        return {name: g.Vector(x, -y, z) for name, (x, y, z) in points.items()}
 
     return left, mirrored(left), behind, mirrored(behind)

@@ -111,7 +111,7 @@ def _vehicle(
     named = replace(
         d, sprung_distance=pair(d.sprung_distance), depth=pair(d.depth), preload=pair(d.preload)
     )
-    weight = g.scale(-p["gravity"], attitude.road_normal)
+    weight = attitude.road_normal * -p["gravity"]
     return _Vehicle(frame, attitude, weight, q, nu, delta, p, named)
 
 
@@ -125,7 +125,7 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     mass = v.p["sprung_mass"]
     origin = v.frame.origin(tape)
     rotation = v.frame.rotation(tape, inertia)
-    return mechanics.Body(mass, origin, g.scale(mass, v.weight), rotation, inertia)
+    return mechanics.Body(mass, origin, v.weight * mass, rotation, inertia)
 
 
 def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
@@ -165,7 +165,7 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     )
     force, moment = _loads(tape, contact, v.attitude.road_normal, load, tire)
     mass = p["unsprung_mass"]
-    whole = g.named(tape, g.add(force, g.scale(mass, v.weight)))
+    whole = g.named(tape, force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
     return _Wheel(
         mechanics.Body(mass, centre, whole, rotation, about, moment),
@@ -182,8 +182,8 @@ def _loads(
     """Force on a wheel and its moment about the wheel centre; the vertical load has no arm."""
     shear = g.named(
         tape,
-        g.add(g.scale(tire.longitudinal, contact.heading), g.scale(tire.lateral, contact.leftward)),
+        contact.heading * tire.longitudinal + contact.leftward * tire.lateral,
     )
-    arm = g.named(tape, g.scale(-contact.height, up))
-    moment = g.add(g.cross(arm, shear), g.scale(tire.aligning, up))
-    return g.named(tape, g.add(shear, g.scale(load, up))), g.named(tape, moment)
+    arm = g.named(tape, up * -contact.height)
+    moment = arm.cross(shear) + up * tire.aligning
+    return g.named(tape, shear + up * load), g.named(tape, moment)
