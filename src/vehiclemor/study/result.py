@@ -164,7 +164,7 @@ def errors_dataset(
         values = np.array([getattr(end, name) for end in ends], dtype=object)
         variables[name] = ("scenario", values, {"long_name": text})
     variables |= _of_fit(reduced, "reduced coordinates")
-    outputs = model.equations.outputs
+    outputs = model.definition.outputs
     coordinates = {
         "scenario": [scenario.label for scenario in experiment.test],
         "output": [quantity.name for quantity in outputs],
