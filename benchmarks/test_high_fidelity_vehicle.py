@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
+from vehiclemor.simulation.system_loops import FULL as FULL_FORM
 
 from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity import definition as high_fidelity_vehicle
@@ -16,7 +17,6 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system_loops import FULL as FULL_FORM
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

@@ -1,7 +1,5 @@
 """A dynamic model in other states than its own: encode, integrate, lift."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,9 +7,10 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -68,3 +67,37 @@ class ReducedSystem:
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Projection of full states (samples, 2 n), if there is a subspace."""
         return None if self.project is None else self.project(states)
+
+
+def transformed_system(
+    model: DynamicModel,
+    system: System,
+    encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    offline: Offline,
+    settings: OnlineSettings,
+) -> ReducedSystem:
+    """Equations in other states than the model's.
+
+    Parameters
+    ----------
+    system
+        The equations; its kernel `full_state` gives the full state of a transformed one.
+    encode
+        (full state (2 n,), inputs) -> transformed state (dim,).
+    """
+    dim = len(system.reference)
+
+    def lift(run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return system.along("full_state", run.path, inputs, 2 * len(model.coordinates))
+
+    return ReducedSystem(
+        model,
+        system,
+        whole_space(dim),
+        encode,
+        lift,
+        dim,
+        offline,
+        settings.solver,
+        settings.tolerance,
+    )

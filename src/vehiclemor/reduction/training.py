@@ -39,6 +39,9 @@ class TrainingRun:
         return self.at(np.linspace(0.0, self.maneuver.duration, count))
 
 
+Training = Sequence[TrainingRun]
+
+
 def training_runs(
     model: Model,
     maneuver: Maneuver,

@@ -1,7 +1,5 @@
 """Scenarios: what a reduced model is trained, chosen or tested on."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The high-fidelity vehicle with frozen inertia, from the exact kernels of a ready model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

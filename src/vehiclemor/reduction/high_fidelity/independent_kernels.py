@@ -1,7 +1,5 @@
 """Compiled kernels of the high-fidelity vehicle in other coordinates than its own."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation

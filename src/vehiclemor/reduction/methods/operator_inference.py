@@ -17,10 +17,7 @@ Nothing makes a fitted A stable: its spectral abscissa at straight running is re
 eigenvalues are reflected at the imaginary axis (`stabilise`).
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -30,15 +27,14 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, polynomial_features
 from vehiclemor.reduction.vehicle.linear_vehicle import HEADING, MARGIN, PLACE
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
-from vehiclemor.reduction.vehicle.samples import shape_samples
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape, shape_samples
 from vehiclemor.simulation.dynamic import DynamicModel
 
 
@@ -77,7 +73,7 @@ def check(model: DynamicModel, settings: OperatorInferenceSettings) -> None:
 
 
 def fit(
-    model: DynamicModel, training: Sequence[TrainingRun], settings: OperatorInferenceSettings
+    model: DynamicModel, training: Training, settings: OperatorInferenceSettings
 ) -> ReducedVehicle:
     """Project the training runs on their POD basis and fit the operators."""
     if not training:

@@ -8,10 +8,7 @@ To be expected: an explicit run gains up to the factor, with small errors, until
 constraints limit the steps; a W-method gains nothing, since stiffness is free for it.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
@@ -19,7 +16,7 @@ from pydantic import Field
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -59,11 +56,7 @@ def softened(model: DynamicModel, factor: float) -> DynamicModel:
     return changed
 
 
-def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: SoftenedSlipSettings,
-) -> ReducedSystem:
+def fit(model: DynamicModel, training: Training, settings: SoftenedSlipSettings) -> ReducedSystem:
     """States of the softened vehicle, outputs of the original; no training run is looked at."""
     began = time.perf_counter()
     soft = softened(model, settings.factor)

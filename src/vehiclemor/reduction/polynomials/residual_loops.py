@@ -83,13 +83,8 @@ def reduced_path(
     """
     means, basis, response, coefficients, derivatives, tolerances = polynomials
     path, counts = solution.path, solution.counts
-    x, first, second, third = (
-        vector(buffer, 0, N),
-        vector(buffer, N, N),
-        vector(buffer, 2 * N, N),
-        vector(buffer, 3 * N, N),
-    )
-    load, step = vector(buffer, 4 * N, N), vector(buffer, 5 * N, N)
+    x, load, step = vector(buffer, 0, N), vector(buffer, 4 * N, N), vector(buffer, 5 * N, N)
+    first, second, third = vector(buffer, N, N), vector(buffer, 2 * N, N), vector(buffer, 3 * N, N)
     matrix_of = matrix(buffer, 6 * N, N, N + 1)
     for k in range(N):
         x[k] = x_start[k]

@@ -1,9 +1,6 @@
 """Reduced algebraic equations on one affine subspace in each time window."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,7 +14,7 @@ from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, p
 from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
 from vehiclemor.reduction.projection.windows import first_samples
 from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Iteration
@@ -90,7 +87,7 @@ class AlgebraicProjection:
 
 def fit_windows(
     model: AlgebraicModel,
-    training: Sequence[TrainingRun],
+    training: Training,
     edges: np.ndarray,
     settings: AlgebraicPodSettings,
 ) -> AlgebraicProjection:

@@ -5,8 +5,6 @@ as settings: which equations are projected (formulation), and in which inner pro
 compared.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +20,7 @@ from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.reduction.projection.windows import first_samples
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import ProjectionWindows
@@ -128,7 +126,7 @@ class DynamicProjection:
 
 def fit_windows(
     model: DynamicModel,
-    training: Sequence[TrainingRun],
+    training: Training,
     edges: np.ndarray,
     settings: DynamicPodSettings,
 ) -> DynamicProjection:

@@ -1,7 +1,5 @@
 """Settings that all methods on POD subspaces share, by kind of model."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

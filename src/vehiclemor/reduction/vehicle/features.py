@@ -9,8 +9,6 @@ kernel it makes the right-hand side of the reduced vehicle
 Coefficients are constants of the kernel: fits with the same features compile nothing new.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement

@@ -9,8 +9,6 @@ Speed, heading and place are kept as in every reduced vehicle: the speed stays t
 and the dynamics are those of the model's own speed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -10,8 +10,6 @@ order derivatives for network pruning: optimal brain surgeon, NIPS 5 (1992), 164
 groups of coefficients, since a feature that one equation needs costs the others nothing).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

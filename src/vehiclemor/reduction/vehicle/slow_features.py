@@ -5,8 +5,6 @@ roll angle, its rate and the steering; a vehicle that is its own mirror image ha
 lateral equations and even ones in the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -15,8 +13,7 @@ import numpy as np
 
 from vehiclemor.reduction.vehicle.features import Features, monomials
 from vehiclemor.reduction.vehicle.regression import largest
-from vehiclemor.reduction.vehicle.samples import ShapeSamples
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
@@ -53,7 +50,7 @@ class FeatureTable:
         lateral = [(self.odd_nonlinear, column) for column in range(k)]
         return [*lateral, (self.odd, k + 1), (self.odd, k + 3)]
 
-    def with_only(self, kept: Sequence[int]) -> FeatureTable:
+    def with_only(self, kept: Sequence[int]) -> "FeatureTable":
         """Some of the features, by their numbers in order."""
         odd = [i for i in kept if i in self.odd]
         even = [i for i in kept if i in self.even]

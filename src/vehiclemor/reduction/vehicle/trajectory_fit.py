@@ -8,14 +8,12 @@ Ordinary Differential Equations I (2nd ed., Springer 1993), section I.14); steps
 Levenberg and Marquardt.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
@@ -54,7 +52,7 @@ class Target:
 
 
 def targets(
-    reduced: ReducedVehicle, training: Sequence[TrainingRun], runs: Sequence[Trajectory]
+    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
 ) -> list[Target]:
     """Training runs in reduced states."""
     x, y, heading = reduced.model.planar

@@ -1,7 +1,5 @@
 """The paper's claims: their criteria evaluated, or why they can't be."""
 
-from __future__ import annotations
-
 import math
 
 from vehiclemor.registry import names

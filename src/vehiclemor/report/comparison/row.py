@@ -1,7 +1,5 @@
 """One row of the comparison with the paper."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

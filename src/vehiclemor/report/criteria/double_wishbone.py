@@ -1,7 +1,5 @@
 """The paper's claims on the suspension, figures 6 and 11 to 14, as criteria that can fail."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

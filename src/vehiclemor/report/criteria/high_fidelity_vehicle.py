@@ -1,7 +1,5 @@
 """The paper's claim on the high-fidelity vehicle, figures 9 and 10, as a criterion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from vehiclemor.report.criteria.finding import Finding, Results, at_point

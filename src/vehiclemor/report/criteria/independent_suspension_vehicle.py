@@ -3,8 +3,6 @@
 Every criterion takes the worse of the two starts: from the equilibrium the car hardly pitches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

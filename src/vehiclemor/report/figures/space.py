@@ -1,7 +1,5 @@
 """Vehicles in space: what the drawings of both vehicles share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

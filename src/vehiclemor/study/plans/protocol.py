@@ -1,7 +1,5 @@
 """Protocols: training, validation and test scenarios of a model, and who competes on them."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
