@@ -15,6 +15,14 @@ from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
+def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
+    return state
+
+
+def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
+    return run.path
+
+
 @dataclass(frozen=True, eq=False)
 class ReducedSystem:
     """Equations in reduced states, with the ways there and back.
@@ -27,14 +35,15 @@ class ReducedSystem:
         The equations that are integrated.
     spaces
         Their form, and their subspaces if they are projected.
-    encode
-        (full state (2 n,), inputs) -> state (dim,) of the system.
-    lift
-        (run of the system, inputs (samples, inputs), full state at the start) -> full states.
     effective_rank
         Number of coordinates or modes that stand for the model's.
     solver, tolerance
         Integrator and its tolerance.
+    encode
+        (full state (2 n,), inputs) -> state (dim,) of the system; the same by default.
+    lift
+        (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
+        default the run's own.
     project
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     """
@@ -42,12 +51,12 @@ class ReducedSystem:
     model: DynamicModel
     system: System
     spaces: ProjectionWindows
-    encode: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray]
     effective_rank: int
     offline: Offline
     solver: str
     tolerance: float
+    encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
+    lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
     def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
@@ -94,10 +103,10 @@ def transformed_system(
         model,
         system,
         whole_space(dim),
-        encode,
-        lift,
         dim,
         offline,
         settings.solver,
         settings.tolerance,
+        encode,
+        lift,
     )

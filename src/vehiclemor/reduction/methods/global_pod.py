@@ -18,7 +18,7 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_snapshots, pod_basis
-from vehiclemor.reduction.projection.dynamic import DynamicProjection
+from vehiclemor.reduction.projection.dynamic import DynamicProjection, projected_equations
 from vehiclemor.reduction.projection.inner_products import coordinate_weight
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.training import Training
@@ -83,15 +83,8 @@ def fit(model: DynamicModel, training: Training, settings: GlobalPodSettings) ->
     edges = np.array([0.0, max(run.maneuver.duration for run in training)])
     ranks = np.array([2 * r], dtype=np.int64)
     spaces = ProjectionWindows("coordinates", edges, mean[None], trial_basis, test_basis, ranks)
-    return DynamicProjection(
-        model,
-        "coordinates",
-        (Basis(mean[:n], vectors.T, scaled.singular_values),),
-        spaces,
-        offline_cost(began, model, runs),
-        settings.solver,
-        settings.tolerance,
-    )
+    basis = Basis(mean[:n], vectors.T, scaled.singular_values)
+    return projected_equations(model, spaces, [basis], offline_cost(began, model, runs), settings)
 
 
 def kept_apart(model: DynamicModel) -> np.ndarray:

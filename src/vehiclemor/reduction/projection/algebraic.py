@@ -12,7 +12,7 @@ from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
-from vehiclemor.reduction.projection.windows import first_samples
+from vehiclemor.reduction.projection.windows import by_window, first_samples
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -77,12 +77,7 @@ class AlgebraicProjection:
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""
-        times = np.linspace(self.edges[0], self.edges[-1], len(states))
-        first = first_samples(times, self.edges)
-        parts = [
-            project(states[first[k] : first[k + 1]], basis) for k, basis in enumerate(self.bases)
-        ]
-        return np.concatenate(parts)
+        return by_window(states, self.edges, lambda part, k: project(part, self.bases[k]))
 
 
 def fit_windows(

@@ -53,12 +53,12 @@ def projected_vehicle(
         shape.model,
         heading_frame(shape),
         spaces,
-        encode,
-        lift,
         effective_rank,
         offline,
         settings.solver,
         settings.tolerance,
+        encode,
+        lift,
         project,
     )
 

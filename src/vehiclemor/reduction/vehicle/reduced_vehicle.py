@@ -114,12 +114,12 @@ class ReducedVehicle:
             self.model,
             self.system,
             whole_space(self.effective_rank),
-            self.encoded,
-            self.lifted,
             self.effective_rank,
             self.offline,
             self.solver,
             self.tolerance,
+            self.encoded,
+            self.lifted,
         )
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
