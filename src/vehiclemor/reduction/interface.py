@@ -38,13 +38,7 @@ class Offline:
 def offline_cost(
     began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0
 ) -> Offline:
-    """Cost since `began` (`time.perf_counter()`), with the evaluations of training runs.
-
-    Parameters
-    ----------
-    further
-        Evaluations of the full model's equations besides those of the runs.
-    """
+    """Seconds since `began` (`time.perf_counter()`), evaluations of the runs and `further` ones."""
     evaluations = sum(run.counts[model.evaluations] for run in runs) + further
     return Offline(time.perf_counter() - began, evaluations)
 

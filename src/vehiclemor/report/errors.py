@@ -47,14 +47,7 @@ def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 
 def settings_table(
     study: str, outputs: tuple[str, ...], results: Path, jobs: int = 1
 ) -> pd.DataFrame:
-    """Control-period POD on a vehicle with every combination of its settings.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Errors and floors of a few outputs, evaluations, largest growth rate of a reduced Jacobian,
-        status and reason of each combination.
-    """
+    """Control-period POD on a vehicle with every combination of its settings, as of `flat`."""
     dataset = next(iter(run_studies(study, results, jobs).values()))
     return flat(dataset, outputs)
 

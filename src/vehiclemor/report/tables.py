@@ -20,13 +20,7 @@ LATEX_SPECIAL = {"\\": r"\textbackslash{}"} | {c: f"\\{c}" for c in "&%$#_{}"} |
 
 
 def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
-    """Write every table of every registered model in three formats.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-    """
+    """Write every table of every registered model in three formats; the files written."""
     tables = {"comparison": paper_comparison(results, jobs)}
     for model in names("model"):
         tables |= {f"{name}-{model}": t for name, t in model_tables(model, results, jobs).items()}

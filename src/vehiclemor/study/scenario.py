@@ -108,14 +108,7 @@ def training_run(model: Model, scenario: Scenario) -> TrainingRun:
 def training_scenarios(
     test: Scenario, policy: str, factors: Sequence[tuple[float, float]] = ()
 ) -> tuple[Scenario, ...]:
-    """What a training policy trains on before a test scenario.
-
-    Parameters
-    ----------
-    policy
-        One of `reduction.training.POLICIES`.
-    factors
-        (frequency, amplitude) factors of the policy `set`.
+    """What a training policy trains on before a test scenario, see `policy_factors`.
 
     Raises
     ------

@@ -49,12 +49,7 @@ SPEED_UPS = {
 def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: str) -> xr.Dataset:
     """Stored timing of cases on the model's nominal maneuver, from every start.
 
-    Measured first if it is missing or out of date.
-
-    Parameters
-    ----------
-    name
-        Of the file in the folder `studies`.
+    Measured first if the file `studies/<name>.nc` is missing or out of date.
 
     Returns
     -------

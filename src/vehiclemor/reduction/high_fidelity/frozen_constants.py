@@ -56,13 +56,7 @@ class _Exact:
 
 
 def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels of the vehicle with frozen inertia, and their constants.
-
-    Parameters
-    ----------
-    model
-        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
-    """
+    """Kernels of the vehicle with frozen inertia, and their constants of a ready model."""
     made, _ = compiled(FROZEN_INERTIA.name, FROZEN_INERTIA)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]

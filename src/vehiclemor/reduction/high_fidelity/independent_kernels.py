@@ -11,13 +11,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 
 
 def independent_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels over the 14 independent coordinates, and their constants.
-
-    Parameters
-    ----------
-    model
-        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
-    """
+    """Kernels over the 14 independent coordinates, and their constants of a ready model."""
     made, _ = compiled(INDEPENDENT.name, INDEPENDENT)
     return made, hoisted_constants(made, model.parameters, free_lengths(model))
 

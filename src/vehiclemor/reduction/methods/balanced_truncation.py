@@ -37,15 +37,7 @@ class BalancedTruncationSettings(OnlineSettings):
 
 
 def balanced(a: np.ndarray, b: np.ndarray, c: np.ndarray, rank: int) -> Balanced:
-    """Balance a stable system x' = a x + b u, y = c x.
-
-    Parameters
-    ----------
-    a, b, c
-        Matrices (n, n), (n, inputs), (outputs, n).
-    rank
-        Number of states to keep.
-    """
+    """Balance a stable system x' = a x + b u, y = c x of n states, of which `rank` are kept."""
     from scipy.linalg import solve_continuous_lyapunov
 
     reached = gramian_factor(solve_continuous_lyapunov(a, -b @ b.T))

@@ -119,12 +119,8 @@ def _inferred(
 ) -> tuple[np.ndarray, tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]]:
     """Coefficients (terms, k + 3) of the goals, and the blocks that parity allows.
 
-    Parameters
-    ----------
-    odd
-        Which coordinates change sign in the mirror (k,).
-    values, goals
-        Terms (samples, terms) and rates, psi', U, V (samples, k + 3).
+    `odd` (k,) are coordinates that change sign in the mirror, `values` the terms (samples, terms),
+    `goals` rates, psi', U and V (samples, k + 3).
     """
     k = len(odd)
     parity = term_parity(odd, inputs, settings.degree)

@@ -74,13 +74,7 @@ class PathMapModel:
         return 1
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Polynomials at the maneuver's output times.
-
-        Raises
-        ------
-        InputError
-            If the start or the maneuver's inputs are not the model's, or an input isn't finite.
-        """
+        """Polynomials at the maneuver's output times."""
         model, times = self.model, maneuver.times
         model.start(start)
         inputs = checked_inputs(model, maneuver)

@@ -105,13 +105,7 @@ class PolynomialResidualModel:
         return self.basis.rank
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Solve the polynomial equations at the maneuver's output times.
-
-        Raises
-        ------
-        InputError
-            If the start or the maneuver's inputs are not the model's, or an input isn't finite.
-        """
+        """Solve the polynomial equations at the maneuver's output times."""
         model, times = self.model, maneuver.times
         began_at = self.reduced(model.start(start)[None, :])[0]
         inputs = checked_inputs(model, maneuver)

@@ -86,15 +86,7 @@ def fit_windows(
     edges: np.ndarray,
     settings: AlgebraicPodSettings,
 ) -> AlgebraicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) in each window.
-
-    Parameters
-    ----------
-    training
-        Runs whose snapshots are put side by side.
-    edges
-        Window edges (windows + 1,) in s.
-    """
+    """POD subspaces between edges (windows + 1,) in s, of snapshots as in `dynamic.fit_windows`."""
     began = time.perf_counter()
     count, rank = settings.snapshots, settings.rank
     moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]

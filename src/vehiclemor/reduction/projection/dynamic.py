@@ -106,14 +106,9 @@ def fit_windows(
     edges: np.ndarray,
     settings: DynamicPodSettings,
 ) -> DynamicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) in each window.
+    """POD subspaces of equidistant snapshots (both ends included) of all runs, side by side.
 
-    Parameters
-    ----------
-    training
-        Runs whose snapshots are put side by side.
-    edges
-        Window edges (windows + 1,) in s.
+    Windows lie between edges (windows + 1,) in s.
 
     Raises
     ------

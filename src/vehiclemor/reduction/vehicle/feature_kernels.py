@@ -36,13 +36,7 @@ def diagonal_blocks(sizes: Sequence[int]) -> tuple[tuple[int, ...], ...]:
 
 
 def kernel_text(features: Features, parameters: int) -> str:
-    """Source of the kernels; constants are the features' parameters, then C.
-
-    Parameters
-    ----------
-    parameters
-        Number of parameters.
-    """
+    """Source of the kernels; constants are the features' parameters, so many, then C."""
     k = features.states + PLANAR
     lines = [f"y{i} = _x[{i}]" for i in range(k)] + _inputs_at(features, 0)
     lines += _rates(features, "y", "", parameters)

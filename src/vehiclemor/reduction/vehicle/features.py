@@ -73,18 +73,10 @@ class Features:
         error_scale: np.ndarray,
         reference: np.ndarray,
     ) -> System:
-        """The reduced vehicle as the compiled loops take it.
+        """The reduced vehicle as the compiled loops take it, with arguments of `ReducedVehicle`.
 
-        Parameters
-        ----------
-        parameters
-            Of the features.
-        coefficients
-            C (terms, states + 3): columns of z', then of psi', U and V.
-        error_scale
-            Magnitude of each state (states + 3,) below which errors count absolutely.
-        reference
-            Reduced coordinates (states,) at which the Jacobian is frozen.
+        Columns of the coefficients are those of z', then of psi', U and V; the Jacobian is frozen
+        at the reference (states,).
         """
         blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in self.blocks]
         for block, (terms, columns) in zip(blocks, self.blocks, strict=True):

@@ -22,13 +22,7 @@ def projected_vehicle(
     offline: Offline,
     settings: ProjectedSettings,
 ) -> ReducedSystem:
-    """The vehicle's equations with speeds in the heading frame, projected.
-
-    Parameters
-    ----------
-    spaces
-        One window for all times, formulation `state`.
-    """
+    """The vehicle's equations with speeds in the heading frame in subspaces of `one_window`."""
     heading = shape.model.planar[2]
 
     def to_heading_frame(states: np.ndarray) -> np.ndarray:
@@ -89,16 +83,10 @@ def heading_frame(shape: VehicleShape) -> System:
 
 
 def heading_frame_text(text: str, planar: np.ndarray, pairs: Sequence[tuple[int, int]]) -> str:
-    """Text of the kernel `derivative` with pairs of speeds in the heading frame.
+    """Text of the straight-line kernel `derivative` with pairs of speeds in the heading frame.
 
-    Parameters
-    ----------
-    text
-        Straight-line kernel whose speeds in pairs are components in space.
-    planar
-        Numbers of the two positions and of the heading.
-    pairs
-        Numbers of the two speeds of each pair.
+    The speeds of a pair, by their numbers, were components in space; `planar` are the numbers of
+    the two positions and of the heading.
     """
     x, y, heading = (int(i) for i in planar)
     (function,) = ast.parse(text).body

@@ -27,6 +27,8 @@ STRIDE = 5
 DIFFERENCE = 1e-6
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
+# (numbers of features, column) of the coefficients that may change.
+Free = Sequence[tuple[Sequence[int], int]]
 
 
 @dataclass(frozen=True)
@@ -35,12 +37,8 @@ class Target:
 
     Attributes
     ----------
-    run
-        Maneuver and start.
-    times
-        Output times (samples,) in s.
-    inputs
-        Inputs (samples, inputs).
+    times, inputs
+        Output times (samples,) in s, and inputs (samples, inputs) then.
     states
         Reduced states (samples, states + 3): coordinates, heading, place.
     """
@@ -66,22 +64,9 @@ def targets(
 
 
 def improved(
-    reduced: ReducedVehicle,
-    goals: Sequence[Target],
-    free: Sequence[tuple[Sequence[int], int]],
-    sweeps: int,
+    reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int
 ) -> ReducedVehicle:
-    """The reduced vehicle after a number of damped Gauss-Newton steps.
-
-    Parameters
-    ----------
-    goals
-        Training runs in reduced states.
-    free
-        (numbers of features, column) of the coefficients that may change.
-    sweeps
-        Number of steps.
-    """
+    """The reduced vehicle after so many sweeps, damped Gauss-Newton steps."""
     paths, error = _compared(reduced, goals)
     damping = DAMPING
     for _ in range(sweeps):
@@ -106,17 +91,13 @@ def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
     return bool(np.isfinite(_compared(reduced, goals)[1]))
 
 
-def normal_matrix(
-    reduced: ReducedVehicle, goals: Sequence[Target], free: Sequence[tuple[Sequence[int], int]]
-) -> np.ndarray:
+def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
     """Normal matrix of the free coefficients, column by column; all runs must finish."""
     paths, _ = _compared(reduced, goals)
     return _normal_equations(reduced, goals, paths, free)[0]
 
 
-def _changed(
-    reduced: ReducedVehicle, free: Sequence[tuple[Sequence[int], int]], step: np.ndarray
-) -> ReducedVehicle:
+def _changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
     coefficients, first = reduced.coefficients.copy(), 0
     for terms, column in free:
         coefficients[list(terms), column] += step[first : first + len(terms)]
@@ -145,10 +126,7 @@ def _scale(goals: Sequence[Target]) -> np.ndarray:
 
 
 def _normal_equations(
-    reduced: ReducedVehicle,
-    goals: Sequence[Target],
-    paths: Sequence[np.ndarray],
-    free: Sequence[tuple[Sequence[int], int]],
+    reduced: ReducedVehicle, goals: Sequence[Target], paths: Sequence[np.ndarray], free: Free
 ) -> tuple[np.ndarray, np.ndarray]:
     scale = _scale(goals)
     kept = np.flatnonzero(scale)
@@ -164,10 +142,7 @@ def _normal_equations(
 
 
 def _sensitivities(
-    reduced: ReducedVehicle,
-    goal: Target,
-    path: np.ndarray,
-    free: Sequence[tuple[Sequence[int], int]],
+    reduced: ReducedVehicle, goal: Target, path: np.ndarray, free: Free
 ) -> np.ndarray:
     """Derivatives (samples / STRIDE, states + 3, free coefficients) of a reduced run."""
     k, c = reduced.features.states, reduced.coefficients

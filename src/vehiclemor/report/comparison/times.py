@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.models.report import TimingCase, timing_cases
 from vehiclemor.registry import component
-from vehiclemor.report.comparison.row import PRESETS, Row, verdict
+from vehiclemor.report.comparison.rows import PRESETS, Row, verdict
 from vehiclemor.report.published import Claim, Number
 
 if TYPE_CHECKING:

@@ -22,6 +22,8 @@ VISIBLE = 0.05
 INDISTINGUISHABLE = 0.01
 # A change of an error by less than this share is no change.
 SMALLEST_CHANGE = 0.01
+# Of a vehicle: of both the worse one counts.
+STARTS = ("equilibrium", "dropped")
 Results = Mapping[str, "xr.Dataset"]
 
 
@@ -76,3 +78,32 @@ def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISI
     worst = max(largest_deviation(point, output) for output in outputs)
     text = "largest deviation, as a share of the signal's range"
     return Finding(worst, bound, worst < bound, text)
+
+
+def worst_of(values: dict[str, float]) -> tuple[float, str]:
+    """Largest value and where it is; missing if any is missing."""
+    missing = [name for name, value in values.items() if value != value]
+    if missing:
+        return float("nan"), missing[0]
+    name = max(values, key=lambda key: values[key])
+    return values[name], name
+
+
+def _failures(dataset: xr.Dataset) -> str:
+    states = {s: str(dataset["status"].sel(start=s).item()) for s in STARTS}
+    return ", ".join(f"{start}: {status}" for start, status in states.items() if status != "ok")
+
+
+def closely_followed(point: xr.Dataset, outputs: tuple[str, ...]) -> Finding:
+    """Whether the outputs can hardly be told from the full model's, from both starts."""
+    deviations = {
+        f"{output} from {start}": largest_deviation(point.sel(start=start), output)
+        for start in STARTS
+        for output in outputs
+    }
+    worst, where = worst_of(deviations)
+    failed = _failures(point)
+    text = f"largest deviation of {where}, as a share of the signal's range"
+    return Finding(
+        worst, VISIBLE, worst < VISIBLE and not failed, f"{text}; {failed}" if failed else text
+    )

@@ -1,13 +1,15 @@
 """Time histories and paths of any model: full order beside reduced models, and their errors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures.lines import (
     CROSS,
     FULL,
@@ -15,16 +17,10 @@ from vehiclemor.report.figures.lines import (
     Style,
     legend_above,
     letter,
-    point,
     styles,
 )
 from vehiclemor.report.labels import axis_label, error_label
 from vehiclemor.report.published import rms_numbers
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PUBLISHED = "published RMS error"
 STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
@@ -130,7 +126,7 @@ def _lines(dataset: xr.Dataset, methods: Mapping[str, str]) -> list[Line]:
 def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
     """One output of the full and the reduced models; what the crosses mean -> their colour."""
     dataset, output, lines = panel
-    full = point(dataset, "full_order")["outputs"].sel(output=output)
+    full = at_point(dataset, "full_order")["outputs"].sel(output=output)
     axis.plot(full.time, full, label="full order", **FULL)
     axis.set_ylabel(axis_label(dataset, output))
     low, high = float(full.min()), float(full.max())
@@ -139,7 +135,7 @@ def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
         axis.set_ylim(low - margin, high + margin)
     left: dict[str, str] = {}
     for method, text, style in lines:
-        history = point(dataset, method)["outputs"].sel(output=output)
+        history = at_point(dataset, method)["outputs"].sel(output=output)
         if whole:
             axis.plot(full.time, history, label=text, **style)
         elif _plot_until_it_leaves(axis, history, text, style):
@@ -170,10 +166,12 @@ def _draw_errors(axis: Axes, panel: Panel) -> None:
     """Errors over the time, and the RMS error of the best approximation by the first method."""
     dataset, output, lines = panel
     for method, text, style in lines:
-        run = point(dataset, method)
+        run = at_point(dataset, method)
         error = (run["outputs"] - run["reference_outputs"]).sel(output=output)
         axis.plot(run.time, error, label=text, **style)
-    floors = (point(dataset, line.method)["floor_rms_error"].sel(output=output) for line in lines)
+    floors = (
+        at_point(dataset, line.method)["floor_rms_error"].sel(output=output) for line in lines
+    )
     floor = next((float(value) for value in floors if np.isfinite(value)), None)
     if floor is not None:
         shade = {"color": "#BBBBBB", "alpha": 0.5, "label": "RMS of the best approximation"}
@@ -191,7 +189,7 @@ def _draw_largest_errors(
     period = published.control_period if published else None
     ended: dict[str, str] = {}
     for method, text, style in lines:
-        run = point(dataset, method)
+        run = at_point(dataset, method)
         error = abs(run["outputs"] - run["reference_outputs"]).sel(output=output)
         edges, largest = _largest(error, period or last / 50.0)
         axis.semilogy(edges, largest, label=text, drawstyle="steps-post", **style)
@@ -222,7 +220,7 @@ def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequenc
     figure, axes = plt.subplots(len(shown), 1)
     for number, (axis, furthest) in enumerate(zip(axes, shown, strict=True)):
         for method, text, style in _lines(dataset, {"full_order": "full order", **methods}):
-            path = point(dataset, method, start="equilibrium")["outputs"]
+            path = at_point(dataset, method, start="equilibrium")["outputs"]
             x, y = (path.sel(output=f"{way}_position") for way in ("longitudinal", "lateral"))
             axis.plot(x, y, label=text, **style)
         axis.set_xlim(0.0, furthest)
@@ -252,9 +250,9 @@ def figure_replayed_paths(
     size = (6.7, 4.8 if beside_replay else 3.2)
     figure, axes = plt.subplots(panels, 1, sharex=True, squeeze=False, figsize=size)
     upper, lower = axes[0, 0], axes[-1, 0]
-    replay = point(dataset, "replay", start="equilibrium")["outputs"].sel(output=output)
+    replay = at_point(dataset, "replay", start="equilibrium")["outputs"].sel(output=output)
     for method, text, style in _lines(dataset, methods):
-        run = point(dataset, method, start="equilibrium")["outputs"].sel(output=output)
+        run = at_point(dataset, method, start="equilibrium")["outputs"].sel(output=output)
         upper.plot(run.time, run, label=text, **style)
         if beside_replay and method not in ("full_order", "replay"):
             lower.plot(run.time, 1e3 * (run - replay), label=text, **style)
