@@ -6,15 +6,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.report.criteria.finding import at_point
-from vehiclemor.report.figures.lines import (
-    COLORS,
-    FULL,
-    LITERAL,
-    Results,
-    Style,
-    letter,
-    styles,
-)
+from vehiclemor.report.figures.lines import COLORS, FULL, LITERAL, Results, Style, letter, styles
 from vehiclemor.report.labels import axis_label
 
 OUTPUT = "second_euler_angle"
