@@ -45,8 +45,7 @@ class OperatorInferenceSettings(OnlineSettings):
     degree: int = Field(1, ge=1, description="of the operators: 1 linear, 2 quadratic")
     ridge: float = Field(1e-8, ge=0.0, description="weight of the coefficients' size in the fit")
     stabilise: Literal["check", "shift"] = Field(
-        "check",
-        description="growing linear part: check reports it, shift reflects its eigenvalues",
+        "check", description="growing linear part: check reports it, shift reflects its eigenvalues"
     )
 
 

@@ -81,10 +81,7 @@ class AlgebraicProjection:
 
 
 def fit_windows(
-    model: AlgebraicModel,
-    training: Training,
-    edges: np.ndarray,
-    settings: AlgebraicPodSettings,
+    model: AlgebraicModel, training: Training, edges: np.ndarray, settings: AlgebraicPodSettings
 ) -> AlgebraicProjection:
     """POD subspaces between edges (windows + 1,) in s, of snapshots as in `dynamic.fit_windows`."""
     began = time.perf_counter()

@@ -101,10 +101,7 @@ class DynamicProjection(ReducedSystem):
 
 
 def fit_windows(
-    model: DynamicModel,
-    training: Training,
-    edges: np.ndarray,
-    settings: DynamicPodSettings,
+    model: DynamicModel, training: Training, edges: np.ndarray, settings: DynamicPodSettings
 ) -> DynamicProjection:
     """POD subspaces of equidistant snapshots (both ends included) of all runs, side by side.
 

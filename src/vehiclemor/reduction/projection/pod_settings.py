@@ -41,8 +41,7 @@ class AlgebraicPodSettings(Settings):
         description="galerkin: seed of a random order and signs of the equations; 0: natural",
     )
     reversed_coordinates: str = Field(
-        "",
-        description="galerkin: coordinates counted the other way round, separated by commas",
+        "", description="galerkin: coordinates counted the other way round, separated by commas"
     )
     tolerance: float = Field(1e-12, gt=0.0, description="largest step of the last iteration")
     rounding_seed: int = Field(

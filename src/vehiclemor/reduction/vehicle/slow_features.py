@@ -69,11 +69,7 @@ class FeatureTable:
 
 
 def feature_table(
-    shape: VehicleShape,
-    modes: SlowModes,
-    samples: ShapeSamples,
-    hull: float,
-    nonlinearity: str,
+    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, hull: float, nonlinearity: str
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     u = samples.inputs

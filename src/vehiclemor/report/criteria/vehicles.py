@@ -94,9 +94,5 @@ CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
     "hfv_fig10_one_state_excellent": one_state_suffices,
 }
 WITHOUT_REPLAY = frozenset(
-    {
-        "gv_three_states_suffice",
-        "gv_control_periods_sharpen_basis",
-        "gv_longer_period_saves_time",
-    }
+    {"gv_three_states_suffice", "gv_control_periods_sharpen_basis", "gv_longer_period_saves_time"}
 )

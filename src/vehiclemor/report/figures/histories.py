@@ -232,11 +232,7 @@ def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequenc
 
 
 def figure_replayed_paths(
-    results: Results,
-    *,
-    methods: Mapping[str, str],
-    beside_replay: bool = False,
-    columns: int = 4,
+    results: Results, *, methods: Mapping[str, str], beside_replay: bool = False, columns: int = 4
 ) -> Figure:
     """Lateral position over the time without steering, bases from a lane change.
 

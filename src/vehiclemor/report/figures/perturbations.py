@@ -51,11 +51,7 @@ def figure_error_curves(
 
 
 def figure_error_map(
-    results: Results,
-    *,
-    outputs: Sequence[str],
-    methods: Mapping[str, str],
-    values: bool = False,
+    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str], values: bool = False
 ) -> Figure:
     """RMS errors over frequency and amplitude perturbations, one column for each method.
 

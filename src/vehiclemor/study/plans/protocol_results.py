@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 
 def protocol_dataset(
-    protocol: Protocol,
-    rows: Sequence[Row],
-    found: dict[str, list[xr.Dataset]],
-    timed: xr.Dataset,
+    protocol: Protocol, rows: Sequence[Row], found: dict[str, list[xr.Dataset]], timed: xr.Dataset
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `row`, `scenario` and `output`.
 

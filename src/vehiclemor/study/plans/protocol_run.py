@@ -79,10 +79,7 @@ def validate(
 
 
 def test(
-    model: Model,
-    rows: Sequence[Row],
-    sets: dict[str, tuple[Scenario, ...]],
-    workers: Workers,
+    model: Model, rows: Sequence[Row], sets: dict[str, tuple[Scenario, ...]], workers: Workers
 ) -> dict[str, list[xr.Dataset]]:
     """Results of the chosen candidates: set -> one dataset for each row."""
     experiments = [
