@@ -1,9 +1,8 @@
 """Tables of the comparison, costs, errors, equation order and operations: CSV, Markdown, LaTeX."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
@@ -12,9 +11,6 @@ from vehiclemor.report.costs import cost_table
 from vehiclemor.report.errors import error_table, quantity_table, settings_table
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.simulation.build import build
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LATEX_SPECIAL = {"\\": r"\textbackslash{}"} | {c: f"\\{c}" for c in "&%$#_{}"} | {"^": r"\^{}"}
 
@@ -39,8 +35,6 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
 
 def model_tables(model: str, results: Path, jobs: int = 1) -> dict[str, pd.DataFrame]:
     """Tables that every model has: costs, errors, paper's terms, operations, quantities."""
-    import pandas as pd
-
     tables = {
         "costs": cost_table(model, results),
         "errors": error_table(model, results, jobs),
@@ -60,8 +54,6 @@ def settings_studies() -> dict[str, tuple[str, ...]]:
 
 def operation_table(model: str) -> pd.DataFrame:
     """Exact operation counts of a model's generated kernels."""
-    import pandas as pd
-
     counts = build(model).operation_counts
     return pd.DataFrame([{"kernel": name, **count} for name, count in counts.items()])
 

@@ -1,9 +1,8 @@
 """Published beside reproduced: every number, every claim with a criterion, verdict and reason."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from vehiclemor.registry import component, names
 from vehiclemor.report.comparison.rows import (
@@ -20,9 +19,6 @@ from vehiclemor.report.printing import Row as Printed
 from vehiclemor.report.printing import table_text
 from vehiclemor.report.published import load_published
 from vehiclemor.study.run import run_studies
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SIX_SLOWER = "dw_fig14_six_slower_than_three"
 HEADINGS = ("item", "published", "reproduced", "floor", "replay", "unit", "verdict")
@@ -42,8 +38,6 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
         One row for each published number or claim and variant of the method (`default`, `literal`),
         with the columns `COLUMNS`.  For a claim `published` is the bound of its criterion.
     """
-    import pandas as pd
-
     results = run_studies("paper", folder, jobs)
     published = load_published()
     numbers = [n for n in published.numbers.values() if n.kind in ("rms_error", "time_reduction")]

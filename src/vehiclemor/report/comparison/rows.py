@@ -1,17 +1,14 @@
 """Rows of the comparison with the paper: its numbers and claims beside what is reproduced."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import xarray as xr
 
 from vehiclemor.registry import names
 from vehiclemor.report.criteria import CRITERIA, WITHOUT_REPLAY, Results
 from vehiclemor.report.criteria.finding import Finding
 from vehiclemor.report.published import Claim, Number
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Label of a method in the paper's studies, and preset -> what its rows are called.
 VARIANTS = {"pod": "default", "pod_literal": "literal"}

@@ -1,17 +1,12 @@
 """Published savings of time beside those of the timing cases."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+import pandas as pd
 
 from vehiclemor.models.report import TimingCase, timing_cases
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.rows import PRESETS, Row, claim_row, number_row
 from vehiclemor.report.criteria.finding import Finding
 from vehiclemor.report.published import Claim, Number
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:

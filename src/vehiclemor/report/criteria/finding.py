@@ -5,15 +5,11 @@ signal's range.  Each criterion is evaluated for the default settings and for th
 ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
-    import xarray as xr
+import numpy as np
+import xarray as xr
 
 # Share of a signal's range from which on a deviation counts as visible in a figure: 2 mm on a curve
 # that is 40 mm high.

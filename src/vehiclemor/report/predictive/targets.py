@@ -1,15 +1,12 @@
 """What the winner of the predictive comparison must reach, and what it has reached."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from vehiclemor.report.labels import unit_of
 from vehiclemor.study.plans.protocol_file import ProtocolFile, SpeedTarget, Straight
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Row = dict[str, Any]
 
