@@ -6,11 +6,9 @@ where the Jacobian has small diagonal blocks, of the exponential method, see
 `integrators/fused_etdrk4`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,14 +17,45 @@ from vehiclemor.simulation.integrators import ros34pw2, tableaus
 from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
 from vehiclemor.simulation.integrators.exponential_functions import TABLES
 
-if TYPE_CHECKING:
-    from vehiclemor.reduction.vehicle.features import Features
-
 # After the reduced coordinates z come heading and place.
 PLANAR = 3
 # The tables' functions at argument zero, for states that no block belongs to.
 AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
 JACOBIAN, HALF_FIRST, HALF_SECOND, FIRST, SECOND, MIDDLE, LAST = range(TABLES)
+
+
+@dataclass(frozen=True)
+class FeatureText:
+    """Text of features.
+
+    Attributes
+    ----------
+    states, inputs
+        Numbers of reduced coordinates `z0, z1, ...` and of inputs `u0, u1, ...`.
+    lines
+        Assignments `name = expression` of what the features share, in order; they may use
+        parameters `p[i]`.
+    terms
+        Expression of each feature.
+    groups
+        (numbers of features, columns of C) of each block of C that is not zero; all if empty.
+    diagonal
+        Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
+        Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
+    """
+
+    states: int
+    inputs: int
+    lines: tuple[tuple[str, str], ...]
+    terms: tuple[str, ...]
+    groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
+    diagonal: tuple[int, ...] = ()
+
+    @property
+    def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
+        """Blocks of C: numbers of features, columns."""
+        everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
+        return self.groups or (everything,)
 
 
 def diagonal_blocks(sizes: Sequence[int]) -> tuple[tuple[int, ...], ...]:
@@ -35,7 +64,7 @@ def diagonal_blocks(sizes: Sequence[int]) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(range(a, b)) for a, b in pairwise(ends))
 
 
-def kernel_text(features: Features, parameters: int) -> str:
+def kernel_text(features: FeatureText, parameters: int) -> str:
     """Source of the kernels; constants are the features' parameters, so many, then C."""
     k = features.states + PLANAR
     lines = [f"y{i} = _x[{i}]" for i in range(k)] + _inputs_at(features, 0)
@@ -47,7 +76,7 @@ def kernel_text(features: Features, parameters: int) -> str:
     return "\n".join(kernels)
 
 
-def columns_text(features: Features) -> str:
+def columns_text(features: FeatureText) -> str:
     """Source of the kernel that evaluates the features; its constants are their parameters."""
     lines = [f"z{i} = _x[{i}]" for i in range(features.states)] + _inputs_at(features, 0)
     lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
@@ -55,11 +84,11 @@ def columns_text(features: Features) -> str:
     return _function("columns", lines)
 
 
-def _inputs_at(features: Features, first: int) -> list[str]:
+def _inputs_at(features: FeatureText, first: int) -> list[str]:
     return [f"u{i} = _u[{first + i}]" for i in range(features.inputs)]
 
 
-def _rates(features: Features, state: str, mark: str, parameters: int) -> list[str]:
+def _rates(features: FeatureText, state: str, mark: str, parameters: int) -> list[str]:
     """Assignments of `rate{mark}_i` for states named `{state}i` and inputs `u0, u1, ...`."""
     k = features.states
     body = [f"z{i} = {state}{i}" for i in range(k)]
@@ -82,7 +111,7 @@ def _rates(features: Features, state: str, mark: str, parameters: int) -> list[s
     return body
 
 
-def _w_step(features: Features, parameters: int) -> str:
+def _w_step(features: FeatureText, parameters: int) -> str:
     """A whole step of the W-method without a loop, see `fused_ros34pw2`."""
     dim, tableau = features.states + PLANAR, tableaus.ros34pw2()
     a, gamma_c = tableau[:4], tableau[4:8]
@@ -118,7 +147,7 @@ def _w_step(features: Features, parameters: int) -> str:
     return _function("ros34pw2_step", lines)
 
 
-def _exponential_step(features: Features, parameters: int) -> str:
+def _exponential_step(features: FeatureText, parameters: int) -> str:
     """A whole step of the exponential method without a loop, see `fused_etdrk4`."""
     dim = features.states + PLANAR
     blocks = diagonal_blocks(features.diagonal)

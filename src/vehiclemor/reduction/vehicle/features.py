@@ -10,7 +10,6 @@ Coefficients are constants of the kernel: fits with the same features compile no
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -19,6 +18,7 @@ from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.reduction.vehicle.feature_kernels import (
     PLANAR,
+    FeatureText,
     columns_text,
     diagonal_blocks,
     kernel_text,
@@ -27,38 +27,8 @@ from vehiclemor.simulation.paths import along
 from vehiclemor.simulation.system import System
 
 
-@dataclass(frozen=True)
-class Features:
-    """Text of features.
-
-    Attributes
-    ----------
-    states, inputs
-        Numbers of reduced coordinates `z0, z1, ...` and of inputs `u0, u1, ...`.
-    lines
-        Assignments `name = expression` of what the features share, in order; they may use
-        parameters `p[i]`.
-    terms
-        Expression of each feature.
-    groups
-        (numbers of features, columns of C) of each block of C that is not zero; all if empty.
-    diagonal
-        Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
-        Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
-    """
-
-    states: int
-    inputs: int
-    lines: tuple[tuple[str, str], ...]
-    terms: tuple[str, ...]
-    groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
-    diagonal: tuple[int, ...] = ()
-
-    @property
-    def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-        """Blocks of C: numbers of features, columns."""
-        everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
-        return self.groups or (everything,)
+class Features(FeatureText):
+    """Features that can be evaluated, and made the right-hand side of a reduced vehicle."""
 
     def at(self, z: np.ndarray, u: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""

@@ -1,7 +1,8 @@
 """Time histories and paths of any model: full order beside reduced models, and their errors."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -42,79 +43,79 @@ class Panel(NamedTuple):
     lines: Sequence[Line]
 
 
-def figure_histories(
-    results: Results,
-    *,
-    outputs: Sequence[str],
-    methods: Mapping[str, str],
-    rows: Sequence[str] = ("history",),
-    place: Mapping[str, object] | None = None,
-    shown: float | None = None,
-    marks: Sequence[float] = (),
-    whole: bool = False,
-    limits: Sequence[float] | None = None,
-    height: float = 4.4,
-    columns: int = 4,
-) -> Figure:
-    """Rows of panels for each output, one column for each start.
+class Look(NamedTuple):
+    """How histories are drawn.
 
-    Parameters
+    Attributes
     ----------
-    methods
-        Label of a reduced model in the study -> text of the legend.
     rows
         What each output has a row of: `history`, `error` (over the time, beside the RMS error of
         the best approximation) or `largest error` (in each control period, beside the published).
     place
         Place in the study's grid.
-    shown
-        Time up to which the runs are shown, in s.
-    marks
-        Times of vertical lines, in s.
+    shown, marks
+        Time up to which the runs are shown, and times of vertical lines, in s.
     whole
         Draw lines in full, instead of up to where they leave the full-order signal's range.
     limits
         Of the axes of the largest errors.
-    height
-        Of the figure, in inches.
-    columns
-        Of the legend.
+    height, columns
+        Of the figure, in inches, and of the legend.
     """
+
+    rows: Sequence[str] = ("history",)
+    place: Mapping[str, object] = MappingProxyType({})
+    shown: float | None = None
+    marks: Sequence[float] = ()
+    whole: bool = False
+    limits: Sequence[float] | None = None
+    height: float = 4.4
+    columns: int = 4
+
+
+def figure_histories(
+    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str], **options: Any
+) -> Figure:
+    """Rows of panels for each output, one column for each start; `options` are those of `Look`.
+
+    `methods` are labels of reduced models in the study with their texts in the legend.
+    """
+    look = Look(**options)
     (dataset,) = results.values()
-    dataset = dataset.sel(dict(place or {}))
+    dataset = dataset.sel(dict(look.place))
     lines = _lines(dataset, methods)
     starts = [str(start) for start in dataset["start"].values]
-    shape = len(outputs) * len(rows), len(starts)
-    figure, axes = plt.subplots(*shape, sharex=True, squeeze=False, figsize=(6.7, height))
+    shape = len(outputs) * len(look.rows), len(starts)
+    figure, axes = plt.subplots(*shape, sharex=True, squeeze=False, figsize=(6.7, look.height))
     ended: dict[str, str] = {}
     contents = [
-        (output, content, start) for output in outputs for content in rows for start in starts
+        (output, content, start) for output in outputs for content in look.rows for start in starts
     ]
     for number, (axis, (output, content, start)) in enumerate(
         zip(axes.flat, contents, strict=True)
     ):
         panel = Panel(dataset.sel(start=start), output, lines)
         if content == "history":
-            ended |= _draw_history(axis, panel, whole)
+            ended |= _draw_history(axis, panel, look.whole)
         elif content == "error":
             _draw_errors(axis, panel)
         else:
-            ended |= _draw_largest_errors(axis, panel, limits)
-        for moment in marks:
+            ended |= _draw_largest_errors(axis, panel, look.limits)
+        for moment in look.marks:
             axis.axvline(moment, color="#999999", linewidth=0.8, linestyle=(0, (1, 3)))
         several = f" {STARTS.get(start, start)}" if len(starts) > 1 else ""
         axis.set_title(letter(number) + several)
     last = float(dataset["time"][-1])
     for axis in axes[-1]:
-        part = f", first {shown:g} s of {last:g} s" if shown else ""
+        part = f", first {look.shown:g} s of {last:g} s" if look.shown else ""
         axis.set_xlabel(f"time (s){part}")
-        axis.set_xlim(0.0, shown or last)
+        axis.set_xlim(0.0, look.shown or last)
     for text, color in ended.items():
         axes[0, 0].plot([], [], color=color, label=text, **CROSS)
-    if "history" in rows and "largest error" in rows:
+    if "history" in look.rows and "largest error" in look.rows:
         # The legend is that of the first panel.
         axes[0, 0].plot([], [], color="black", linestyle=":", label=PUBLISHED)
-    legend_above(figure, axes[0, 0], columns)
+    legend_above(figure, axes[0, 0], look.columns)
     return figure
 
 
@@ -236,19 +237,17 @@ def figure_replayed_paths(
 ) -> Figure:
     """Lateral position over the time without steering, bases from a lane change.
 
-    Parameters
-    ----------
-    beside_replay
-        Whether a second panel shows what sets the reduced models apart from replay.
+    With `beside_replay` a second panel shows what sets the reduced models apart from replay.
     """
     (dataset,) = results.values()
     panels, output = 2 if beside_replay else 1, "lateral_position"
     size = (6.7, 4.8 if beside_replay else 3.2)
     figure, axes = plt.subplots(panels, 1, sharex=True, squeeze=False, figsize=size)
     upper, lower = axes[0, 0], axes[-1, 0]
-    replay = at_point(dataset, "replay", start="equilibrium")["outputs"].sel(output=output)
+    runs = dataset["outputs"].sel(start="equilibrium", output=output).squeeze(drop=True)
+    replay = runs.sel({"method": "replay"})
     for method, text, style in _lines(dataset, methods):
-        run = at_point(dataset, method, start="equilibrium")["outputs"].sel(output=output)
+        run = runs.sel({"method": method})
         upper.plot(run.time, run, label=text, **style)
         if beside_replay and method not in ("full_order", "replay"):
             lower.plot(run.time, 1e3 * (run - replay), label=text, **style)
