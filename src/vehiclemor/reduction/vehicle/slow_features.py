@@ -59,13 +59,8 @@ class FeatureTable:
         (_, lateral), (_, symmetric) = self.features.groups
         groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
         features = replace(self.features, terms=terms, groups=groups)
-        return FeatureTable(
-            features,
-            self.parameters,
-            list(numbers[: len(odd)]),
-            list(numbers[len(odd) :]),
-            self.linear_count,
-        )
+        first, rest = list(numbers[: len(odd)]), list(numbers[len(odd) :])
+        return FeatureTable(features, self.parameters, first, rest, self.linear_count)
 
 
 def feature_table(

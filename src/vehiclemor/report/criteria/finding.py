@@ -65,7 +65,7 @@ def largest_deviation(point: xr.Dataset, output: str) -> float:
 
 def relative_rms(dataset: xr.Dataset, label: str, output: str) -> np.ndarray:
     """RMS errors of a method over a grid as shares of the full-order signal's range."""
-    chosen = dataset.sel({"method": label, "output": output}).squeeze(drop=True)
+    chosen = at_point(dataset, label, output=output)
     return (chosen["rms_error"] / chosen["signal_range"]).values
 
 
