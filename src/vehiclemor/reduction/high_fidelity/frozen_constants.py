@@ -1,7 +1,5 @@
 """The high-fidelity vehicle with frozen inertia, from the exact kernels of a ready model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -60,20 +58,14 @@ class _Exact:
 
 
 def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels of the vehicle with frozen inertia, and their constants.
-
-    Parameters
-    ----------
-    model
-        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
-    """
+    """Kernels of the vehicle with frozen inertia, and their constants of a ready model."""
     made, _ = compiled("high_fidelity_frozen_inertia", _derive)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
     return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
 
 
-def _derive() -> Program:
+def _derive() -> "Program":
     from vehiclemor.models.high_fidelity import frozen_inertia
 
     return frozen_inertia.derive()

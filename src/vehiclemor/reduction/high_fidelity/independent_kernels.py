@@ -1,7 +1,5 @@
 """Compiled kernels of the high-fidelity vehicle in other coordinates than its own."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,18 +15,12 @@ if TYPE_CHECKING:
 
 
 def independent_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels over the 14 independent coordinates, and their constants.
-
-    Parameters
-    ----------
-    model
-        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
-    """
+    """Kernels over the 14 independent coordinates, and their constants of a ready model."""
     made, _ = compiled("high_fidelity_independent", _derive)
     return made, hoisted_constants(made, model.parameters, free_lengths(model))
 
 
-def _derive() -> Program:
+def _derive() -> "Program":
     # Imported here: equations that were derived before are read from disk, without SymPy.
     from vehiclemor.models.high_fidelity import independent
 
