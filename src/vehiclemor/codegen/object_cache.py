@@ -15,6 +15,9 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+from vehiclemor.errors import FileError
+from vehiclemor.files import write_whole
+
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
@@ -50,7 +53,7 @@ def _folder(chosen: str | None) -> Path:
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
         reason = _distrust(folder.stat())
@@ -69,7 +72,7 @@ def _distrust(status: os.stat_result) -> str:
     if status.st_uid != os.geteuid():
         return "it belongs to another user"
     if status.st_mode & OTHERS_WRITE:
-        return "other users can write it"
+        return "other users can write it, see chmod go-w"
     return ""
 
 
@@ -84,15 +87,19 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
         Gives the content.
     """
     path = cache_folder() / name
-    content = _checked(path)
+    content = _checked(path, name)
     if content is None:
         content = make()
-        digest = hashlib.sha256(content).hexdigest().encode()
-        write_whole(path, digest + b"\n" + content)
+        _write(path, _digest(name, content) + b"\n" + content)
     return content
 
 
-def _checked(path: Path) -> bytes | None:
+def _digest(name: str, content: bytes) -> bytes:
+    """Hash by which a file is checked; it does not hold under another name."""
+    return hashlib.sha256(name.encode() + b"\n" + content).hexdigest().encode()
+
+
+def _checked(path: Path, name: str) -> bytes | None:
     """Content of a file, if it can be trusted."""
     try:
         with path.open("rb") as file:
@@ -102,16 +109,21 @@ def _checked(path: Path) -> bytes | None:
         return None
     except OSError as error:
         digest, content, reason = b"", b"", error.strerror or "it can't be read"
-    if not reason and hashlib.sha256(content).hexdigest().encode() == digest:
+    if not reason and _digest(name, content) == digest:
         return content
     _LOG.warning("%s is made again: %s", path, reason or "the file is damaged")
     return None
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name, then move it into place; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    os.replace(temporary, path)
+def _write(path: Path, content: bytes) -> None:
+    """Write a file whole, for this user alone; where that fails the next process makes it again."""
+
+    def write(temporary: Path) -> None:
+        temporary.touch(mode=0o600)
+        temporary.write_bytes(content)
+
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_whole(path, write)
+    except (OSError, FileError) as error:
+        _LOG.warning("the cache is incomplete: %s", error)

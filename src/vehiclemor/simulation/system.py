@@ -15,7 +15,6 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
 from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.exponential_functions import block_functions
 from vehiclemor.simulation.integrators.structures import (
     NOT_FINITE,
     SINGULAR,
@@ -90,6 +89,21 @@ class Solver(NamedTuple):
     tolerance: float
     times: np.ndarray | None = None
     longest_step: float | None = None
+
+
+class RunArguments(NamedTuple):
+    """Arguments of the compiled time loop, see `integrators/loop.integrate`."""
+
+    start: np.ndarray
+    equations: Ready
+    signal: Ready
+    spans: Ready
+    subspaces: Ready
+    method: Ready
+    control: Ready
+    output: Output
+    buffer: np.ndarray
+    integers: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +185,8 @@ class System:
             chosen = catalogue.integrator(solver)
             if chosen.operators is None:
                 operators = np.zeros((1, 1, 1))
-            elif solver in self.fused and self.diagonal:
-                blocks = self.diagonal
-                operators = block_functions(self.frozen_jacobian, blocks, catalogue.STEP_GRID)
+            elif solver in self.fused and chosen.block_operators:
+                operators = chosen.block_operators(self.frozen_jacobian, self.diagonal)
             else:
                 operators = chosen.operators(self.frozen_jacobian, active)
             grid = catalogue.STEP_GRID
@@ -198,14 +211,14 @@ class System:
             If a value is out of bounds or a name is unknown.
         """
         loop, arguments = self.prepared(maneuver, state, windows, solver)
-        output: Output = arguments[7]
+        output = arguments.output
         status, seconds = timed(loop.prepared(*arguments), output.counts)
-        failure = f"{REASONS[status]} at t = {arguments[8][0]:.6g} s" if status else ""
+        failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
         return Run(output.samples, output.path, output.counts, seconds, failure)
 
     def prepared(
         self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
-    ) -> tuple[Loop, tuple]:
+    ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
         times = maneuver.times if solver.times is None else loop_array(solver.times)
         longest = solver.longest_step
@@ -222,7 +235,8 @@ class System:
         fused = self.fused.get(name, "") if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(state)
-        arguments = (
+        assert dim == n or not full, f"{n} states in a space of {dim} dimensions"
+        arguments = RunArguments(
             loop_array(state),
             self.called(windows.formulation, fused),
             signal,

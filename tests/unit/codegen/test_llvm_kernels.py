@@ -8,21 +8,14 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from llvmlite import ir
-from numba import cfunc, njit
-from numba.core.errors import TypingError
-from vehiclemor.codegen.link import linked_source
-from vehiclemor.codegen.straight_line import (
-    call_machine,
-    emit,
-    kernel_shape,
-    machine_signature,
-    python_kernel,
-    straight_line,
-)
+from numba import njit
 
 from tests.unit.programs import run
 from vehiclemor.codegen import arctangent, exponential, sincos
-from vehiclemor.codegen.kernel_text import kernel_source, work_size
+from vehiclemor.codegen.kernel_text import kernel_source, reference_source
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.llvm_kernels import KernelText, emit
+from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -31,29 +24,18 @@ x, y, p = sp.symbols("x y p", real=True)
 
 def compiled(text: str):
     """A function of arrays from the text of one kernel."""
-    lines = straight_line(text)
-    arguments = text[text.index("(") + 1 : text.index(")")]
-    pointers = arguments.replace("_work, ", "")
-    namespace = {"lines": lines}
-    exec(f"def machine({pointers}):\n    lines(({pointers},))", namespace)  # noqa: S102
-    machine = cfunc(machine_signature(len(pointers.split(","))))(namespace["machine"])
-    return python_kernel(kernel_shape(text), machine)
-
-
-def texts(program: Program) -> dict[str, str]:
-    parts = kernel_source(program).strip().split("\n\n\n")
-    return {part[4 : part.index("(")]: f"{part}\n" for part in parts}
+    kernels = Kernels(kernel_sources(text))
+    (name,) = kernels.sources
+    return lambda *arrays: kernels.call(name, *arrays)
 
 
 def result_of(program: Program, values: dict[sp.Symbol, float]) -> np.ndarray:
-    kernels = texts(program)
-    work = np.full(work_size(program), np.nan)
+    kernels = Kernels(kernel_sources(kernel_source(program)))
     constants = np.full(len(program.constant_symbols), np.nan)
-    parameters = np.array([values[symbol] for symbol in program.parameters])
-    compiled(kernels["constants"])(parameters, work, constants)
+    kernels.call("constants", np.array([values[s] for s in program.parameters]), constants)
     arguments = [np.array([values[s] for s in symbols]) for symbols in program.arguments.values()]
     result = np.full(program.functions["f"].shape, np.nan)
-    compiled(kernels["f"])(*arguments, constants, work, result)
+    kernels.call("f", *arguments, constants, result)
     return result
 
 
@@ -178,7 +160,7 @@ def test_what_is_not_straight_line_is_refused(line):
     pointers = dict(zip(("_x", "_result"), function.args, strict=True))
     builder = ir.IRBuilder(function.append_basic_block())
     with pytest.raises(ValueError, match=r"straight-line|unknown|index|shape"):
-        emit(text, builder, pointers, lambda *_: None)
+        emit(KernelText(text), builder, pointers)
 
 
 def test_arrays_of_another_kind_are_refused():
@@ -193,30 +175,32 @@ def test_arrays_of_another_kind_are_refused():
             kernel(np.zeros(2), wrong)
 
 
-def test_loops_refuse_arrays_of_another_kind():
-    @njit
-    def call(model, x, u, result):
-        call_machine(model, 0, x, u, result)
-
-    fine, model = np.zeros(4), (np.zeros(4), np.zeros(1, np.int64))
-    fixed = np.zeros(4)
-    fixed.flags.writeable = False
-    with pytest.raises(TypingError, match="a kernel needs C-contiguous arrays of floats"):
-        call(model, fine[::2], fine, fine)
-    with pytest.raises(TypingError, match="or write to"):
-        call(model, fine, fine, fixed)
-
-
 def test_equal_to_what_the_compiler_makes_of_the_text():
     results = [sp.sin(x) * y / x + p, sp.cos(x) - sp.atan(y) * sp.sin(y), sp.atan(x), x - y * p]
     program = assemble(Tape(), {"q": [x, y]}, [p], {"f": (results, (4,))})
-    namespace: dict = {}
-    source = linked_source(kernel_source(program), [], {}, "a test")
-    exec(source.replace("cache=True, ", ""), namespace)  # noqa: S102
-    constants = np.empty(len(program.constant_symbols))
-    work, result = np.zeros(work_size(program)), np.empty(len(results))
-    namespace["constants"](np.array([0.6]), work, constants)
-    namespace["f"](np.array([1.7, 2.3]), constants, work, result)
+    namespace: dict = {"math": math}
+    exec(reference_source(program), namespace)  # noqa: S102 - the package's own source
+    constants, result = np.empty(len(program.constant_symbols)), np.empty(len(results))
+    nothing = np.zeros(0)
+    njit(namespace["constants"])(np.array([0.6]), nothing, constants)
+    njit(namespace["f"])(np.array([1.7, 2.3]), constants, nothing, result)
     np.testing.assert_allclose(
         result_of(program, {x: 1.7, y: 2.3, p: 0.6}), result, rtol=1e-14, atol=1e-15
     )
+
+
+@pytest.mark.parametrize("targets", [1, 4, 5, 11])
+def test_weighted_sums_are_products_with_the_coefficients(targets, rng):
+    width, terms, first = padded(targets), 9, 3
+    names = ", ".join(f"s{i}" for i in range(targets))
+    factors = ", ".join(f"_x[{j}]" for j in range(terms))
+    lines = [f"({names},) = weighted_sums(_constants, {first}, ({factors},))"]
+    lines += [f"_result[{i}] = s{i}" for i in range(targets)]
+    kernel = compiled("def sums(_x, _constants, _result):\n    " + "\n    ".join(lines) + "\n")
+    x, c = rng.normal(size=terms), rng.normal(size=(terms, width))
+    result = np.empty(targets)
+    kernel(x, np.concatenate([np.full(first, np.nan), c.ravel()]), result)
+    np.testing.assert_allclose(result, x @ c[:, :targets], rtol=1e-13, atol=1e-14)
+    # All that the vectors load must be there.
+    with pytest.raises(TypeError, match="sums: constants must be"):
+        kernel(x, np.zeros(first + terms * width - 1), result)

@@ -1,232 +1,294 @@
-"""Compiled kernels are kept by content: a second process compiles nothing, new source is new."""
+"""Files of the cache are checked by content, name and owner; nothing unchecked is executed."""
 
-import json
+import ast
+import logging
 import os
-import subprocess
-import sys
-from dataclasses import replace
+import stat
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from vehiclemor.codegen.link import kernels_source, linked_source, loops_source
-from vehiclemor.simulation.system_loops import COORDINATES
 
-from tests.unit.standard_problems import maneuver
-from vehiclemor.codegen import cache, straight_line
-from vehiclemor.errors import InputError
-from vehiclemor.reduction.projection.dynamic import check_subspace
-from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
-from vehiclemor.registry import component
-from vehiclemor.simulation import build, newton_loops, system_loops
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.simulation.system import SOLVERS
-
-# Prints hits and misses of every compiled function, the machine code's hits, and a result.
-REPORT = """
-used = {
-    name: [sum(d.stats.cache_hits.values()), sum(d.stats.cache_misses.values())]
-    for module in modules
-    for name, d in vars(module).items()
-    if getattr(d, "signatures", None)
-}
-machine = {n: d.cache_hits for n, d in vars(modules[0]).items() if n.endswith("_machine")}
-print(json.dumps([used, machine, [module.__file__ for module in modules], result.tolist()]))
-"""
-
-LINKED = (
-    """
-import json
-import numpy as np
-from vehiclemor.codegen.object_cache import load_module
-from vehiclemor.codegen.link import linked_source
-from vehiclemor.simulation import newton_loops
-
-kernels = "def residual(q, u, constants, work, result):\\n    result[0] = q[0] * u[0]\\n"
-sizes = {"N": 1, "INPUTS": 1, "OUTPUTS": 1, "WORK": 1}
-modules = [load_module("tiny", linked_source(kernels, [newton_loops], sizes, "a test"))]
-path, nothing, result = np.array([[2.0], [3.0]]), np.zeros(1), np.zeros((2, 1))
-modules[0].residual_path(path, path, nothing, result)
-"""
-    + REPORT
+from tests.unit import standard_problems
+from vehiclemor.codegen import (
+    compiler,
+    derivation,
+    kernels,
+    llvm_kernels,
+    loops,
+    object_cache,
 )
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.object_cache import cache_folder, fetched
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.paths import PATH_LOOPS
 
-ADDRESSED = (
-    """
-import json
-import numpy as np
-from vehiclemor.codegen.object_cache import load_module
-from vehiclemor.codegen.link import kernels_source, loops_source
-from vehiclemor.simulation import run_loops, system_loops
-
-kernels = "def outputs(_x, _u, _constants, _work, _result):\\n    _result[0] = _x[0] * _u[0]\\n"
-modules = [load_module("tiny", kernels_source(kernels, {}, "a test"))]
-# Without the integrators, which take long to compile.
-modules.append(load_module("tiny_loops", loops_source([system_loops, run_loops], "a test")))
-path, nothing, result = np.array([[2.0], [3.0]]), np.zeros(1), np.zeros((2, 1))
-addresses = np.array([0, modules[0]._outputs_machine.address, 0, 0])
-modules[1].output_path(path, path, (nothing, addresses), result)
-"""
-    + REPORT
-)
+PACKAGE = Path(object_cache.__file__).parents[1]
+FLIPS = 200
+NAME = "kernels/some-0123.o"
 
 
-def process(script: str, folder: Path) -> tuple[dict, dict, list[Path], list]:
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
-    environment["VEHICLEMOR_CACHE"] = str(folder)
-    command = [sys.executable, "-c", script]
-    done = subprocess.run(
-        command, env=environment, cwd=folder, check=False, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    used, machine, files, result = json.loads(done.stdout)
-    return used, machine, [Path(file) for file in files], result
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache."""
+    chosen = tmp_path / "cache"
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(chosen))
+    return chosen
+
+
+@pytest.fixture
+def made() -> list[bytes]:
+    """What was made, one entry for each time."""
+    return []
+
+
+@pytest.fixture
+def fetch(made: list[bytes]) -> Callable[..., bytes]:
+    def fetch(name: str = NAME, content: bytes = b"some content") -> bytes:
+        def make() -> bytes:
+            made.append(content)
+            return content
+
+        return fetched(name, make)
+
+    return fetch
+
+
+def flipped(content: bytes, bit: int) -> bytes:
+    changed = bytearray(content)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
+def test_what_is_whole_is_made_once(folder, fetch, made, caplog):
+    assert fetch() == fetch() == b"some content"
+    assert len(made) == 1
+    assert not caplog.records
+    # Nobody else can read or write it, and nothing unfinished is left.
+    (path,) = (path for path in folder.rglob("*") if path.is_file())
+    assert path == folder / NAME
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_every_single_flipped_bit_is_named_and_repaired(folder, fetch, made, caplog):
+    fetch()
+    path = folder / NAME
+    whole = path.read_bytes()
+    for bit in range(8 * len(whole)):
+        path.write_bytes(flipped(whole, bit))
+        assert fetch() == b"some content"
+        assert path.read_bytes() == whole
+        (record,) = caplog.records
+        assert record.getMessage() == f"{path} is made again: the file is damaged"
+        assert record.levelno == logging.WARNING
+        caplog.clear()
+    assert len(made) == 1 + 8 * len(whole)
 
 
 @pytest.mark.parametrize(
-    ("script", "functions"),
-    [(LINKED, {"residual_path"}), (ADDRESSED, {"output_path"})],
-    ids=["linked", "addressed"],
+    "damage",
+    [
+        lambda _: b"",
+        lambda whole: whole[: len(whole) // 2],
+        lambda whole: whole[:64],
+        lambda whole: whole[:-1],
+        lambda whole: whole + b" ",
+        lambda whole: whole.split(b"\n", 1)[1],
+    ],
+    ids=["empty", "half", "hash alone", "last byte gone", "one byte more", "no hash"],
 )
-def test_second_process_compiles_nothing(tmp_path: Path, script: str, functions: set[str]) -> None:
-    first, cold, source, result = process(script, tmp_path)
-    assert result == [[4.0], [9.0]]
-    assert set(cold.values()) <= {0}
-    assert all(hits == 0 and misses == 1 for hits, misses in first.values())
-    written = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
-    second, warm, same, again = process(script, tmp_path)
-    assert functions <= set(second)
-    for name, (hits, misses) in second.items():
-        assert hits > 0, name
-        assert misses == 0, name
-    assert set(warm) == set(cold) == ({"_outputs_machine"} if script == ADDRESSED else set())
-    assert set(warm.values()) <= {1}
-    assert same == source
-    assert all(tmp_path in file.parents for file in source)
-    assert again == result
-    # Nothing was written again, and no half-written file is left.
-    assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*") if p.is_file()} == written
-    assert not [path for path in written if path.suffix == ".tmp"]
+def test_a_file_of_another_length_is_made_again(folder, fetch, made, caplog, damage):
+    fetch()
+    path = folder / NAME
+    whole = path.read_bytes()
+    path.write_bytes(damage(whole))
+    assert fetch() == b"some content"
+    assert (len(made), path.read_bytes()) == (2, whole)
+    assert len(caplog.records) == 1
 
 
-def test_all_dynamic_models_run_in_the_same_loops(standard) -> None:
-    vehicle = build.build("independent_suspension_vehicle")
-    other = standard()
-    assert vehicle.loops is other.loops
-    assert vehicle.kernel_hash != other.kernel_hash
-    quiet = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
-    x = vehicle.start()
-    vehicle.simulate(component("maneuver", "straight_ahead"), tolerance=1e-3)
-    compiled = len(vehicle.loops.run.signatures)
-    for solver in SOLVERS:
-        other.simulate(quiet, solver=solver, tolerance=1)
-    x.flags.writeable = False
-    space = whole_space(2 * len(vehicle.coordinates))
-    vehicle.integrate(
-        component("maneuver", "straight_ahead"), x, space, "ros34pw2", 1e-3, longest_step=1
-    )
-    assert len(vehicle.loops.run.signatures) == compiled == 1
+def test_a_whole_file_under_another_name_is_refused(folder, fetch, made):
+    fetch()
+    (folder / NAME).rename(folder / "kernels" / "other-4567.o")
+    assert fetch("kernels/other-4567.o", b"other content") == b"other content"
+    assert len(made) == 2
 
 
-def test_hash_of_a_dynamic_model_follows_its_loops(
-    standard, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before = standard().kernel_hash
-    assert standard().kernel_hash == before
-    monkeypatch.setattr(build, "loops_digest", lambda: "changed")
-    assert standard().kernel_hash != before
+@pytest.mark.parametrize("mode", [0o666, 0o620, 0o602])
+def test_a_file_that_others_can_write_is_refused(folder, fetch, made, caplog, mode):
+    fetch()
+    path = folder / NAME
+    path.chmod(mode)
+    assert fetch() == b"some content"
+    assert len(made) == 2
+    assert caplog.messages == [f"{path} is made again: other users can write it"]
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    fetch()
+    assert len(made) == 2
 
 
-@pytest.mark.parametrize("lacking", ["second_order", "speeds"])
-def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking: str) -> None:
-    whole = standard()
-    shapes = {k: v for k, v in whole.equations.shapes.items() if k != lacking}
-    model = replace(whole, equations=replace(whole.equations, shapes=shapes))
-    settings = DynamicPodSettings(rank=1, snapshots=2, formulation="state", inner_product="range")
-    check_subspace(model, settings)
-    for wrong in ({"formulation": "coordinates"}, {"inner_product": "energy"}):
-        with pytest.raises(InputError, match=f"has no {lacking}"):
-            check_subspace(model, settings.model_copy(update=wrong))
-    nothing = np.zeros((1, 1, 4))
-    edges, rank = np.array([0.0, 9.0]), np.array([2])
-    spaces = ProjectionWindows(COORDINATES, edges, np.zeros((1, 4)), nothing, nothing, rank)
-    quiet = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
-    with pytest.raises(InputError, match=f"has no {lacking}"):
-        model.integrate(quiet, model.start(), spaces, "dopri5", 1e-3)
-    function = model.mass_matrix if lacking == "second_order" else model.speeds_of_rates
-    with pytest.raises(InputError, match=f"has no {lacking}"):
-        function(model.start())
+needs_root = pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away"
+)
 
 
-def test_machine_code_follows_the_source_that_writes_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def sources() -> tuple[str, str]:
-        kernels = "def f(_q, _work, _result):\n    _result[0] = _q[0]\n"
-        return kernels_source(kernels, {}, "a test"), loops_source([system_loops], "a test")
-
-    first = sources()
-    assert first == sources()
-    monkeypatch.setattr(straight_line, "source_hash", lambda: "another")
-    assert all(old != new for old, new in zip(first, sources(), strict=True))
-
-
-def test_hash_follows_source_and_versions(monkeypatch: pytest.MonkeyPatch) -> None:
-    digest = cache.kernel_hash("x = 1\n")
-    assert digest == cache.kernel_hash("x = 1\n")
-    assert digest != cache.kernel_hash("x = 2\n")
-    for package in cache.COMPILER_PACKAGES:
-        with monkeypatch.context() as patch:
-            patch.setattr(cache, "version", lambda name, package=package: f"{name == package}")
-            changed = cache.kernel_hash("x = 1\n")
-            patch.setattr(cache, "version", lambda _: "False")
-            assert changed != cache.kernel_hash("x = 1\n")
-    monkeypatch.setattr(cache.platform, "python_version", lambda: "9.9.9")
-    assert digest != cache.kernel_hash("x = 1\n")
+@needs_root
+def test_a_file_of_another_user_is_refused(folder, fetch, made, caplog):
+    fetch()
+    os.chown(folder / NAME, 12345, -1)
+    assert fetch() == b"some content"
+    assert len(made) == 2
+    assert caplog.messages == [f"{folder / NAME} is made again: it belongs to another user"]
+    assert (folder / NAME).stat().st_uid == os.geteuid()
 
 
-def test_changed_source_is_another_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path))
-    old = cache.load_module("toy", "VALUE = 1\n")
-    new = cache.load_module("toy", "VALUE = 2\n")
-    assert (old.VALUE, new.VALUE) == (1, 2)
-    assert cache.load_module("toy", "VALUE = 1\n") is old
-    assert Path(old.__file__).read_text() == "VALUE = 1\n"
+@needs_root
+def test_a_folder_of_another_user_is_refused(folder, caplog):
+    folder.mkdir()
+    os.chown(folder, 12345, -1)
+    assert cache_folder() != folder
+    assert "(it belongs to another user): every process compiles for itself" in caplog.text
 
 
-def test_changed_loop_or_size_changes_the_source() -> None:
-    kernels = "def residual(q, result):\n    result[0] = q[0]\n"
-    source = linked_source(kernels, [newton_loops], {"N": 1}, "a test")
-    assert source == linked_source(kernels, [newton_loops], {"N": 1}, "a test")
-    for other in (
-        linked_source(kernels.replace("q[0]", "2.0*q[0]"), [newton_loops], {"N": 1}, "a test"),
-        linked_source(kernels, [newton_loops], {"N": 2}, "a test"),
-        linked_source(kernels, [], {"N": 1}, "a test"),
-    ):
-        assert cache.kernel_hash(other) != cache.kernel_hash(source)
+@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
+def test_a_folder_that_others_can_write_is_refused(folder, fetch, caplog, mode):
+    folder.mkdir()
+    folder.chmod(mode)
+    assert fetch() == b"some content"
+    assert caplog.messages == [
+        f"cache {folder} is not used (other users can write it): every process compiles for itself"
+    ]
+    assert not list(folder.iterdir())
+    # What stands in for it is this user's alone, the same for all of the process.
+    instead = cache_folder()
+    assert stat.S_IMODE(instead.stat().st_mode) == 0o700
+    assert (instead / NAME).exists()
+    assert cache_folder() == instead
+    assert len(caplog.messages) == 1
 
 
-def test_cache_folder_that_cannot_be_written_is_replaced(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_made_by_a_generous_user_is_trusted(folder, fetch, made):
+    # Where users have groups of their own, files that are made can be written by the group.
+    before = os.umask(0o002)
+    try:
+        fetch()
+        fetch()
+    finally:
+        os.umask(before)
+    assert cache_folder() == folder
+    assert len(made) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_replaced(tmp_path, monkeypatch, fetch, caplog):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "file" / "below"))
-    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
-    folder = cache.cache_folder()
-    assert folder.is_dir()
-    assert folder.parent == tmp_path
-    # Code is imported from it: nobody else may write there.
-    assert folder.stat().st_mode & 0o077 == 0
+    assert fetch() == b"some content"
+    assert len(caplog.messages) == 1
+    assert "every process compiles for itself" in caplog.text
 
 
-def test_damaged_kernel_file_is_written_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path))
-    source = "ANSWER = 42\n"
-    digest = cache.kernel_hash(source)
-    path = tmp_path / "kernels" / digest / f"vehiclemor_kernels_damaged_{digest}.py"
-    path.parent.mkdir(parents=True)
-    for damaged in ("", "ANSWER = 41\n"):
-        path.write_text(damaged)
-        assert cache.load_module("damaged", source).ANSWER == 42
-        del sys.modules[path.stem]
-    assert path.read_text() == source
+def test_a_file_that_cannot_be_written_is_made_by_every_process(folder, fetch, made, caplog):
+    folder.mkdir()
+    (folder / "kernels").write_text("not a folder")
+    assert fetch() == fetch() == b"some content"
+    assert len(made) == 2
+    assert all("the cache is incomplete" in m for m in caplog.messages if "made again" not in m)
+
+
+def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
+    import platformdirs
+
+    monkeypatch.delenv("VEHICLEMOR_CACHE")
+    monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
+    object_cache._folder.cache_clear()
+    assert cache_folder() == tmp_path / "own" / "vehiclemor"
+    object_cache._folder.cache_clear()
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "chosen"))
+    assert cache_folder() == tmp_path / "chosen"
+
+
+# Machine code and derivations
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> DynamicModel:
+    return build("independent_suspension_vehicle")
+
+
+def test_flipped_bits_in_cached_code_give_no_wrong_number(
+    vehicle, folder, monkeypatch, rng, caplog
+):
+    """Random bits of kernels of a vehicle, of a compiled loop and of a derivation."""
+    sources, x, u = vehicle.equations.sources, vehicle.start("dropped"), np.array([0.03])
+    sizes = {"derivative": len(x), "outputs": len(vehicle.outputs)}
+
+    def numbers() -> list:
+        """What is computed by files that are loaded anew, as in another process."""
+        results, address = [], 0
+        for name, size in sizes.items():
+            address, function, owner = kernels._machine.__wrapped__(sources[name])
+            results.append(np.full(size, np.nan))
+            function(*(array.ctypes.data for array in (x, u, vehicle.constants, results[-1])))
+        path = np.full((2, size), np.nan)
+        (loop,) = loops._loops.__wrapped__(PATH_LOOPS, ("kernel_path",), (), ()).values()
+        states, inputs = np.tile(x, (2, 1)), np.tile(u, (2, 1))
+        loop(states, inputs, np.array([address]), vehicle.constants, path)
+        del owner
+        return [*results, path, derivation.derivation("standard_problems", standard_problems)]
+
+    expected = numbers()
+    contents = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert sorted({path.parent.name for path in contents}) == ["derivations", "kernels", "loops"]
+    # What is made again takes no time here: it is what the compiler has made before.
+    made = {p.name.partition("-")[0]: whole.split(b"\n", 1)[1] for p, whole in contents.items()}
+    monkeypatch.setattr(llvm_kernels, "kernel_module", lambda kernels: kernels[0].name)
+    monkeypatch.setattr(compiler, "compiled_module", lambda name: made[name])
+    monkeypatch.setattr(compiler, "compiled_loops", lambda *_: made["path_loops"])
+    places = list(contents)
+    caplog.clear()
+    for _ in range(FLIPS):
+        path = places[int(rng.integers(len(places)))]
+        path.write_bytes(flipped(contents[path], int(rng.integers(8 * len(contents[path])))))
+        *found, derived = numbers()
+        for result, wanted in zip(found, expected[:-1], strict=True):
+            np.testing.assert_array_equal(result, wanted)
+        assert derived == expected[-1]
+        assert caplog.messages == [f"{path} is made again: the file is damaged"]
+        assert path.read_bytes() == contents[path]
+        caplog.clear()
+
+
+def test_planted_files_are_refused(folder, caplog):
+    """A derivation or machine code that says something else, with any hash but its own."""
+    source = kernels.kernel_sources("def planted(_x, _result):\n    _result[0] = 2.0 * _x[0]\n")
+    other = kernels.kernel_sources("def planted(_x, _result):\n    _result[0] = 9.0 * _x[0]\n")
+    files = []
+    for sources in (source, other):
+        kernels._machine.__wrapped__(sources["planted"])
+        files.append(next(p for p in folder.rglob("*.o") if p not in files))
+    files[0].write_bytes(files[1].read_bytes())
+    result = np.empty(1)
+    Kernels(source).call("planted", np.array([1.5]), result)
+    assert result == [3.0]
+    standard = derivation.derivation("standard_problems", standard_problems)
+    (path,) = (folder / "derivations").iterdir()
+    digest, content = path.read_bytes().split(b"\n", 1)
+    path.write_bytes(digest + b"\n" + content.replace(b"_result[0]", b"_result[1]"))
+    assert derivation.derivation("standard_problems", standard_problems) == standard
+    assert [message.rpartition(": ")[2] for message in caplog.messages] == [
+        "the file is damaged"
+    ] * 2
+
+
+def test_nothing_is_read_that_could_run_code():
+    """No module of the package reads pickles, nor executes text."""
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                names = [alias.name for alias in node.names]
+                names.append(getattr(node, "module", None) or "")
+                assert not {"pickle", "marshal", "shelve", "dill", "cloudpickle"} & set(names), path
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id not in {"eval", "exec", "compile", "__import__"}, path

@@ -5,12 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
 from vehiclemor.simulation.integrators.structures import Signal
+from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver
 
 LANE_CHANGE = component("maneuver", "lane_change")
 
@@ -76,14 +79,21 @@ def test_break_points_outside_the_run_are_no_edges():
     np.testing.assert_array_equal(signal_of(late).edges, [0.0, 4.0, 10.0])
 
 
-def test_compiled_loops_read_the_polynomials(standard, rng):
-    model, man = standard(), maneuver(driven, 8.0, (2.5,))
-    signal = signal_of(man)
-    for t in rng.uniform(0.0, 8.0, 60):
-        u = np.full(3, np.nan)
-        model.loops.input_at(t, int(t > 2.5), signal.arrays, u)
-        np.testing.assert_allclose(u, man.at(np.array([t]))[0], rtol=0, atol=1e-10)
-        np.testing.assert_allclose(u, value(signal, t), rtol=0, atol=1e-15)
+@pytest.mark.parametrize("solver", ["dopri5", "etdrk4"])
+def test_compiled_loops_read_the_polynomials(solver):
+    man, seen = maneuver(driven, 8.0, (2.5,)), []
+
+    def time_itself(x, u):
+        seen.append((x[0], *u))
+        return [1.0]
+
+    run = python_system(time_itself, [0.0], 3).run(
+        man, np.zeros(1), whole_space(1), Solver(solver, 1e-6, longest_step=0.3)
+    )
+    np.testing.assert_allclose(run.path[:, 0], run.times, rtol=1e-12)
+    times, inputs = np.array(seen)[3:, 0], np.array(seen)[3:, 1:]
+    assert len(times) > 60
+    np.testing.assert_allclose(inputs, man.at(times), rtol=0, atol=1e-10)
 
 
 def test_a_jump_has_both_its_values_at_its_time():
@@ -107,13 +117,25 @@ def test_the_value_at_the_very_time_of_a_jump_means_nothing(at_jump):
     [
         pytest.param(lambda t: np.where(t < 4.1, 0.0, 0.02), id="jump"),
         pytest.param(lambda t: 0.02 * np.abs(t - 4.1), id="corner"),
-        pytest.param(lambda t: np.clip(t - 4.1, 0.0, None) ** 2, id="curvature"),
     ],
 )
 def test_a_corner_that_has_no_name_is_refused(corner):
     with pytest.raises(InputError, match=r"'mine' is not smooth between t = 0 and 10 s; .*break"):
         signal_of(steered(corner))
     assert len(signal_of(steered(corner, corners=(4.1,))).edges) == 3
+
+
+@pytest.mark.parametrize("at", [4.1, 4.1001, 4.2, 5.0])
+def test_a_corner_of_the_curvature_is_refused_or_followed(at):
+    bent = steered(lambda t: np.clip(t - at, 0.0, None) ** 2)
+    try:
+        signal = signal_of(bent)
+    except InputError:
+        return
+    times = at + np.linspace(-2e-3, 2e-3, 4001)
+    found = np.array([value(signal, t) for t in times])
+    # As exact as a smooth input: 1e-11 of its largest value.
+    np.testing.assert_allclose(found, bent.at(times), rtol=0, atol=2e-11 * (10.0 - at) ** 2)
 
 
 def test_a_short_pulse_between_named_corners_is_accepted():

@@ -1,23 +1,17 @@
 """Kane's equations on textbook systems, the symmetric solve, and the order of batched calls."""
 
-import math
 from itertools import product
 
-import mpmath as mp
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.unit.programs import run
-from vehiclemor.codegen.arctangent import TAN_3_PI_8, atan
-from vehiclemor.codegen.schedule import Batch, schedule
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
 from vehiclemor.symbolic.geometry import vector
 from vehiclemor.symbolic.joints import along, free_rate
-from vehiclemor.symbolic.program import Function, assemble
+from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
 
 one = sp.Symbol("one", real=True)
@@ -238,108 +232,3 @@ def test_symmetric_elimination_equals_a_dense_solve_in_any_order(seed):
     values |= dict(zip(b, right_side, strict=True)) | {one: 1.0}
     found = run(program, "f", values)[:n]
     np.testing.assert_allclose(found, np.linalg.solve(matrix, right_side), rtol=1e-9, atol=1e-11)
-
-
-# Batches
-
-
-def random_function(seed: int) -> Function:
-    """Straight-line function with many sines and arctangents of named results."""
-    rng = np.random.default_rng(seed)
-    known = list(real("x0 x1 x2"))
-    assignments = []
-    for number in range(40):
-        a, b = (known[int(k)] for k in rng.integers(len(known), size=2))
-        choices = [a * b, a + b, sp.sin(a) + b, sp.atan(a) * b, sp.cos(a) * sp.atan(b), a - 2]
-        symbol = sp.Symbol(f"_v{number}", real=True)
-        assignments.append((symbol, choices[int(rng.integers(len(choices)))]))
-        known.append(symbol)
-    results = (sp.sin(known[-1]), sp.atan(known[-2]), known[-3], known[-4])
-    return Function(tuple(assignments), results, (4,))
-
-
-@settings(max_examples=25)
-@given(seed=st.integers(0, 10**6))
-def test_every_argument_is_known_before_it_is_used(seed):
-    function = random_function(seed)
-    known, answered, kept = set(real("x0 x1 x2")), set(), []
-    kinds = {sp.sin: "sincos", sp.cos: "sincos", sp.atan: "atan"}
-
-    def used(expression):
-        assert expression.free_symbols <= known
-        for call in expression.atoms(sp.sin, sp.cos, sp.atan):
-            assert (kinds[call.func], call.args[0]) in answered
-
-    for step in schedule(function):
-        if isinstance(step, Batch):
-            assert set(step.arguments) <= known
-            assert len(set(step.arguments)) == len(step.arguments)
-            assert not {(step.name, argument) for argument in step.arguments} & answered
-            answered |= {(step.name, argument) for argument in step.arguments}
-        else:
-            used(step[1])
-            known.add(step[0])
-            kept.append(step)
-    assert sorted(kept, key=str) == sorted(function.assignments, key=str)
-    for result in function.results:
-        used(result)
-
-
-def test_independent_calls_share_one_batch():
-    x = real("x0 x1 x2 x3")
-    named = [sp.Symbol(f"_v{k}", real=True) for k in range(4)]
-    assignments = [(named[k], sp.atan(x[k]) + 1) for k in range(4)]
-    batches = [
-        step
-        for step in schedule(Function(tuple(assignments), tuple(named), (4,)))
-        if isinstance(step, Batch)
-    ]
-    assert batches == [Batch("atan", tuple(x))]
-
-
-# Arctangent
-
-
-def test_arctangent_equals_the_c_librarys():
-    # Where the argument is reduced, and magnitudes from denormal to the largest.
-    borders = [0.66, 1.0, TAN_3_PI_8]
-    dense = np.concatenate(
-        [
-            np.linspace(0.0, 4.0, 20001),
-            np.logspace(-300, 300, 2001),
-            *([np.nextafter(b, 9.0), b, np.nextafter(b, 0.0)] for b in borders),
-        ]
-    )
-    found = np.array([atan(float(x)) for x in dense])
-    expected = np.array([math.atan(x) for x in dense])
-    np.testing.assert_allclose(found, expected, rtol=3.4e-16, atol=0.0)
-    mirrored = np.array([atan(float(-x)) for x in dense])
-    np.testing.assert_array_equal(mirrored, -found)
-
-
-def test_arctangent_is_as_accurate_as_it_says(rng):
-    points = np.concatenate([rng.uniform(-4.0, 4.0, 1500), rng.standard_cauchy(500)])
-    with mp.workdps(40):
-        errors = [abs(mp.mpf(float(atan(float(x)))) / mp.atan(mp.mpf(x)) - 1) for x in points]
-    assert max(errors) < 2.3e-16
-
-
-@pytest.mark.parametrize("x", [0.0, math.inf, -math.inf, 1e308, -1e308, 5e-324])
-def test_arctangent_of_special_values(x):
-    with np.errstate(all="ignore"):
-        assert float(atan(np.float64(x))) == math.atan(x)
-
-
-def test_arctangent_of_no_number_is_none():
-    assert math.isnan(atan(math.nan))
-
-
-def test_compiled_arctangents_are_the_arctangents_and_do_not_disturb_each_other(standard, rng):
-    model = standard()
-    states = rng.standard_cauchy((400, 4)) * 10.0 ** rng.integers(-9, 9, (400, 4))
-    states[::7, 2] = np.nan
-    states[1::7, 1] = np.inf
-    states[2::7, 3] = -0.0
-    found = model.outputs_at(states, np.zeros((400, 3)))
-    np.testing.assert_array_equal(found[:, :4], states)
-    np.testing.assert_allclose(found[:, 4:], np.arctan(states), rtol=3.4e-16, atol=0.0)
