@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.models.report import tabled_outputs
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import nominal, perturbed
 from vehiclemor.report.published import rms_numbers
@@ -32,7 +31,7 @@ def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 
     """RMS errors, floors, counts and status of every cell of studies of a model."""
     import pandas as pd
 
-    outputs = tabled_outputs(component("model", model))
+    outputs = component("model", model).shown.outputs
     datasets = {k: v for study in studies for k, v in run_studies(study, results, jobs).items()}
     parts = [
         flat(dataset, outputs).assign(study=name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from vehiclemor.models.report import TimingCase, timing_cases
+from vehiclemor.models.report import TimingCase
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.row import PRESETS, Row, verdict
 from vehiclemor.report.published import Claim, Number
@@ -43,7 +43,7 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
 
 def _cases(model: str, states: int) -> list[TimingCase]:
     """Timing cases of control-period POD with so many states and nothing else set."""
-    cases = timing_cases(component("model", model))
+    cases = component("model", model).shown.timing
     return [c for c in cases if c.method == "pod" and dict(c.settings) == {"rank": states}]
 
 
