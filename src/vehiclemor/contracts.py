@@ -11,7 +11,6 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.report import timing_cases
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
@@ -49,7 +48,7 @@ def check_model(name: str) -> None:
         derived = model.equations.shapes[function]
         assert derived == (size,), f"{name}: {function} has shape {derived}, not ({size},)"
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
-    timed = {case.method for case in timing_cases(definition)}
+    timed = {case.method for case in definition.shown.timing}
     assert timed <= set(names("method")), f"{name}: unknown methods among {sorted(timed)} are timed"
     maneuver = _nominal(model)
     inputs = tuple(quantity.name for quantity in definition.inputs)

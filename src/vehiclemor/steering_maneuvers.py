@@ -176,11 +176,7 @@ rack_lane_change = _racked(
     "single lane change of 3.5 m at 20 m/s, a pulse of the rack of 2.5 s from 1 s on, 10 s",
 )
 straight_ahead = replace(
-    lane_change,
-    name="straight_ahead",
-    summary="no steering, 25 s",
-    signal=_held(1),
-    corners=smooth,
+    lane_change, name="straight_ahead", summary="no steering, 25 s", signal=_held(1), corners=smooth
 )
 rack_straight_ahead = replace(
     rack_lane_change,

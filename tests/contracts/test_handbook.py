@@ -10,7 +10,6 @@ import pytest
 import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.contracts import check_method, check_model
-from vehiclemor.models.report import tabled_outputs, timing_cases
 from vehiclemor.registry import component
 
 PAGE = Path(__file__).parents[2] / "paper" / "handbook" / "add-a-model-or-method.md"
@@ -63,5 +62,5 @@ def test_model_of_the_handbook(example):
     assert float(np.abs(run["outputs"].sel(output="position") - exact).max()) < 1e-8
     # It declares no report and has tables all the same.
     definition = component("model", "oscillator")
-    assert tabled_outputs(definition) == ("position",)
-    assert [case.id for case in timing_cases(definition)][:2] == ["baseline", "strongest"]
+    assert definition.shown.outputs == ("position",)
+    assert [case.id for case in definition.shown.timing][:2] == ["baseline", "strongest"]

@@ -97,7 +97,7 @@ def test_second_order_form_is_that_of_the_masses(car):
 
 def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
     definition = component("model", "quarter_car")
-    cases = report.timing_cases(definition)
+    cases = definition.shown.timing
     ids = [case.id for case in cases]
     assert ids[:2] == ["baseline", "strongest"]
     assert len(set(ids)) == len(ids)
@@ -105,9 +105,9 @@ def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
     # Of two coordinates, one is a reduction.
     assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {1}
     outputs = ("body_acceleration", "suspension_travel", "tire_force")
-    assert report.tabled_outputs(definition) == report.printed_outputs(definition) == outputs
-    assert set(report.printed_counts(definition)) <= set(build("quarter_car").counts)
-    variants = list(report.paper_cases(definition))
+    assert definition.shown.outputs == definition.shown.printed_outputs == outputs
+    assert set(definition.shown.counts) <= set(build("quarter_car").counts)
+    variants = list(report.paper_cases(definition.shown))
     assert [case.id for case in variants[:2]] == ["baseline", "strongest"]
     assert len({case.id for case in variants}) == len(variants) == 2 + 2 * 2 * 2 * 3
 
@@ -119,6 +119,6 @@ def test_it_passes_the_contracts():
 
 
 def test_every_row_of_its_cost_table_can_be_run():
-    for case in report.timing_cases(component("model", "quarter_car")):
+    for case in component("model", "quarter_car").shown.timing:
         data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
         assert data["status"].item() == "ok", case.id

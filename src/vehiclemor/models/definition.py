@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError, did_you_mean
 from vehiclemor.models.quantities import Quantity
-from vehiclemor.models.report import ModelReport
+from vehiclemor.models.report import ModelReport, completed
 from vehiclemor.parameters import Declared
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class ModelDefinition:
     loads
         Outputs that are zero where a wheel has left the road.
     report
-        What tables and figures show of it.
+        What tables and figures show of it; see `shown`.
 
     Raises
     ------
@@ -141,6 +142,12 @@ class ModelDefinition:
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loads: tuple[str, ...] = ()
     report: ModelReport = field(default_factory=ModelReport)
+
+    @cached_property
+    def shown(self) -> ModelReport:
+        """What tables and figures show: as declared or else by the kind."""
+        outputs = tuple(output.name for output in self.outputs)
+        return completed(self.report, self.kind, len(self.coordinates), outputs)
 
     @property
     def states(self) -> tuple[str, ...]:

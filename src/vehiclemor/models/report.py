@@ -1,18 +1,14 @@
 """What tables and figures show of a model: outputs, costs to time, nominal study, paper's terms.
 
 Data only.  What a model leaves empty follows from its kind, so that one that declares nothing still
-gets every table; the functions below give what it declares or else these defaults.
+gets every table: see `completed`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, Protocol
-
-if TYPE_CHECKING:
-    from vehiclemor.models.quantities import Quantity
 
 Value = float | int | str | bool
 
@@ -80,30 +76,6 @@ class ModelReport:
     paper_open: Mapping[str, tuple[Value, ...]] = field(default_factory=dict)
 
 
-class Reported(Protocol):
-    """What the functions below read of a model's definition."""
-
-    @property
-    def kind(self) -> str:
-        """`ae`, `ode` or `dae`."""
-        ...
-
-    @property
-    def coordinates(self) -> tuple[Quantity, ...]:
-        """Coordinates in order."""
-        ...
-
-    @property
-    def outputs(self) -> tuple[Quantity, ...]:
-        """Outputs in order."""
-        ...
-
-    @property
-    def report(self) -> ModelReport:
-        """As declared."""
-        ...
-
-
 REPLAY = TimingCase("replay", "replay", "replay")
 STRONGEST = TimingCase("strongest", "full order, strongest", "full_order", "strongest")
 ALGEBRAIC_BASELINES = (
@@ -160,11 +132,6 @@ DEFAULTS = {"ae": _ALGEBRAIC, "ode": _DYNAMIC, "dae": _DYNAMIC}
 LARGEST_DEFAULT_RANK = 3
 
 
-def default_rank(definition: Reported) -> int:
-    """Rank of the reduced models in the default rows: 3, but less than the coordinates."""
-    return max(1, min(LARGEST_DEFAULT_RANK, len(definition.coordinates) - 1))
-
-
 def reduced_case(
     method: str,
     rank: int,
@@ -183,51 +150,44 @@ def reduced_case(
     return TimingCase(name, label, method, preset, settings)
 
 
-def timing_cases(definition: Reported) -> tuple[TimingCase, ...]:
-    """Rows of a model's cost table: by default full-order solvers, replay, and POD both ways."""
-    if definition.report.timing:
-        return definition.report.timing
-    rank = default_rank(definition)
-    cases = (
-        reduced_case("pod", rank),
-        reduced_case("pod", rank, "literal"),
-        reduced_case("fixed_basis", rank),
+def default_rank(coordinates: int) -> int:
+    """Rank of the reduced models in the default rows: 3, but less than the coordinates."""
+    return max(1, min(LARGEST_DEFAULT_RANK, coordinates - 1))
+
+
+def completed(
+    declared: ModelReport, kind: str, coordinates: int, outputs: tuple[str, ...]
+) -> ModelReport:
+    """What a model declares or else what follows from its kind, coordinates and outputs.
+
+    The default rows are full-order solvers, replay, and POD both ways.
+    """
+    default, rank = DEFAULTS[kind], default_rank(coordinates)
+    reduced = (("pod", "recommended"), ("pod", "literal"), ("fixed_basis", "recommended"))
+    cases = [reduced_case(method, rank, preset) for method, preset in reduced]
+    tabled = declared.outputs or outputs
+    baseline, strongest = declared.baselines
+    return replace(
+        declared,
+        outputs=tabled,
+        printed_outputs=declared.printed_outputs or tabled[:3],
+        counts=declared.counts or default.counts,
+        timing=declared.timing or (*default.timing, *cases),
+        baselines=(baseline or default.baselines[0], strongest or default.baselines[1]),
+        paper_fixed=declared.paper_fixed or {"rank": rank},
+        paper_open=declared.paper_open or default.paper_open,
     )
-    return (*DEFAULTS[definition.kind].timing, *cases)
 
 
-def tabled_outputs(definition: Reported) -> tuple[str, ...]:
-    """Outputs whose errors are tabled."""
-    return definition.report.outputs or tuple(output.name for output in definition.outputs)
-
-
-def printed_outputs(definition: Reported) -> tuple[str, ...]:
-    """Outputs whose errors are printed beside the times."""
-    return definition.report.printed_outputs or tabled_outputs(definition)[:3]
-
-
-def printed_counts(definition: Reported) -> Mapping[str, str]:
-    """Counts that are printed: name -> heading."""
-    return definition.report.counts or DEFAULTS[definition.kind].counts
-
-
-def baselines(definition: Reported) -> tuple[str, str]:
-    """What the cases `baseline` and `strongest` are, in words."""
-    declared, default = definition.report.baselines, DEFAULTS[definition.kind].baselines
-    return (declared[0] or default[0], declared[1] or default[1])
-
-
-def paper_cases(definition: Reported) -> Iterator[TimingCase]:
+def paper_cases(report: ModelReport) -> Iterator[TimingCase]:
     """Both full-order cases, then control-period POD with all that the paper leaves open.
 
     The identifier and the label of a variant are the values that it sets.
     """
     yield TimingCase("baseline", "full order, the paper's kind", "full_order")
     yield STRONGEST
-    declared = definition.report
-    fixed = declared.paper_fixed or {"rank": default_rank(definition)}
-    varied = declared.paper_open or DEFAULTS[definition.kind].paper_open
+    varied = report.paper_open
     for values in product(*varied.values()):
         label = ", ".join(str(value) for value in values)
-        chosen = {**fixed, **dict(zip(varied, values, strict=True))}
+        chosen = {**report.paper_fixed, **dict(zip(varied, values, strict=True))}
         yield TimingCase(label, f"pod, {label}", "pod", settings=chosen)

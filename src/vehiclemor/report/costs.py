@@ -5,7 +5,6 @@ from pathlib import Path
 import pandas as pd
 import xarray as xr
 
-from vehiclemor.models.report import baselines, printed_counts, printed_outputs, timing_cases
 from vehiclemor.registry import component
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.printing import Row, fixed, power, table_text, wrapped
@@ -26,7 +25,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     """
     data = _timing(model, folder)
     rows = [
-        _row(data.sel(start=start, case=case), list(printed_counts(component("model", model))))
+        _row(data.sel(start=start, case=case), list(component("model", model).shown.counts))
         for start in data["start"].values
         for case in data["case"].values
     ]
@@ -34,7 +33,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
 
 
 def _timing(model: str, folder: Path) -> xr.Dataset:
-    cases = timing_cases(component("model", model))
+    cases = component("model", model).shown.timing
     return timed_model(build(model), cases, folder, f"timing-{model}")
 
 
@@ -70,8 +69,8 @@ def costs_text(model: str, folder: Path) -> str:
     """The cost table of a model as text: times and counts, then errors and training."""
     data, table = _timing(model, folder), cost_table(model, folder)
     definition = component("model", model)
-    counts, outputs = printed_counts(definition), printed_outputs(definition)
-    baseline, strongest = baselines(definition)
+    counts, outputs = definition.shown.counts, definition.shown.printed_outputs
+    baseline, strongest = definition.shown.baselines
     title = f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})"
     legend = (
         f"speed-up x1: against {baseline}; x2: against {strongest}; break-even in runs; "

@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.files import write_text
-from vehiclemor.models.report import default_rank, tabled_outputs
+from vehiclemor.models.report import default_rank
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.resources import data_names
@@ -104,7 +104,7 @@ def bounds(model: Model) -> dict[str, float]:
         return dict(definition.report.bounds)
     outputs = model.simulate(component("maneuver", definition.maneuver)).outputs
     ranges = dict(zip(model.outputs, np.ptp(outputs, axis=0), strict=True))
-    shown = [output for output in tabled_outputs(definition) if ranges[output] > 0.0]
+    shown = [output for output in definition.shown.outputs if ranges[output] > 0.0]
     return {output: INDISTINGUISHABLE * float(ranges[output]) for output in shown}
 
 
@@ -123,7 +123,7 @@ def _study(name: str, kind: str, results: Path, head: str, grid: str) -> str:
 
 def _rank(model: Model, method: str) -> dict[str, int]:
     """The rank of a default row, for a method whose own default the model is too small for."""
-    rank = default_rank(component("model", model.name))
+    rank = default_rank(len(model.coordinates))
     own = default_settings(model, method).get("rank")
     return {"rank": rank} if isinstance(own, int) and own > rank else {}
 

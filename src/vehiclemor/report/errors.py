@@ -7,7 +7,6 @@ from pathlib import Path
 import pandas as pd
 import xarray as xr
 
-from vehiclemor.models.report import tabled_outputs
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import nominal, perturbed
 from vehiclemor.report.published import rms_numbers
@@ -26,7 +25,7 @@ def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
 
 def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 1) -> pd.DataFrame:
     """RMS errors, floors, counts and status of every cell of studies of a model."""
-    outputs = tabled_outputs(component("model", model))
+    outputs = component("model", model).shown.outputs
     datasets = {k: v for study in studies for k, v in run_studies(study, results, jobs).items()}
     parts = [
         flat(dataset, outputs).assign(study=name)

@@ -31,13 +31,7 @@ START = "equilibrium"
 RACKS_OF_REACH = 9
 # Loops of the full-order solution, and the kernels that stand in loops.
 KINEMATIC_LOOPS = ("simulation.newton_loops",)
-INLINED_KERNELS = (
-    "residual",
-    "residual_jacobian",
-    "newton_step",
-    "tangent_parts",
-    "tangent",
-)
+INLINED_KERNELS = ("residual", "residual_jacobian", "newton_step", "tangent_parts", "tangent")
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",

@@ -30,9 +30,7 @@ SMALLEST_SINGULAR_VALUE = 1e-8
 
 
 def build(
-    name: str,
-    parameter_file: Path | None = None,
-    overrides: Mapping[str, object] | None = None,
+    name: str, parameter_file: Path | None = None, overrides: Mapping[str, object] | None = None
 ) -> Model:
     """Derive (or fetch), compile and parametrise a registered model.
 

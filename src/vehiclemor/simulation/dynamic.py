@@ -11,12 +11,7 @@ import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.simulation.checks import (
-    check_inputs,
-    cut_short,
-    left_validity,
-    lifted_wheels,
-)
+from vehiclemor.simulation.checks import check_inputs, cut_short, left_validity, lifted_wheels
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System

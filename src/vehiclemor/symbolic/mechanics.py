@@ -163,10 +163,7 @@ class MovingFrame:
         return Motion(g.named(tape, turn + relative.value), columns, g.named(tape, bias))
 
     def rotation(
-        self,
-        tape: Tape,
-        inertia: Tensor,
-        spin: tuple[int, sp.Expr, Vector] | None = None,
+        self, tape: Tape, inertia: Tensor, spin: tuple[int, sp.Expr, Vector] | None = None
     ) -> Motion:
         """Rotation of a body whose inertia tensor is constant in the frame.
 

@@ -10,7 +10,6 @@ import pytest
 from tests.unit import standard_problems
 from vehiclemor import registry
 from vehiclemor.errors import InputError
-from vehiclemor.models import report
 from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.models.report import ModelReport, TimingCase
@@ -83,7 +82,7 @@ def test_what_is_no_definition_is_refused_with_its_entry_point(monkeypatch, valu
 def test_what_a_built_in_declares_exists(name):
     definition = component("model", name)
     declared = definition.report
-    cases = report.timing_cases(definition)
+    cases = definition.shown.timing
     labels = [case.label for case in cases]
     assert len(set(labels)) == len(labels)
     assert {case.method for case in cases} <= set(names("method"))
@@ -109,22 +108,23 @@ def test_defaults_follow_the_kind():
     speeds = {"ae": (), "ode": PLAIN.speeds, "dae": PLAIN.speeds}
     for kind, counted in (("ae", "iterations"), ("ode", "rhs_calls"), ("dae", "rhs_calls")):
         made = replace(PLAIN, kind=kind, speeds=speeds[kind], design_coordinates=PLAIN.starts)
-        cases = report.timing_cases(made)
+        cases = made.shown.timing
         assert [case.id for case in cases][:2] == ["baseline", "strongest"]
         assert "replay" in [case.id for case in cases]
-        assert counted in report.printed_counts(made)
-        assert report.tabled_outputs(made) == tuple(output.name for output in PLAIN.outputs)
-        assert report.printed_outputs(made) == ("angle", "tracked", "angular_speed")
-        assert all(report.baselines(made))
+        assert counted in made.shown.counts
+        assert made.shown.outputs == tuple(output.name for output in PLAIN.outputs)
+        assert made.shown.printed_outputs == ("angle", "tracked", "angular_speed")
+        assert all(made.shown.baselines)
         chosen = replace(made, report=ModelReport(outputs=("tracked",)))
-        assert report.tabled_outputs(chosen) == report.printed_outputs(chosen) == ("tracked",)
+        assert chosen.shown.outputs == chosen.shown.printed_outputs == ("tracked",)
 
 
 @pytest.mark.parametrize(("coordinates", "rank"), [(1, 1), (2, 1), (3, 2), (4, 3), (26, 3)])
 def test_the_default_rank_is_a_reduction_where_there_is_one(coordinates, rank):
     made = tuple(Quantity(f"q{k}", "m", "a coordinate") for k in range(coordinates))
     speeds = tuple(Quantity(f"v{k}", "m/s", "a speed") for k in range(coordinates))
-    assert report.default_rank(replace(PLAIN, coordinates=made, speeds=speeds)) == rank
+    shown = replace(PLAIN, coordinates=made, speeds=speeds).shown
+    assert shown.paper_fixed == {"rank": rank}
 
 
 def test_declarations_are_read_without_sympy():

@@ -252,7 +252,7 @@ JOINTS = real("slid angle")
 
 def motions(tape: Tape, travel: Travel, acceleration: g.Vector | None = None):
     """Moving frame, and the arm's point and rotation in it."""
-    frame = m.MovingFrame(NU[:3], NU[3:6], first=0, acceleration=acceleration)
+    frame = m.MovingFrame(g.vector(NU[:3]), g.vector(NU[3:6]), first=0, acceleration=acceleration)
     lever = g.rotate_about_axis(tape, exact(travel.lever), exact(travel.axis), JOINTS[1])
     turn = along(free_rate(7, NU[7]), exact(travel.axis))
     relative = carried(tape, along(free_rate(6, NU[6]), exact(travel.slide)), turn, lever)
@@ -284,7 +284,7 @@ def test_a_frame_of_velocities_in_space_can_count_gravity_as_acceleration(seed):
 
 def test_a_point_at_rest_in_the_frame_needs_no_relative_motion(rng):
     travel, tape = Travel(rng), Tape()
-    frame = m.MovingFrame(NU[:3], NU[3:6], first=0)
+    frame = m.MovingFrame(g.vector(NU[:3]), g.vector(NU[3:6]), first=0)
     place = exact(travel.lever)
     still = frame.point(tape, place, m.Motion(m.ZERO, {}, m.ZERO))
     plain = frame.point(tape, place)

@@ -9,6 +9,7 @@ import sympy as sp
 from tests.unit.programs import run
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
+from vehiclemor.symbolic.geometry import vector
 from vehiclemor.symbolic.joints import along, free_rate
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
@@ -21,8 +22,8 @@ def real(names: str) -> tuple[sp.Symbol, ...]:
 
 
 def motion(value, columns, bias) -> mechanics.Motion:
-    named = {k: tuple(map(sp.sympify, column)) for k, column in columns.items()}
-    return mechanics.Motion(tuple(value), named, tuple(map(sp.sympify, bias)))
+    named = {k: vector(column) for k, column in columns.items()}
+    return mechanics.Motion(vector(value), named, vector(bias))
 
 
 class System:
@@ -64,11 +65,11 @@ def test_double_pendulum_has_lagranges_equations(rng):
     v1 = tuple(va * e for e in first)
     v2 = sums(v1, tuple(vb * e for e in second))
     bodies = [
-        mechanics.Body(sp.Float(m1), motion(v1, {0: first}, turn1), (0, 0, -m1 * g)),
+        mechanics.Body(sp.Float(m1), motion(v1, {0: first}, turn1), vector((0, 0, -m1 * g))),
         mechanics.Body(
             sp.Float(m2),
             motion(v2, {0: first, 1: second}, sums(turn1, turn2)),
-            (0, 0, -m2 * g),
+            vector((0, 0, -m2 * g)),
         ),
     ]
     system = System(tape, 2, bodies, list(symbols))
@@ -90,20 +91,20 @@ MASS = 1.7
 
 
 def exact(tensor: np.ndarray) -> tuple:
-    return tuple(tuple(sp.Float(e) for e in row) for row in tensor)
+    return tuple(vector([sp.Float(e) for e in row]) for row in tensor)
 
 
 def test_a_free_rigid_body_has_newtons_and_eulers_equations(rng):
     speeds, loads = real("u v w p q r"), real("fx fy fz mx my mz")
     tape = Tape()
-    frame = mechanics.MovingFrame(speeds[:3], speeds[3:], first=0)
+    frame = mechanics.MovingFrame(vector(speeds[:3]), vector(speeds[3:]), first=0)
     body = mechanics.Body(
         sp.Float(MASS),
         frame.origin(tape),
-        loads[:3],
+        vector(loads[:3]),
         frame.rotation(tape, exact(INERTIA)),
         exact(INERTIA),
-        loads[3:],
+        vector(loads[3:]),
     )
     system = System(tape, 6, [body], [*speeds, *loads])
     for _ in range(10):
@@ -120,10 +121,10 @@ def carrier_with_slider_and_rotor():
     """A free body that carries a mass on a slide and a spinning rotor; no loads."""
     *speeds, slid, rate, spin = symbols = real("u v w p q r slid rate spin")
     tape = Tape()
-    frame = mechanics.MovingFrame(tuple(speeds[:3]), tuple(speeds[3:]), first=0)
-    axis = tuple(sp.Float(e) for e in (0.6, 0.0, 0.8))
+    frame = mechanics.MovingFrame(vector(speeds[:3]), vector(speeds[3:]), first=0)
+    axis = vector([sp.Float(e) for e in (0.6, 0.0, 0.8)])
     about = mechanics.axisymmetric_inertia(sp.Float(1.9), sp.Float(1.1), axis)
-    place = (sp.Float(0.5), sp.Float(-0.3), slid + sp.Float(0.2))
+    place = vector((sp.Float(0.5), sp.Float(-0.3), slid + sp.Float(0.2)))
     none = mechanics.ZERO
     bodies = [
         mechanics.Body(

@@ -31,11 +31,11 @@ def compiled_tensors() -> tuple[Callable, Callable, Callable]:
     rows = [list(row) for row in sp.Matrix(3, 3, lambda i, j: real(f"r{i}{j}")).tolist()]
     mass, lever = real("mass"), real("lx ly lz")
     xx, xy, xz, yy, yz, zz = entries
-    tensor, tape = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), Tape()
-    by_axis = [list(row) for row in m.turned_tensor(tape, tensor, axis, angle)]
+    tensor, tape = tuple(map(g.vector, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))), Tape()
+    by_axis = [list(row) for row in m.turned_tensor(tape, tensor, g.vector(axis), angle)]
     rotation = tuple(g.vector(row) for row in rows)
     by_matrix = [list(row) for row in m.rotated_tensor(tape, tensor, rotation)]
-    of_point = [list(row) for row in m.point_mass_tensor(mass, lever)]
+    of_point = [list(row) for row in m.point_mass_tensor(mass, g.vector(lever))]
     return (
         function_of(tape, [entries, axis, angle], by_axis),
         function_of(tape, [entries, rows], by_matrix),
@@ -97,7 +97,7 @@ def arm_with_wheel(as_rotor: bool) -> Callable:
     """
     tape, angle, speeds, loads = Tape(), RIG[0], RIG[1:9], RIG[9:]
     hinge = exact(HINGE)
-    frame = m.MovingFrame(speeds[:3], speeds[3:6], first=0)
+    frame = m.MovingFrame(g.vector(speeds[:3]), g.vector(speeds[3:6]), first=0)
     turn = along(free_rate(6, speeds[6]), hinge)
 
     def lever(design: np.ndarray) -> g.Vector:
@@ -107,8 +107,8 @@ def arm_with_wheel(as_rotor: bool) -> Callable:
         now = lever(design)
         return frame.point(tape, exact(PIVOT) + now, carried(tape, STILL, turn, now))
 
-    axle, force, moment = lever(AXLE), loads[:3], loads[3:6]
-    on_arm, moment_on_arm = loads[6:9], loads[9:]
+    axle = lever(AXLE)
+    force, moment, on_arm, moment_on_arm = (g.vector(loads[k : k + 3]) for k in (0, 3, 6, 9))
     turning = frame.turning(tape, turn)
     if as_rotor:
         total = ARM_MASS + WHEEL_MASS
@@ -173,7 +173,7 @@ def free_body_with_rotor() -> Callable:
     """Rates of the speeds of a free body whose rotor a motor in it drives."""
     speeds, torque = real("u v w p q_y r spin"), real("torque")
     tape, tensor = Tape(), tensor_of(TENSOR)
-    frame = m.MovingFrame(speeds[:3], speeds[3:6], first=0)
+    frame = m.MovingFrame(g.vector(speeds[:3]), g.vector(speeds[3:6]), first=0)
     turning = frame.turning(tape, STILL)
     rotor = m.Rotor(6, speeds[6], exact(AXLE), sp.Float(ABOUT), torque)
     body = m.Body(

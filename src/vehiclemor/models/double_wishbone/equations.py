@@ -34,14 +34,7 @@ def derive() -> Program:
     residual = [tape.let(e) for e in [*closures, centre[2] - u[0], q[7] - u[1]]]
     jacobian = tape.jacobian(residual, q)
     axle = position["axle_direction"]
-    outputs = [
-        centre[0],
-        centre[1],
-        q[1],
-        sp.atan2(-axle[0], axle[1]),
-        sp.asin(axle[2]),
-        q[7],
-    ]
+    outputs = [centre[0], centre[1], q[1], sp.atan2(-axle[0], axle[1]), sp.asin(axle[2]), q[7]]
     (step,) = eliminate(tape, jacobian, [residual], PIVOTS)
     augmented = [e for row, phi in zip(jacobian, residual, strict=True) for e in [*row, phi]]
     n = len(quantities.COORDINATES)

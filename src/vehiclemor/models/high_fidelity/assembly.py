@@ -49,10 +49,7 @@ def solved(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> dict[int, sp.Expr
 
 
 def chassis_accelerations(
-    tape: Tape,
-    attitude: body.Attitude,
-    solved: Mapping[int, sp.Expr],
-    speeds: Sequence[sp.Expr],
+    tape: Tape, attitude: body.Attitude, solved: Mapping[int, sp.Expr], speeds: Sequence[sp.Expr]
 ) -> list[sp.Expr]:
     """Second derivatives of position, yaw, pitch and roll."""
     turning = g.vector(speeds[3:6])

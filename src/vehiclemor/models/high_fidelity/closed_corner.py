@@ -114,10 +114,7 @@ def closed(
         part,
         offset,
         square,
-        _sign(
-            tape,
-            design_off @ g.named(tape, design_between.cross(inner - ball)),
-        ),
+        _sign(tape, design_off @ g.named(tape, design_between.cross(inner - ball))),
     )
     carrier = _carrier(tape, (design_between, design_off), (between, off))
     reach = g.named(tape, between * part + off * offset)

@@ -79,10 +79,7 @@ def derive() -> Program:
     second_order = [
         e
         for row in rows
-        for e in [
-            *row[:n],
-            tape.let(sp.Add(*[row[k] * accelerations[k] for k in range(n)])),
-        ]
+        for e in [*row[:n], tape.let(sp.Add(*[row[k] * accelerations[k] for k in range(n)]))]
     ]
     descriptor = [*open_form]
     for row, right in zip(_rows(motions, range(n)), gamma, strict=True):
@@ -145,10 +142,7 @@ def _closures(
 
 
 def _bound_rates(
-    tape: Tape,
-    closures: Sequence[mechanics.Motion],
-    gamma: Sequence[sp.Expr],
-    free: Sequence[Rate],
+    tape: Tape, closures: Sequence[mechanics.Motion], gamma: Sequence[sp.Expr], free: Sequence[Rate]
 ) -> list[Rate]:
     """Rates whose derivatives follow from the closures and those of the lower arms."""
     bound = list(free)

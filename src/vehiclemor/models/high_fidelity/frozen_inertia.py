@@ -68,10 +68,7 @@ def derive() -> Program:
         [*flat, *c.values()],
         {
             "derivative": (derivative, (2 * N,)),
-            "full_state": (
-                _full_state(tape, q, nu, chassis, rack, p),
-                (2 * len(ALL_COORDINATES),),
-            ),
+            "full_state": (_full_state(tape, q, nu, chassis, rack, p), (2 * len(ALL_COORDINATES),)),
         },
     )
 

@@ -174,10 +174,7 @@ def wheel_on_road(
     # (axle - tilt normal) / cosine.
     sideways = let(tire.lateral * inverse)
     upwards = let(load - sideways * tilt)
-    force = g.named(
-        tape,
-        heading * tire.longitudinal + axle * sideways + up * upwards,
-    )
+    force = g.named(tape, heading * tire.longitudinal + axle * sideways + up * upwards)
     # Moment about the wheel centre, without its part about the axle, which turns the wheel.
     along = let(tire.lateral * cosine + load * tilt)
     rolling, twist = let(radius * along), tire.aligning

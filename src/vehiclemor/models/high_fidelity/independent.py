@@ -59,10 +59,7 @@ def derive() -> Program:
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (outputs, (len(OUTPUTS),)),
-            "full_state": (
-                full_state(tape, q, rates, corners, motions),
-                (2 * len(COORDINATES),),
-            ),
+            "full_state": (full_state(tape, q, rates, corners, motions), (2 * len(COORDINATES),)),
             "mass": ([entry for row in mass for entry in row], (n, n)),
             "quasi_speeds": (_quasi_speeds(tape, rates, speeds, corners, motions), (n,)),
             "suspension": (_suspension(tape, vehicle, corners[0]), (3, 4)),

@@ -180,10 +180,7 @@ def _loads(
     tape: Tape, contact: body.Contact, up: g.Vector, load: sp.Expr, tire: TireForces
 ) -> tuple[g.Vector, g.Vector]:
     """Force on a wheel and its moment about the wheel centre; the vertical load has no arm."""
-    shear = g.named(
-        tape,
-        contact.heading * tire.longitudinal + contact.leftward * tire.lateral,
-    )
+    shear = g.named(tape, contact.heading * tire.longitudinal + contact.leftward * tire.lateral)
     arm = g.named(tape, up * -contact.height)
     moment = arm.cross(shear) + up * tire.aligning
     return g.named(tape, shear + up * load), g.named(tape, moment)

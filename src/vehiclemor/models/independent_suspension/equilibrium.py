@@ -48,10 +48,7 @@ def derived(p: Mapping[str, Any]) -> Derived:
     a, b = p["front_axle_distance"], p["rear_axle_distance"]
     total = mass + 4 * corner
     sprung_a = (total * a - 2 * corner * (a + b)) / mass
-    load = (
-        total * p["gravity"] * b / (2 * (a + b)),
-        total * p["gravity"] * a / (2 * (a + b)),
-    )
+    load = (total * p["gravity"] * b / (2 * (a + b)), total * p["gravity"] * a / (2 * (a + b)))
     corners = sum(
         2 * corner * (distance**2 + track**2 / 4)
         for distance, track in ((a, p["front_track"]), (b, p["rear_track"]))

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from vehiclemor.models.report import printed_outputs
 from vehiclemor.registry import component
 from vehiclemor.report.costs import cost_table, costs_text
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
@@ -42,7 +41,9 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
 
 def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
     """The comparison of a model as text."""
-    columns = {f"rms_{o}": label_of(o).short for o in printed_outputs(component("model", name))}
+    columns = {
+        f"rms_{o}": label_of(o).short for o in component("model", name).shown.printed_outputs
+    }
     records = rows.to_dict("records")
     printed: list[Row] = []
     for row in records:

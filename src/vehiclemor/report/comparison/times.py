@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from vehiclemor.models.report import TimingCase, timing_cases
+from vehiclemor.models.report import TimingCase
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.rows import PRESETS, Row, claim_row, number_row
 from vehiclemor.report.criteria.finding import Finding
@@ -28,7 +28,7 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
 
 def _cases(model: str, states: int) -> list[TimingCase]:
     """Timing cases of control-period POD with so many states and nothing else set."""
-    cases = timing_cases(component("model", model))
+    cases = component("model", model).shown.timing
     return [c for c in cases if c.method == "pod" and dict(c.settings) == {"rank": states}]
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from pydantic import Field
 
-from vehiclemor.models.report import printed_outputs
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import (
@@ -118,7 +117,7 @@ def find(name: str, results: Path) -> Entry:
 def _of_a_model(kind: str, model: str, results: Path) -> Entry:
     """One of the figures that every model has, of all registered methods."""
     drawing, content, study, caption = OF_A_MODEL[kind]
-    outputs = list(printed_outputs(component("model", model)))[:MOST_OUTPUTS]
+    outputs = list(component("model", model).shown.printed_outputs)[:MOST_OUTPUTS]
     methods = default_studies.legend(model)
     options: dict[str, object] = {"outputs": outputs, "methods": methods}
     if drawing == "histories":

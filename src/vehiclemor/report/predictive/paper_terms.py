@@ -43,7 +43,7 @@ def paper_terms_rows(models: Iterable[str], folder: Path) -> list[Row]:
 
 def _model_rows(name: str, folder: Path) -> list[Row]:
     model = build(name)
-    cases, limits = list(paper_cases(component("model", name))), bounds(model)
+    cases, limits = list(paper_cases(component("model", name).shown)), bounds(model)
     dataset = timed_model(model, cases, folder, f"paper-terms-{name}")
     rows = []
     for case in cases:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from tests.unit.programs import function_of
 from vehiclemor.models.components import tilted_wheel, tires
 from vehiclemor.models.components.tire_coefficients import FIALA
+from vehiclemor.symbolic.geometry import vector
 from vehiclemor.symbolic.tape import Tape
 
 ALONG, ACROSS, MOST, LEAST, WIDTH = COEFFICIENTS = (115e3, 117e3, 0.75, 0.2, 0.32)
@@ -236,14 +237,16 @@ FIELDS = ("arm", "heading", "leftward", "up", "load", "slip_ratio", "tan_slip")
 def compiled_wheel() -> Callable:
     """(up, height, axle, velocity, turning, spin) -> contact by name, tire forces, loads."""
     tape, p = Tape(), {name: sp.Float(value, 17) for name, value in WHEEL.items()}
-    up, axle, velocity, turning = (sp.symbols(f"{n}x {n}y {n}z", real=True) for n in "navw")
+    up, axle, velocity, turning = (vector(sp.symbols(f"{n}x {n}y {n}z", real=True)) for n in "navw")
     height, spin = sp.symbols("height spin", real=True)
     contact = tilted_wheel.tilted_contact(tape, up, height, axle, velocity, turning, spin, p)
     tire = tilted_wheel.tire_on(tape, contact, p)
     results = [getattr(contact, name) for name in FIELDS]
     results += [(tire.longitudinal, tire.lateral, tire.aligning), *contact.loads(tape, tire)]
     function = function_of(
-        tape, [up, height, axle, velocity, turning, spin], [list(np.atleast_1d(r)) for r in results]
+        tape,
+        [list(up), height, list(axle), list(velocity), list(turning), spin],
+        [[r] if isinstance(r, sp.Expr) else list(r) for r in results],
     )
 
     def evaluate(*given) -> dict:

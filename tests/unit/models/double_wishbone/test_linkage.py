@@ -16,6 +16,7 @@ from vehiclemor.models.high_fidelity import linkage_motions
 from vehiclemor.models.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.symbolic.geometry import vector
 from vehiclemor.symbolic.joints import free_rate
 from vehiclemor.symbolic.tape import Tape
 
@@ -33,13 +34,13 @@ def compiled(side: int) -> Callable:
     """(hard points by name, q, rack, rates, rack's velocity and acceleration) -> places by name."""
     tape, q = Tape(), sp.symbols("q:7", real=True)
     rates, rack = sp.symbols("rate:7", real=True), sp.symbols("rack rack_dot rack_ddot", real=True)
-    points = {name: sp.symbols(f"{name}_x {name}_y {name}_z", real=True) for name in POINTS}
+    points = {name: vector(sp.symbols(f"{name}_x {name}_y {name}_z", real=True)) for name in POINTS}
     linkage = double_wishbone_linkage.assembled(tape, q, rack[0], points, side)
     on_carrier = {name: linkage.on_carrier(tape, points[name]) for name in CARRIED}
     free = [free_rate(k, rate) for k, rate in enumerate(rates)]
     motions = linkage_motions.linkage_motions(tape, linkage, q, free, rack[1:])
     gaps, closing = linkage_motions.closures(tape, linkage, motions, points)
-    zero = (sp.Integer(0),) * 3
+    zero = vector((0, 0, 0))
     results = {
         **on_carrier,
         "upper_arm_ball": linkage.upper_ball_joint,
@@ -60,8 +61,8 @@ def compiled(side: int) -> Callable:
     }
     function = function_of(
         tape,
-        [list(points.values()), q, rack, rates],
-        [sp.Matrix(r).tolist() for r in results.values()],
+        [[list(point) for point in points.values()], q, rack, rates],
+        [sp.Matrix(list(r)).tolist() for r in results.values()],
     )
 
     def places(p, q, rack=(0.0, 0.0, 0.0), rates=(0.0,) * 7) -> dict[str, np.ndarray]:
