@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
@@ -16,9 +18,13 @@ def feature_columns(
     features: Features, z: np.ndarray, u: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
     """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""
-    kernels = Kernels(kernel_sources(columns_text(features)))
     sizes = features.states, features.inputs, len(features.terms)
-    return along(kernels, "columns", parameters, (z, u), sizes)
+    return along(_column_kernels(features), "columns", parameters, (z, u), sizes)
+
+
+@cache
+def _column_kernels(features: Features) -> Kernels:
+    return Kernels(kernel_sources(columns_text(features)))
 
 
 def feature_system(
