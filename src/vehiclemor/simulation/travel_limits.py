@@ -21,8 +21,15 @@ LARGEST_CHANGE = 0.1
 class Mechanism(Protocol):
     """What the continuation needs of a kinematic model."""
 
-    name: str
-    design: np.ndarray
+    @property
+    def name(self) -> str:
+        """Registered name."""
+        ...
+
+    @property
+    def design(self) -> np.ndarray:
+        """Coordinates (n,) at the design position."""
+        ...
 
     def jacobian(self, q: Any, u: Any) -> np.ndarray:
         """Derivative (n, n) of the residual equations."""
