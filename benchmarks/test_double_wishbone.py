@@ -41,25 +41,21 @@ def test_derivation(benchmark):
 def test_kernel(benchmark, model, kernel):
     """One call of a kernel from Python, the call included."""
     benchmark.group = "kernels (with the call from Python)"
-    function = model.equations.program.functions[kernel]
-    result, work = np.empty(function.shape), np.empty(model.kernels.WORK)
+    result = np.empty(model.equations.shapes[kernel])
     q, u = model.solve([0.05, 0.0]), np.array([0.05, 0.0])
-    benchmark(getattr(model.kernels, kernel), q, u, model.constants, work, result)
+    benchmark(model.equations.kernels.call, kernel, q, u, model.constants, result)
     benchmark.extra_info["operations"] = model.operation_counts[kernel]["total"]
     assert np.isfinite(result).all()
 
 
-@pytest.mark.parametrize("kernel", ["residual", "output"])
+@pytest.mark.parametrize("kernel", ["residual", "outputs"])
 def test_kernel_in_loop(benchmark, model, kernel):
     """1001 calls of a kernel in a compiled loop."""
     benchmark.group = "kernels, 1001 calls in a compiled loop"
     trajectory = model.simulate(sine_travel)
-    widths = {"residual": len(model.coordinates), "output": len(model.outputs)}
-    result = np.empty((len(trajectory.time), widths[kernel]))
-    loop = getattr(model.kernels, f"{kernel}_path")
-    benchmark(loop, trajectory.coordinates, trajectory.inputs, model.constants, result)
-    name = {"residual": "residual", "output": "outputs"}[kernel]
-    benchmark.extra_info["operations"] = model.operation_counts[name]["total"]
+    run = {"residual": model.residual_at, "outputs": model.outputs_at}[kernel]
+    result = benchmark(run, trajectory.coordinates, trajectory.inputs)
+    benchmark.extra_info["operations"] = model.operation_counts[kernel]["total"]
     assert np.isfinite(result).all()
 
 

@@ -9,20 +9,21 @@ from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
 from vehiclemor.maneuvers import rack_lane_change
-from vehiclemor.models.high_fidelity import definition as high_fidelity_vehicle
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.integrators.catalogue import problem_size, rhs_loop
+from vehiclemor.simulation.integrators.structures import FINISHED, Place
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system_loops import FULL as FULL_FORM
+from vehiclemor.simulation.system import Solver
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000
 FULL = {
-    "explicit 1e-6": ("explicit", 1e-6),
-    "explicit 1e-3": ("explicit", 1e-3),
+    "explicit 1e-6": ("dopri5", 1e-6),
+    "explicit 1e-3": ("dopri5", 1e-3),
     "RODAS4 1e-4": ("rodas4", 1e-4),
     "ROS34PW2 7e-4, one Jacobian": ("ros34pw2", 7e-4),
 }
@@ -65,7 +66,7 @@ def report_errors(benchmark, model, outputs, reference):
 def test_derivation(benchmark):
     """Symbolic derivation with elimination, common subexpressions and hoisting."""
     benchmark.group = "symbolics"
-    equations = benchmark.pedantic(high_fidelity_vehicle.derive, rounds=2)
+    equations = benchmark.pedantic(component("model", "high_fidelity_vehicle").derive, rounds=2)
     assert isinstance(equations.program, Program)
 
 
@@ -75,13 +76,8 @@ def test_kernel(benchmark, model, kernel):
     benchmark.group = f"kernels, {CALLS} calls in a compiled loop"
     states = np.tile(model.start("dropped"), (CALLS, 1))
     inputs = np.full((CALLS, 3), 1e-3)
-    # The loop calls whatever address stands in the place of the derivative.
-    constants, addresses = model.machine
-    addresses = addresses.copy()
-    addresses[0] = getattr(model.kernels, f"_{kernel}_machine").address
-    shape = model.equations.shapes[kernel]
-    result = np.empty((CALLS, int(np.prod(shape))))
-    benchmark(model.loops.derivative_path, states, inputs, (constants, addresses), result)
+    size = int(np.prod(model.equations.shapes[kernel]))
+    result = benchmark(model.system.along, kernel, states, inputs, size)
     benchmark.extra_info["operations"] = model.operation_counts[kernel]["total"]
     assert np.isfinite(result).all()
 
@@ -94,17 +90,15 @@ def test_full_order(benchmark, model, references, label, start):
     solver, tolerance = FULL[label]
     run = model.simulate(rack_lane_change, start, None, solver, tolerance)
     whole = whole_space(2 * len(model.coordinates))
-    arguments = model.system.arguments(
-        rack_lane_change, model.start(start), whole, solver, tolerance, rack_lane_change.times
-    )
+    how = Solver(solver, tolerance, rack_lane_change.times)
+    loop, arguments = model.system.prepared(rack_lane_change, model.start(start), whole, how)
 
     def whole_run():
         # The loop stops at a number of calls, which its counts add up.
-        arguments[-1][:] = 0
-        return model.loops.run(*arguments)
+        arguments.output.counts[:] = 0
+        return loop(*arguments)
 
-    status, _ = benchmark(whole_run)
-    assert status == 0
+    assert benchmark(whole_run) == FINISHED
     benchmark.extra_info |= run.counts
     error = report_errors(benchmark, model, run.outputs, references[start])
     assert error[model.outputs.index("lateral_position")] < 0.05
@@ -116,27 +110,17 @@ def spans(model):
 
     Every library calls the same compiled function: inputs from their polynomials, then the kernel.
     """
-    signal, times = signal_of(rack_lane_change), rack_lane_change.times
-    nothing, none = np.zeros(1), np.zeros((1, 1))
-    for segment in range(len(signal.edges) - 1):
-        a, b = signal.edges[segment : segment + 2]
+    ready, times = signal_of(rack_lane_change), rack_lane_change.times
+    edges, n = ready.bundle.edges, 2 * len(model.coordinates)
+    equations, subspaces = model.system.called("full", ""), whole_space(n).subspaces
+    loop, buffer = rhs_loop("full"), np.empty(problem_size(n, len(model.inputs)))
+    for segment in range(len(edges) - 1):
+        a, b = edges[segment : segment + 2]
         last = b == rack_lane_change.duration
         wanted = times[(times >= a) & ((times <= b) if last else (times < b))]
 
         def slope(t, x, dx, segment=segment):
-            model.loops.reduced_slope(
-                FULL_FORM,
-                float(t),
-                segment,
-                x,
-                len(x),
-                signal.arrays,
-                nothing,
-                none,
-                none,
-                model.machine,
-                dx,
-            )
+            loop(x, equations, ready, subspaces, Place(float(t), segment, 0), buffer, dx)
 
         yield a, b, wanted, slope
 

@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuvers import lane_change
-from vehiclemor.models.independent_suspension import definition as independent_suspension_vehicle
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.integrators.structures import FINISHED
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000
 FULL = {
-    "explicit 1e-6": ("explicit", 1e-6),
-    "explicit 1e-3": ("explicit", 1e-3),
+    "explicit 1e-6": ("dopri5", 1e-6),
+    "explicit 1e-3": ("dopri5", 1e-3),
     "RODAS4 1e-4": ("rodas4", 1e-4),
     "ROS34PW2 2e-3, one Jacobian": ("ros34pw2", 2e-3),
 }
@@ -46,7 +47,9 @@ def reference(model):
 def test_derivation(benchmark):
     """Symbolic derivation with elimination, common subexpressions and hoisting."""
     benchmark.group = "symbolics"
-    equations = benchmark.pedantic(independent_suspension_vehicle.derive, rounds=3)
+    equations = benchmark.pedantic(
+        component("model", "independent_suspension_vehicle").derive, rounds=3
+    )
     assert isinstance(equations.program, Program)
 
 
@@ -68,17 +71,15 @@ def test_full_order(benchmark, model, reference, label):
     solver, tolerance = FULL[label]
     run = model.simulate(lane_change, None, None, solver, tolerance)
     whole = whole_space(2 * len(model.coordinates))
-    arguments = model.system.arguments(
-        lane_change, model.start(), whole, solver, tolerance, lane_change.times
-    )
+    how = Solver(solver, tolerance, lane_change.times)
+    loop, arguments = model.system.prepared(lane_change, model.start(), whole, how)
 
     def whole_run():
         # The loop stops at a number of calls, which its counts add up.
-        arguments[-1][:] = 0
-        return model.loops.run(*arguments)
+        arguments.output.counts[:] = 0
+        return loop(*arguments)
 
-    status, _ = benchmark(whole_run)
-    assert status == 0
+    assert benchmark(whole_run) == FINISHED
     error = np.abs(run.outputs - reference.outputs).max(axis=0)
     lateral, yaw = (model.outputs.index(name) for name in ("lateral_position", "yaw"))
     benchmark.extra_info |= run.counts

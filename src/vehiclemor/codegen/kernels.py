@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -117,13 +118,11 @@ def _machine(source: KernelSource) -> tuple[int, Any, MachineCode]:
 
 def kernel_sources(text: str) -> dict[str, KernelSource]:
     """Sources of the kernels in a text, by name."""
-    import ast
-
     from vehiclemor.codegen.llvm_kernels import KernelText
 
     found = {}
-    for node in ast.parse(text).body:
-        kernel = KernelText(f"{ast.unparse(node)}\n")
+    for part in re.split(r"\n+(?=def )", text.strip()):
+        kernel = KernelText(f"{part}\n")
         sizes = tuple(kernel.sizes[name] for name in kernel.pointers)
         arguments = tuple(kernel.pointers)
         found[kernel.name] = KernelSource(

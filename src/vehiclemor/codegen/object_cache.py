@@ -15,6 +15,9 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+from vehiclemor.errors import FileError
+from vehiclemor.files import write_whole
+
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
@@ -50,7 +53,7 @@ def _folder(chosen: str | None) -> Path:
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
         reason = _distrust(folder.stat())
@@ -69,7 +72,7 @@ def _distrust(status: os.stat_result) -> str:
     if status.st_uid != os.geteuid():
         return "it belongs to another user"
     if status.st_mode & OTHERS_WRITE:
-        return "other users can write it"
+        return "other users can write it, see chmod go-w"
     return ""
 
 
@@ -88,7 +91,7 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     if content is None:
         content = make()
         digest = hashlib.sha256(content).hexdigest().encode()
-        write_whole(path, digest + b"\n" + content)
+        _keep(path, digest + b"\n" + content)
     return content
 
 
@@ -108,10 +111,15 @@ def _checked(path: Path) -> bytes | None:
     return None
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name, then move it into place; its folder is made."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    os.replace(temporary, path)
+def _keep(path: Path, content: bytes) -> None:
+    """Write a file of the cache that nobody else can write; without room for it, go on."""
+
+    def write(temporary: Path) -> None:
+        temporary.touch(0o600)
+        temporary.write_bytes(content)
+
+    try:
+        path.parent.mkdir(mode=0o700, exist_ok=True)
+        write_whole(path, write)
+    except (OSError, FileError) as error:
+        _LOG.warning("%s is not kept: %s", path, error)

@@ -137,7 +137,7 @@ ALGEBRAIC_OPEN: Mapping[str, tuple[Value, ...]] = {
 DYNAMIC_OPEN: Mapping[str, tuple[Value, ...]] = {
     "formulation": ("coordinates", "state"),
     "inner_product": ("energy", "euclidean"),
-    "solver": ("explicit", "rodas4"),
+    "solver": ("dopri5", "rodas4"),
     "tolerance": (1e-6, 1e-4, 1e-3),
 }
 _ALGEBRAIC = ModelReport(

@@ -8,7 +8,7 @@ import numpy as np
 
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.structures import Signal
+from vehiclemor.simulation.integrators.structures import Place, Signal
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
 if TYPE_CHECKING:
@@ -32,14 +32,14 @@ def reduced_jacobian(
     loop = catalogue.rhs_loop(windows.formulation)
     equations = model.system.called(windows.formulation, "")
     buffer = np.empty(catalogue.problem_size(n, len(model.inputs)))
-    columns = []
+    place, columns = Place(0.0, 0, window), []
     for j in range(dim):
         step = 1e-6 * max(1.0, abs(y[j]))
         sides = []
         for sign in (1.0, -1.0):
             shifted, image = y.copy(), np.empty(dim)
             shifted[j] += sign * step
-            loop(shifted, equations, signal, windows.subspaces, window, buffer, image)
+            loop(shifted, equations, signal, windows.subspaces, place, buffer, image)
             sides.append(image)
         columns.append((sides[0] - sides[1]) / (2.0 * step))
     return np.column_stack(columns)

@@ -100,7 +100,7 @@ def simulate_projected(
     path, counts = [x], np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
     space = whole_space(2 * len(model.coordinates))
     for (a, b), u in zip(pairwise(times), inputs[1:], strict=True):
-        part = free.integrate(_later(maneuver, a, b), x, space, "explicit", tolerance)
+        part = free.integrate(_later(maneuver, a, b), x, space, "dopri5", tolerance)
         if part.status != "ok":
             raise ConvergenceError(f"{model.name}: {part.message} after t = {a:g} s")
         counts += list(part.counts.values())

@@ -93,6 +93,21 @@ class Solver(NamedTuple):
     longest_step: float | None = None
 
 
+class RunArguments(NamedTuple):
+    """Arguments of the compiled time loop, see `integrators/loop.integrate`."""
+
+    start: np.ndarray
+    equations: Ready
+    signal: Ready
+    spans: Ready
+    subspaces: Ready
+    method: Ready
+    control: Ready
+    output: Output
+    buffer: np.ndarray
+    integers: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class System:
     """A first-order system whose right-hand side is machine code.
@@ -227,14 +242,14 @@ class System:
             If a value is out of bounds or a name is unknown.
         """
         loop, arguments = self.prepared(maneuver, state, windows, solver)
-        output: Output = arguments[7]
+        output = arguments.output
         status, seconds = timed(loop.prepared(*arguments), output.counts)
-        failure = f"{REASONS[status]} at t = {arguments[8][0]:.6g} s" if status else ""
+        failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
         return Run(output.samples, output.path, output.counts, seconds, failure)
 
     def prepared(
         self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
-    ) -> tuple[Loop, tuple]:
+    ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
         times = maneuver.times if solver.times is None else loop_array(solver.times)
         longest = solver.longest_step
@@ -252,7 +267,7 @@ class System:
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(state)
         formulation = chosen.formulation if full else windows.formulation
-        arguments = (
+        arguments = RunArguments(
             loop_array(state),
             self.called(formulation, fused),
             signal,

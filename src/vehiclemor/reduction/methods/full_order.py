@@ -36,7 +36,7 @@ class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
     solver: Annotated[str, one_of(tuple(INTEGRATORS))] = Field(
-        "explicit",
+        "dopri5",
         description="explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
         "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "
         "etdrk4: exponential method of order 4; exponential_adams: of order 6, for high accuracy",

@@ -138,7 +138,7 @@ def _fitted_on_rates(
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
         np.concatenate([3.0 * largest(z), [10.0, 1.0, 10.0, 10.0]]),
         Offline(),
-        "explicit",
+        "dopri5",
         REFIT_TOLERANCE,
         modes.symmetric,
     )

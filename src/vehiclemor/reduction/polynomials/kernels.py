@@ -1,5 +1,6 @@
 """Compiled polynomials: loops with sizes that the compiler knows, one module for each size."""
 
+from functools import cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -79,6 +80,7 @@ def _nested(array: str, first: int, row: int, rank: int, degree: int) -> str:
     return part(())
 
 
+@cache
 def map_loop(states: int, degree: int) -> Loop:
     """Compiled loop of `states` polynomials of that degree in one variable."""
     sizes = {"N": states, "DEGREE": degree}
@@ -87,6 +89,7 @@ def map_loop(states: int, degree: int) -> Loop:
     ]
 
 
+@cache
 def residual_loop(name: str, inputs: int, rank: int, degree: int) -> Loop:
     """Compiled loop of `rank` polynomial equations with so many inputs."""
     # The shared small solve is one of N equations: here these are the reduced ones.

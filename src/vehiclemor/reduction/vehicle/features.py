@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -64,9 +65,12 @@ class Features:
 
     def at(self, z: np.ndarray, u: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""
-        kernels = Kernels(kernel_sources(columns_text(self)))
         sizes = self.states, self.inputs, len(self.terms)
-        return along(kernels, "columns", parameters, (z, u), sizes)
+        return along(self._columns, "columns", parameters, (z, u), sizes)
+
+    @cached_property
+    def _columns(self) -> Kernels:
+        return Kernels(kernel_sources(columns_text(self)))
 
     def system(
         self,

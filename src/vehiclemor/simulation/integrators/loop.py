@@ -30,6 +30,7 @@ from vehiclemor.simulation.integrators.structures import (
     Equations,
     Method,
     Output,
+    Place,
     Problem,
     Signal,
     Spans,
@@ -204,7 +205,9 @@ def over_span(problem, t, end, h, method, control, work, samples, sample, path, 
             factor = min(1.0, factor)
             rejected = False
         for i in range(len(y)):
-            y[i], f[i] = work.new[i], work.f_new[i]
+            y[i] = work.new[i]
+        for i in range(len(f)):
+            f[i] = work.f_new[i]
         whole = t + 1.0001 * h <= end
         t += h
         # A step that was cut at the end of the span says nothing against longer ones.
@@ -217,12 +220,13 @@ def rhs_at(
     equations: Equations,
     signal: Signal,
     subspaces: Subspaces,
-    window: Int,
+    place: Place,
     buffer: Vector,
     result: Vector,
 ) -> Int:
-    """Right-hand side of the projected system of one window at time zero."""
-    sizes = subspaces.means.shape[1], signal.coefficients.shape[1]
-    problem = on_span(equations, signal, subspaces, 0, window, sizes, buffer)
-    rhs(problem, 0.0, y, result)
+    """Right-hand side at reduced coordinates y (dim,); the state is as long as the scale."""
+    sizes = len(equations.error_scale), signal.coefficients.shape[1]
+    segment, window = place.segment, place.window
+    problem = on_span(equations, signal, subspaces, segment, window, sizes, buffer)
+    rhs(problem, place.time, y, result)
     return 0

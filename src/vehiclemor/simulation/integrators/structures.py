@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Cube, Float, IntVector, Matrix, Vector
+from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
 
 # Places of a system's kernels in its list of addresses; see `System`.
 DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, FUSED_STEP = range(5)
@@ -66,6 +66,14 @@ class Spans(NamedTuple):
     edges: Vector
     segments: IntVector
     windows: IntVector
+
+
+class Place(NamedTuple):
+    """A point of a run: time in s, segment of the signal, projection window."""
+
+    time: Float
+    segment: Int
+    window: Int
 
 
 class Subspaces(NamedTuple):
