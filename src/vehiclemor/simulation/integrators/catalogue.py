@@ -67,6 +67,8 @@ class Integrator:
     ----------
     summary
         One line.
+    order
+        Power of the step size with which the error at the end of a run falls.
     control
         Its step-size control.
     modules
@@ -85,6 +87,7 @@ class Integrator:
     """
 
     summary: str
+    order: int
     control: StepControl
     modules: tuple[str, ...]
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
@@ -128,11 +131,13 @@ def modal_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
 INTEGRATORS = {
     "dopri5": Integrator(
         "Dormand-Prince 5(4), explicit",
+        5,
         StepControl(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=False),
         ("dopri5",),
     ),
     "rodas4": Integrator(
         "Rosenbrock method of order 4, fresh Jacobians",
+        4,
         StepControl(1.0 / 4.0, 1.0 / 4.0),
         ("cubic", "dense_solves", "rodas4"),
         tableaus.rodas4(),
@@ -140,6 +145,7 @@ INTEGRATORS = {
     ),
     "ros34pw2": Integrator(
         "W-method of order 3, one Jacobian for all runs",
+        3,
         StepControl(1.0 / 3.0, 1.0 / 3.0),
         ("step_grid", "cubic", "ros34pw2"),
         tableaus.ros34pw2(),
@@ -149,6 +155,7 @@ INTEGRATORS = {
     ),
     "etdrk4": Integrator(
         "exponential method of order 4, with the same",
+        4,
         StepControl(
             0.175,
             0.25,
@@ -166,12 +173,13 @@ INTEGRATORS = {
     ),
     "exponential_adams": Integrator(
         "exponential Adams method of order up to 6, with the same",
+        6,
         StepControl(
             1.0 / 6.0,
             1.0 / 4.0,
             shrink_least=0.3,
             shrink=0.3,
-            grow=4.0,
+            grow=3.0,
             safety=0.8,
             keep_least=0.97,
             keep_most=1.18,

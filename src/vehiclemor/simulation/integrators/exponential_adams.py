@@ -47,8 +47,11 @@ INLINED = (
 MOST_ORDER, KEPT, PHI = 5, 7, 6
 # By order: the error of the corrector over its distance from the predictor, for constant steps.
 SHARE = (0.0, 1 / 2, 1 / 5, 1 / 9, 19 / 251, 27 / 475)
+# Error of the quintic between equal steps over the fifth difference of the slopes: linear motion has
+# no error at the end of a step, however long, but there.
+INTERPOLATION = 2e-4
 # Longest first step of a span in s, of order 1.
-FIRST_STEP = 1e-3
+FIRST_STEP = 1e-4
 # The step grows by no more once the order is the highest.
 GROW = 2.0
 # Places: newest step in the ring of those kept, their number, order, index of the grid, steps with
@@ -193,6 +196,9 @@ def longest_step(h, method, control, work):
     elif places[ORDER] == MOST_ORDER:
         most = 1.0 if places[HOLD] > 0 else GROW
         h = min(h, most * numbers[MEMORY, LAST])
+    if places[INDEX] > 0:
+        # Shorter steps than those of the grid only where its shortest has failed.
+        h = max(h, method.grid[0])
     places[INDEX] = index_below(method.grid, places[INDEX], h)
     return min(h, method.grid[places[INDEX]])
 
@@ -220,8 +226,12 @@ def step(problem, t, h, method, work, counts):
     counts[RHS_CALLS] += 1
     record(method, work, KEPT, work.f_new, work.predictor, work.modal[PREDICTED])
     correct(h, stretch, method, work)
+    # The shortest step of the grid is as good as a point in time.
+    between = INTERPOLATION * h if h > 1.0001 * method.grid[0] else 0.0
+    difference = work.sums[1]
     for i in range(len(work.y)):
-        work.error[i] = SHARE[k] * (work.new[i] - work.predictor[i])
+        distance = SHARE[k] * abs(work.new[i] - work.predictor[i])
+        work.error[i] = distance + between * abs(difference[i])
     return True
 
 
