@@ -47,8 +47,8 @@ INLINED = (
 MOST_ORDER, KEPT, PHI = 5, 7, 6
 # By order: the error of the corrector over its distance from the predictor, for constant steps.
 SHARE = (0.0, 1 / 2, 1 / 5, 1 / 9, 19 / 251, 27 / 475)
-# Error of the quintic between equal steps over the fifth difference of the slopes: linear motion has
-# no error at the end of a step, however long, but there.
+# Error of the quintic between equal steps over the fifth difference of the slopes: there linear
+# motion has an error, which it has not at the end of a step, however long.
 INTERPOLATION = 2e-4
 # Longest first step of a span in s, of order 1.
 FIRST_STEP = 1e-4

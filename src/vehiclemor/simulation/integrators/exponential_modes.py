@@ -117,7 +117,7 @@ def _invariant_subspace(jacobian: np.ndarray, values: np.ndarray, chosen: np.nda
 
 def _real_basis(basis: np.ndarray) -> np.ndarray:
     """Orthonormal real basis of a subspace that contains the conjugates of its vectors."""
-    return np.linalg.svd(np.hstack([basis.real, basis.imag]))[0][:, : basis.shape[1]]
+    return np.linalg.svd(np.hstack([np.real(basis), np.imag(basis)]))[0][:, : basis.shape[1]]
 
 
 def _add_real_modes(basis: np.ndarray, block: np.ndarray, singles: list, pairs: list) -> None:
