@@ -15,7 +15,6 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
 from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.exponential_functions import block_functions
 from vehiclemor.simulation.integrators.structures import (
     NOT_FINITE,
     SINGULAR,
@@ -213,9 +212,8 @@ class System:
         if key not in self._ready:
             chosen = catalogue.integrator(solver)
             grid, stored = catalogue.STEP_GRID, catalogue.Stored(catalogue.NOTHING)
-            if solver in self.fused and self.diagonal:
-                blocks = block_functions(self.frozen_jacobian, self.diagonal, grid)
-                stored = catalogue.Stored(blocks)
+            if solver in self.fused and chosen.block_operators:
+                stored = chosen.block_operators(self.frozen_jacobian, self.diagonal)
             elif chosen.operators is not None:
                 own = chosen.formulation == "vehicle_frame"
                 jacobian = self.turning_jacobian if own else self.frozen_jacobian
@@ -266,6 +264,7 @@ class System:
         fused = self.fused.get(name, "") if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(state)
+        assert dim == n or not full, f"{n} states in a space of {dim} dimensions"
         formulation = chosen.formulation if full else windows.formulation
         arguments = RunArguments(
             loop_array(state),

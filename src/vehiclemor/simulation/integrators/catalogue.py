@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -79,11 +79,13 @@ class Integrator:
         Makes what is stored of a frozen Jacobian (dim, dim) and the active states; none for a
         method with fresh Jacobians or without any.
     fused_modules
-        The same for systems with a kernel that takes whole steps.
+        Modules for systems with a kernel that takes whole steps.
     formulation
         Of the full system.
     rows, squares, fused_squares, numbers
         Scratch space: vectors and matrices of the system's dimension, and single numbers.
+    block_operators
+        Makes operators of diagonal blocks alone, where a kernel that takes whole steps wants those.
     """
 
     summary: str
@@ -98,6 +100,7 @@ class Integrator:
     squares: int = 0
     fused_squares: int = 0
     numbers: int = 16
+    block_operators: Callable[[np.ndarray, Sequence[Sequence[int]]], Stored] | None = None
 
 
 def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
@@ -126,6 +129,11 @@ def modal_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
     shared = [np.pad(part, ((0, 0), (0, n - part.shape[1]))) for part in parts]
     tables = exponential_modes.modal_tables(found, STEP_GRID, PHI)
     return Stored(tables, np.ascontiguousarray(np.vstack(shared)))
+
+
+def block_matrix_functions(jacobian: np.ndarray, blocks: Sequence[Sequence[int]]) -> Stored:
+    """The same of diagonal blocks alone, numbers of the states by block."""
+    return Stored(exponential_functions.block_functions(jacobian, blocks, STEP_GRID))
 
 
 INTEGRATORS = {
@@ -167,6 +175,7 @@ INTEGRATORS = {
         ),
         ("step_grid", "cubic", "etdrk4"),
         operators=matrix_functions,
+        block_operators=block_matrix_functions,
         fused_modules=("step_grid", "cubic", "etdrk4", "fused_etdrk4"),
         rows=32,
         fused_squares=7,

@@ -26,7 +26,7 @@ E1, E3, E4, E5, E6, E7 = (
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("begin", "accept", "longest_step", "step", "prepare_curve", "interpolate")
+INLINED = ("accept", "longest_step", "step")
 
 
 def work_space(buffer, first, integers, dim, inputs):

@@ -14,7 +14,7 @@ from vehiclemor.simulation.integrators.step_grid import index_below, nearest_ind
 from vehiclemor.simulation.integrators.structures import FUSED_STEP, RHS_CALLS, Work
 
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("begin", "accept", "longest_step", "step", "keep_past", "prepare_curve")
+INLINED = ("accept", "longest_step", "step", "keep_past", "prepare_curve")
 
 
 def work_space(buffer, first, integers, dim, inputs):

@@ -19,7 +19,7 @@ from vehiclemor.simulation.integrators.structures import (
 
 ALPHA = 8
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("begin", "accept", "longest_step", "step")
+INLINED = ("accept", "longest_step", "step")
 
 
 def work_space(buffer, first, integers, dim, inputs):

@@ -37,8 +37,6 @@ from vehiclemor.simulation.integrators.structures import (
     Subspaces,
 )
 
-INLINED = ("over_span", "on_span", "scratch_end")
-
 
 def integrate(
     start: Vector,

@@ -23,7 +23,7 @@ GAMMA = 0.25
 S = 6
 ALPHA, D, M, E = 12, 13, 14, 15
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("begin", "accept", "longest_step", "step")
+INLINED = ("accept", "longest_step", "step")
 
 
 def work_space(buffer, first, integers, dim, inputs):

@@ -16,7 +16,7 @@ from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALL
 GAMMA = 4.3586652150845900e-01
 ALPHA, M, E = 8, 9, 10
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("begin", "accept", "longest_step", "step")
+INLINED = ("accept", "longest_step", "step")
 
 
 def work_space(buffer, first, integers, dim, inputs):
