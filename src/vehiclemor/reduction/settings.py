@@ -47,7 +47,7 @@ def one_of(choices: tuple[str, ...]) -> AfterValidator:
 Solver = Annotated[
     str,
     one_of(tuple(INTEGRATORS)),
-    Field(description="as of full_order; ros34pw2 and etdrk4 freeze the Jacobian"),
+    Field(description="as of full_order; all but dopri5 and rodas4 freeze the Jacobian"),
 ]
 # Projected systems have no Jacobian to freeze.
 ProjectedSolver = Annotated[

@@ -134,8 +134,9 @@ class DynamicModel(Model):
         solver
             `dopri5`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
             Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
-            straight running, for all steps and runs.  `etdrk4`: exponential Runge-Kutta method of
-            order 4, with the same.
+            straight running, for all steps and runs.  With the same `etdrk4`: exponential
+            Runge-Kutta method of order 4, and `exponential_adams`: exponential Adams method of
+            order up to 6.
         tolerance
             Largest local error of a state relative to its typical size plus its own.
         longest_step

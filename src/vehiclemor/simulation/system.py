@@ -40,6 +40,7 @@ REASONS = {
 # Kernels that a formulation calls; a fused step comes besides.
 CALLED = {
     "full": ("derivative",),
+    "vehicle_frame": ("derivative",),
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
 }
@@ -153,7 +154,15 @@ class System:
         places = ("derivative", "outputs", "second_order", "speeds")
         found = [self.kernels.address(name) if name in names else 0 for name in places]
         found.append(self.kernels.address(fused) if fused else 0)
-        return Equations(np.array(found, dtype=np.int64), self.constants, self.error_scale)
+        kernels = np.array(found, dtype=np.int64)
+        return Equations(kernels, self.constants, self.error_scale, self.turning)
+
+    @cached_property
+    def turning(self) -> np.ndarray:
+        """Numbers of the heading and of those pairs that turn with it which the rates depend on."""
+        pairs = self.rotating[1:].reshape(-1, 2)
+        pairs = pairs[np.isin(pairs, self.active).all(axis=1)]
+        return np.concatenate([self.rotating[:1], pairs.ravel()])
 
     def jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """df/dx (dim, dim) by central differences; columns of inactive states are zero."""
@@ -174,6 +183,25 @@ class System:
         return self.jacobian(self.reference, np.zeros(self.inputs))
 
     @cached_property
+    def turning_jacobian(self) -> np.ndarray:
+        """The same of the formulation `vehicle_frame`; the heading of the reference is zero."""
+        jacobian, x = self.frozen_jacobian.copy(), self.reference
+        if not len(self.turning):
+            return jacobian
+        heading, pairs = self.turning[0], self.turning[1:].reshape(-1, 2)
+        (rates,) = self.along("derivative", x[None], np.zeros((1, self.inputs)), len(x))
+        for a, b in pairs:
+            jacobian[:, heading] += x[a] * jacobian[:, b] - x[b] * jacobian[:, a]
+        for a, b in pairs:
+            jacobian[a] += x[b] * jacobian[heading]
+            jacobian[b] -= x[a] * jacobian[heading]
+            jacobian[a, heading] += rates[b]
+            jacobian[b, heading] -= rates[a]
+            jacobian[a, b] += rates[heading]
+            jacobian[b, a] -= rates[heading]
+        return jacobian
+
+    @cached_property
     def _ready(self) -> dict[tuple, Ready]:
         # What integrators store of the frozen Jacobian is made when it is first used.
         return {}
@@ -183,14 +211,15 @@ class System:
         key = solver, active.tobytes()
         if key not in self._ready:
             chosen = catalogue.integrator(solver)
-            if chosen.operators is None:
-                operators = np.zeros((1, 1, 1))
-            elif solver in self.fused and chosen.block_operators:
-                operators = chosen.block_operators(self.frozen_jacobian, self.diagonal)
-            else:
-                operators = chosen.operators(self.frozen_jacobian, active)
-            grid = catalogue.STEP_GRID
-            self._ready[key] = ready(Method(chosen.tableau, grid, operators, active, self.rotating))
+            grid, stored = catalogue.STEP_GRID, catalogue.Stored(catalogue.NOTHING)
+            if solver in self.fused and chosen.block_operators:
+                stored = chosen.block_operators(self.frozen_jacobian, self.diagonal)
+            elif chosen.operators is not None:
+                own = chosen.formulation == "vehicle_frame"
+                jacobian = self.turning_jacobian if own else self.frozen_jacobian
+                stored = chosen.operators(jacobian, active)
+            method = Method(chosen.tableau, grid, *stored, active, self.rotating)
+            self._ready[key] = ready(method)
         return self._ready[key]
 
     def called(self, formulation: str, fused: str) -> Ready:
@@ -236,9 +265,10 @@ class System:
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(state)
         assert dim == n or not full, f"{n} states in a space of {dim} dimensions"
+        formulation = chosen.formulation if full else windows.formulation
         arguments = RunArguments(
             loop_array(state),
-            self.called(windows.formulation, fused),
+            self.called(formulation, fused),
             signal,
             windows.spans(signal.bundle.edges, end),
             windows.subspaces,
@@ -250,6 +280,6 @@ class System:
                 np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64),
             ),
             np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, bool(fused))),
-            np.empty(dim + 4, dtype=np.int64),
+            np.empty(dim + 8, dtype=np.int64),
         )
-        return catalogue.time_loop(chosen, windows.formulation, bool(fused)), arguments
+        return catalogue.time_loop(chosen, formulation, bool(fused)), arguments

@@ -35,8 +35,8 @@ class DynamicSettings(OnlineSettings):
     solver: Annotated[str, one_of(tuple(INTEGRATORS))] = Field(
         "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
-        "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; etdrk4: exponential "
-        "method of order 4, with the same",
+        "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "
+        "etdrk4: exponential method of order 4; exponential_adams: of order 6, for high accuracy",
     )
     tolerance: Tolerance = 1e-6
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
-from vehiclemor.simulation.integrators import exponential_functions, tableaus
+from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
 from vehiclemor.simulation.integrators.structures import Control
 
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
@@ -21,6 +22,7 @@ STEP_GRID = 2.0 ** (0.125 * np.arange(-128, 25))
 MOST_CALLS = 100_000
 # Longest first step (s) after a break point of the inputs.
 RESTART = 0.05
+NOTHING = np.zeros((1, 1, 1))
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,26 @@ class StepControl:
     shrink_least: float = 0.1
     shrink: float = 0.2
     grow: float = 6.0
+    safety: float = 0.9
+    keep_least: float = 1.0
+    keep_most: float = 1.0
     halve_last: bool = True
     shortest_first: float = 0.0
+
+
+class Stored(NamedTuple):
+    """What is stored of a frozen Jacobian.
+
+    Attributes
+    ----------
+    operators
+        For every step size: (step sizes, rows, columns).
+    shared
+        For all of them: (rows, columns).
+    """
+
+    operators: np.ndarray
+    shared: np.ndarray = NOTHING[0]
 
 
 @dataclass(frozen=True)
@@ -56,12 +76,14 @@ class Integrator:
     tableau
         Its coefficients.
     operators
-        Makes what is stored of a frozen Jacobian (dim, dim) and the active states for every step
-        size: (step sizes, rows, dim); none for a method with fresh Jacobians or without any.
+        Makes what is stored of a frozen Jacobian (dim, dim) and the active states; none for a
+        method with fresh Jacobians or without any.
     fused_modules
         Modules for systems with a kernel that takes whole steps.
-    rows, squares, fused_squares
-        Scratch space: vectors and matrices of the system's dimension.
+    formulation
+        Of the full system.
+    rows, squares, fused_squares, numbers
+        Scratch space: vectors and matrices of the system's dimension, and single numbers.
     block_operators
         Makes operators of diagonal blocks alone, where a kernel that takes whole steps wants those.
     """
@@ -71,33 +93,47 @@ class Integrator:
     control: StepControl
     modules: tuple[str, ...]
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
-    operators: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    operators: Callable[[np.ndarray, np.ndarray], Stored] | None = None
     fused_modules: tuple[str, ...] = ()
+    formulation: str = "full"
     rows: int = 24
     squares: int = 0
     fused_squares: int = 0
-    block_operators: Callable[[np.ndarray, Sequence[Sequence[int]]], np.ndarray] | None = None
+    numbers: int = 16
+    block_operators: Callable[[np.ndarray, Sequence[Sequence[int]]], Stored] | None = None
 
 
-def inverses(jacobian: np.ndarray, active: np.ndarray) -> np.ndarray:
+def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
     """Transposed active columns (step sizes, active, dim) of (I - gamma h J)^-1."""
     from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
 
     identity = np.eye(len(jacobian))
     found = [np.linalg.inv(identity - GAMMA * h * jacobian) for h in STEP_GRID]
-    return np.ascontiguousarray([inverse.T[active] for inverse in found])
+    return Stored(np.ascontiguousarray([inverse.T[active] for inverse in found]))
 
 
-def matrix_functions(jacobian: np.ndarray, active: np.ndarray) -> np.ndarray:
+def matrix_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
     """Matrix functions (step sizes, 7 dim, dim) of the exponential method."""
     del active
     tables = exponential_functions.exponential_tables(jacobian, STEP_GRID)
-    return np.ascontiguousarray(tables.reshape(len(STEP_GRID), -1, tables.shape[-1]))
+    return Stored(np.ascontiguousarray(tables.reshape(len(STEP_GRID), -1, tables.shape[-1])))
 
 
-def block_matrix_functions(jacobian: np.ndarray, blocks: Sequence[Sequence[int]]) -> np.ndarray:
+def modal_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
+    """Functions of the modes; transposed S and T, and the rest of `exponential_modes.Modes`."""
+    from vehiclemor.simulation.integrators.exponential_adams import PHI
+
+    del active
+    found, n = exponential_modes.modes(jacobian), len(jacobian)
+    parts = [found.rows.T, found.columns.T, found.rates[None], found.forth[None], found.back[None]]
+    shared = [np.pad(part, ((0, 0), (0, n - part.shape[1]))) for part in parts]
+    tables = exponential_modes.modal_tables(found, STEP_GRID, PHI)
+    return Stored(tables, np.ascontiguousarray(np.vstack(shared)))
+
+
+def block_matrix_functions(jacobian: np.ndarray, blocks: Sequence[Sequence[int]]) -> Stored:
     """The same of diagonal blocks alone, numbers of the states by block."""
-    return exponential_functions.block_functions(jacobian, blocks, STEP_GRID)
+    return Stored(exponential_functions.block_functions(jacobian, blocks, STEP_GRID))
 
 
 INTEGRATORS = {
@@ -144,6 +180,25 @@ INTEGRATORS = {
         rows=32,
         fused_squares=7,
     ),
+    "exponential_adams": Integrator(
+        "exponential Adams method of order up to 6, with the same",
+        6,
+        StepControl(
+            1.0 / 6.0,
+            1.0 / 4.0,
+            shrink_least=0.3,
+            shrink=0.3,
+            grow=3.0,
+            safety=0.8,
+            keep_least=0.97,
+            keep_most=1.18,
+        ),
+        ("step_grid", "adams_weights", "exponential_adams"),
+        operators=modal_functions,
+        formulation="vehicle_frame",
+        rows=65,
+        numbers=64,
+    ),
 }
 # Older name of an integrator.
 ALIASES = {"explicit": "dopri5"}
@@ -178,6 +233,7 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
         own.shortest_first,
         RESTART,
         float(MOST_CALLS),
+        own.safety,
         own.exponent,
         own.memory_exponent,
         own.memory_start,
@@ -186,16 +242,19 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
         own.shrink_least,
         own.shrink,
         own.grow,
+        own.keep_least,
+        own.keep_most,
         float(own.halve_last),
     )
     return ready(control)
 
 
 def _problem_modules(formulation: str) -> tuple[str, ...]:
+    # What a formulation doesn't say is as of the full system.
+    own = dict.fromkeys(("inputs", "full", formulation))
     return (
         "simulation.integrators.structures",
-        "simulation.formulations.inputs",
-        f"simulation.formulations.{formulation}",
+        *(f"simulation.formulations.{name}" for name in own),
     )
 
 
@@ -225,12 +284,14 @@ def problem_size(n: int, inputs: int) -> int:
 def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, fused: bool) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs."""
     squares = chosen.fused_squares if fused else chosen.squares
-    return problem_size(n, inputs) + chosen.rows * dim + squares * dim * dim + 3 * inputs + 16
+    own = chosen.rows * dim + squares * dim * dim + 3 * inputs + chosen.numbers
+    return problem_size(n, inputs) + own
 
 
+FORMULATIONS = ("inputs", "full", "vehicle_frame", "state", "coordinates")
 # All source that a run may be compiled from.
 LOOP_SOURCES = (
-    *(f"simulation.formulations.{name}" for name in ("inputs", "full", "state", "coordinates")),
+    *(f"simulation.formulations.{name}" for name in FORMULATIONS),
     *(
         f"simulation.integrators.{name}"
         for own in INTEGRATORS.values()

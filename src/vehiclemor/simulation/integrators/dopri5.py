@@ -59,7 +59,7 @@ def begin(problem, t, method, work):
     rhs(problem, t, work.y, work.f)
 
 
-def longest_step(h, method, work):
+def longest_step(h, method, control, work):
     """Any step size will do."""
     return h
 

@@ -80,7 +80,7 @@ def begin(problem, t, method, work):
         work.stages[Y_PAST, i], work.stages[F_PAST, i] = work.y[i], work.f[i]
 
 
-def longest_step(h, method, work):
+def longest_step(h, method, control, work):
     """The longest step of the grid that is not above h."""
     work.places[0] = index_below(method.grid, work.places[0], h)
     return min(h, method.grid[work.places[0]])
@@ -135,7 +135,7 @@ def take_stages(problem, t, h, stretch, method, work):
     dim = len(y)
     operators = method.operators[work.places[0]]
     turns = len(method.rotating) > 0
-    cosine, sine = heading_of(method, y)
+    cosine, sine = heading_of(method.rotating, y)
     for i in range(dim):
         f1[i] = work.f[i]
     if turns:
@@ -184,7 +184,7 @@ def estimate_error(h, stretch, method, work):
     dim = len(y)
     operators = method.operators[work.places[0]]
     turns = len(method.rotating) > 0
-    cosine, sine = heading_of(method, y)
+    cosine, sine = heading_of(method.rotating, y)
     at_past, at_half, at_end = quadrature_weights(work.memory[0], h)
     for i in range(dim):
         v[i] = y[i] - rows[Y_PAST, i]

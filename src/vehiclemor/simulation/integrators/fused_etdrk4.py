@@ -62,7 +62,7 @@ def keep_past(work):
         work.given[2 * dim + i] = work.given[i]
 
 
-def longest_step(h, method, work):
+def longest_step(h, method, control, work):
     """The longest step of the grid that is not above h."""
     work.places[0] = index_below(method.grid, work.places[0], h)
     return min(h, method.grid[work.places[0]])

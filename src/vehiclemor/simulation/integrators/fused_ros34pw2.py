@@ -56,7 +56,7 @@ def begin(problem, t, method, work):
     work.places[0], work.places[1] = len(method.grid) // 2, -1
 
 
-def longest_step(h, method, work):
+def longest_step(h, method, control, work):
     """Any step size will do: the operator of a step a little longer serves."""
     return h
 

@@ -159,7 +159,7 @@ def over_span(problem, t, end, h, method, control, work, samples, sample, path, 
     while t < end - 1e-12 * (1.0 + abs(end)):
         if counts[RHS_CALLS] > control.most_calls:
             return TOO_MANY_CALLS, t, tried, sample
-        h = longest_step(min(tried, control.longest), method, work)
+        h = longest_step(min(tried, control.longest), method, control, work)
         if t + 1.0001 * h > end:
             h = end - t
         elif control.halve_last > 0.0 and t + 2.0 * h > end:
@@ -179,7 +179,8 @@ def over_span(problem, t, end, h, method, control, work, samples, sample, path, 
                 if tried < 1e-9:
                     return NOT_FINITE, t, tried, sample
                 continue
-            tried = h * max(control.shrink_least, 0.9 * error**-control.rejected_exponent)
+            factor = control.safety * error**-control.rejected_exponent
+            tried = h * max(control.shrink_least, factor)
             continue
         counts[STEPS] += 1
         accept(problem, t, h, method, work, counts)
@@ -193,9 +194,11 @@ def over_span(problem, t, end, h, method, control, work, samples, sample, path, 
         # Proportional and integral control (Hairer, Wanner, Solving Ordinary Differential
         # Equations II, section IV.2): fewer rejections where stability limits the step.
         error = max(error, 1e-10)
-        factor = 0.9 * error**-control.exponent * before**control.memory_exponent
+        factor = control.safety * error**-control.exponent * before**control.memory_exponent
         before = max(error, control.memory_floor)
         factor = min(control.grow, max(control.shrink, factor))
+        if control.keep_least < factor < control.keep_most:
+            factor = 1.0
         if rejected:
             factor = min(1.0, factor)
             rejected = False

@@ -57,7 +57,7 @@ def begin(problem, t, method, work):
     work.places[0] = 0
 
 
-def longest_step(h, method, work):
+def longest_step(h, method, control, work):
     """Any step size will do."""
     return h
 

@@ -49,7 +49,7 @@ def begin(problem, t, method, work):
     work.places[0] = len(method.grid) // 2
 
 
-def longest_step(h, method, work):
+def longest_step(h, method, control, work):
     """Any step size will do: the operator of a step a little longer serves."""
     return h
 
@@ -90,7 +90,7 @@ def step(problem, t, h, method, work, counts):
     work.places[0] = index_above(method.grid, work.places[0], h)
     inverse = method.operators[work.places[0]]
     turns = len(method.rotating) > 0
-    cosine, sine = heading_of(method, y)
+    cosine, sine = heading_of(method.rotating, y)
     scale = GAMMA * h
     for stage in range(4):
         if stage == 0:

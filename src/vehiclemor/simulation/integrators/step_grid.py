@@ -32,11 +32,11 @@ def nearest_index(grid, index, h):
     return index
 
 
-def heading_of(method, y):
+def heading_of(rotating, y):
     """Cosine and sine of the heading; 1 and 0 where nothing turns with it."""
-    if len(method.rotating) == 0:
+    if len(rotating) == 0:
         return 1.0, 0.0
-    heading = y[method.rotating[0]]
+    heading = y[rotating[0]]
     return math.cos(heading), math.sin(heading)
 
 

@@ -42,11 +42,14 @@ class Equations(NamedTuple):
         Hoisted constants of the parameters.
     error_scale
         Magnitude of each state below which errors count absolutely.
+    turning
+        Numbers of the heading and of pairs of velocities that turn with it; may be empty.
     """
 
     kernels: IntVector
     constants: Vector
     error_scale: Vector
+    turning: IntVector
 
 
 class Spans(NamedTuple):
@@ -93,6 +96,8 @@ class Method(NamedTuple):
         Step sizes (s) for which operators are stored.
     operators
         Stored operators of each step size.
+    shared
+        What is stored of the frozen Jacobian for all step sizes.
     active
         Numbers of the states that the right-hand side depends on.
     rotating
@@ -103,6 +108,7 @@ class Method(NamedTuple):
     tableau: Matrix
     grid: Vector
     operators: Cube
+    shared: Matrix
     active: IntVector
     rotating: IntVector
 
@@ -120,6 +126,8 @@ class Control(NamedTuple):
         Longest first step after a break point of the inputs in s.
     most_calls
         Evaluations of the right-hand side after which a run is given up.
+    safety
+        Share of the step size that the error asks for.
     exponent, memory_exponent
         Of this error and of the one before in the factor of the next step.
     memory_start, memory_floor
@@ -128,6 +136,8 @@ class Control(NamedTuple):
         Of the error in the factor after a rejected step.
     shrink_least, shrink, grow
         Smallest factor after a rejected and after an accepted step, largest factor.
+    keep_least, keep_most
+        Factors between which the step size stays.
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
     """
@@ -137,6 +147,7 @@ class Control(NamedTuple):
     shortest_first: Float
     restart: Float
     most_calls: Float
+    safety: Float
     exponent: Float
     memory_exponent: Float
     memory_start: Float
@@ -145,6 +156,8 @@ class Control(NamedTuple):
     shrink_least: Float
     shrink: Float
     grow: Float
+    keep_least: Float
+    keep_most: Float
     halve_last: Float
 
 

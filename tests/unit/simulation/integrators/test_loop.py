@@ -145,6 +145,7 @@ COUNTS = {
     "ros34pw2": lambda spans, attempts, steps: (spans + 3 * attempts + steps, 0, 0, 4 * attempts),
     # The end of a step is evaluated for the estimate of its error.
     "etdrk4": lambda spans, attempts, _: (spans + 4 * attempts, 0, 0, 0),
+    "exponential_adams": lambda spans, attempts, steps: (spans + attempts + steps, 0, 0, 0),
 }
 
 

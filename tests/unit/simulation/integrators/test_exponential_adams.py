@@ -1,0 +1,194 @@
+"""The exponential Adams method: its modes and functions, and systems with defective Jacobians.
+
+N. Higham, Functions of Matrices (SIAM 2008), chapter 10.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.unit.python_system import python_system
+from tests.unit.standard_problems import maneuver
+from vehiclemor.simulation.integrators.exponential_modes import modal_tables, modes
+from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver
+
+SOLVER = "exponential_adams"
+QUIET = maneuver(lambda t, *_: np.zeros((len(t), 3)), 4.0)
+
+
+def jordan(value: float, size: int) -> np.ndarray:
+    return value * np.eye(size) + np.diag(np.ones(size - 1), 1)
+
+
+def block_diagonal(*blocks: np.ndarray) -> np.ndarray:
+    from scipy.linalg import block_diag
+
+    return block_diag(*blocks)
+
+
+OSCILLATOR = np.array([[-1.0, 7.0], [-7.0, -1.0]])
+SPECTRA = {
+    "single and double": block_diagonal(OSCILLATOR, [[-30.0]], [[-4.0]], [[-4.0]]),
+    "the same oscillator twice": block_diagonal(OSCILLATOR, OSCILLATOR, [[-2.0]]),
+    "three defective pairs": block_diagonal(*[jordan(-50.0, 2)] * 3, OSCILLATOR, [[-500.0]]),
+    "a defective and a plain one": block_diagonal(jordan(-5.0, 2), [[-5.0]], [[-5.0]], [[2.0]]),
+    "zero, defective": block_diagonal(jordan(0.0, 3), OSCILLATOR, [[-3.0]]),
+    "nothing": np.zeros((2, 2)),
+}
+
+
+def similar(matrix: np.ndarray, seed: int) -> np.ndarray:
+    """The matrix in other, not orthogonal, coordinates."""
+    random = np.random.default_rng(seed)
+    one, two = (np.linalg.qr(random.normal(size=matrix.shape))[0] for _ in range(2))
+    scaled = one @ np.diag(np.linspace(1.0, 3.0, len(matrix))) @ two
+    return scaled @ matrix @ np.linalg.inv(scaled)
+
+
+def assembled(found, diagonal, forth, back) -> np.ndarray:
+    """A function of the modes as a matrix (n, n)."""
+    r, pairs = len(found.rates), len(found.forth)
+    one, two = np.arange(r - 2 * pairs, r - pairs), np.arange(r - pairs, r)
+    block = np.diag(diagonal)
+    block[one, two], block[two, one] = forth, back
+    return found.columns @ block @ found.rows
+
+
+@pytest.mark.parametrize("name", SPECTRA)
+@given(seed=st.integers(0, 10**6))
+def test_modes_restore_what_is_not_nilpotent(name, seed):
+    matrix = similar(SPECTRA[name], seed)
+    found = modes(matrix)
+    np.testing.assert_allclose(
+        found.rows @ found.columns, np.eye(len(found.rates)), rtol=0, atol=1e-9
+    )
+    # Of a matrix of zeros and a chain of them nothing is kept.
+    expected = matrix
+    if "zero" in name:
+        expected = similar(block_diagonal(np.zeros((3, 3)), SPECTRA[name][3:, 3:]), seed)
+    restored = assembled(found, found.rates, found.forth, found.back)
+    np.testing.assert_allclose(restored, expected, rtol=0, atol=1e-5 * np.abs(matrix).max() + 1e-9)
+
+
+def test_a_longer_jordan_chain_is_left_out_but_for_its_eigenvalue():
+    found = modes(similar(jordan(-5.0, 3), 1))
+    restored = assembled(found, found.rates, found.forth, found.back)
+    np.testing.assert_allclose(restored, -5.0 * np.eye(3), atol=1e-3)
+
+
+@pytest.mark.parametrize("h", [1e-3, 0.1, 8.0])
+@pytest.mark.parametrize("name", ["three defective pairs", "the same oscillator twice"])
+def test_tables_are_the_phi_functions(name, h):
+    from scipy.linalg import expm
+
+    matrix, highest = similar(SPECTRA[name], 3), 6
+    found, n = modes(matrix), len(matrix)
+    (table,) = modal_tables(found, np.array([h]), highest)
+    # Blocks of one exponential (Higham, theorem 10.15).
+    large = np.zeros(((highest + 1) * n, (highest + 1) * n))
+    large[:n, :n] = h * matrix
+    large[: highest * n, n:] += np.eye(highest * n)
+    exact = expm(large)[:n]
+    r, pairs = len(found.rates), len(found.forth)
+    for k in range(1, highest + 1):
+        parts = table[k - 1, :r], table[k - 1, r : r + pairs], table[k - 1, r + pairs :]
+        np.testing.assert_allclose(
+            assembled(found, *parts), exact[:, k * n : (k + 1) * n], rtol=0, atol=1e-6
+        )
+
+
+def run(system, start, tolerance, times, longest=None):
+    found = system.run(
+        QUIET, np.array(start), whole_space(len(start)), Solver(SOLVER, tolerance, times, longest)
+    )
+    assert not found.failure
+    return found
+
+
+@pytest.mark.parametrize("rate", [1.0, 50.0, 1000.0])
+def test_stabilised_constraint_with_a_defective_jacobian(rate):
+    # e'' + 2 a e' + a^2 e = 0 beside a pendulum, whose Jacobian at rest is not that in motion.
+    def slopes(x, u):
+        del u
+        decay = -2.0 * rate * x[1] - rate**2 * x[0]
+        return [x[1], decay, x[3], -math.sin(x[2]) + x[0]]
+
+    system = python_system(slopes, [0.0, 0.0, 0.0, 0.0], 3)
+    times = np.linspace(0.0, 4.0, 41)
+    found = run(system, [0.1, 0.0, 1.0, 0.0], 1e-9, times)
+    exact = 0.1 * (1.0 + rate * times) * np.exp(-rate * times)
+    np.testing.assert_allclose(found.path[:, 0], exact, atol=2e-8)
+    # Linear motion costs steps until it has decayed, but sets no limit to them later.
+    assert found.counts[1] < 350
+
+
+def test_a_system_without_a_jacobian_is_left_to_the_adams_formulas():
+    # y' = -y^3 at y = 0; the exact solution is 1 / sqrt(1 + 2 t).
+    system = python_system(lambda x, _: [-(x[0] ** 3), 0.0], [0.0, 0.0], 3)
+    assert not np.abs(system.frozen_jacobian).max() > 1e-9
+    times = np.linspace(0.0, 4.0, 9)
+    found = run(system, [1.0, 0.0], 1e-10, times)
+    np.testing.assert_allclose(found.path[:, 0], 1.0 / np.sqrt(1.0 + 2.0 * times), atol=1e-9)
+
+
+# A body in the plane: place, heading, velocity in the ground's frame, yaw rate.
+START = [3.0, -2.0, 0.0, 10.0, 0.5, 0.3]
+
+
+def body(x, u):
+    """A drag that differs along and across, and a moment against slipping."""
+    del u
+    c, s = math.cos(x[2]), math.sin(x[2])
+    along, across = c * x[3] + s * x[4], -s * x[3] + c * x[4]
+    drive, side = 2.0 - 0.2 * along, -8.0 * across - 0.4 * across**3
+    rates = [c * drive - s * side, s * drive + c * side]
+    return [x[3], x[4], x[5], *rates, 0.8 * math.sin(along) + 0.5 * across - 3.0 * x[5]]
+
+
+def turning_body():
+    system = python_system(body, [0.0, 0.0, 0.0, 10.0, 0.0, 0.0], 3)
+    return replace(
+        system, rotating=np.array([2, 0, 1, 3, 4]), active=np.arange(2, 6), error_scale=np.ones(6)
+    )
+
+
+def rotated(states: np.ndarray, angle: float) -> np.ndarray:
+    result = np.array(states, dtype=float)
+    for a, b in ((0, 1), (3, 4)):
+        pair = np.exp(1j * angle) * (result[..., a] + 1j * result[..., b])
+        result[..., a], result[..., b] = pair.real, pair.imag
+    result[..., 2] += angle
+    return result
+
+
+def test_the_jacobian_in_the_vehicles_frame_is_that_of_the_transformed_equations():
+    system, reference = turning_body(), np.array([0.0, 0.0, 0.0, 10.0, 0.0, 0.0])
+    # Velocities alone: of the place only differences of the first order turn with the heading.
+    np.testing.assert_array_equal(system.turning, [2, 3, 4])
+
+    def slopes(y):
+        c, s = math.cos(y[2]), math.sin(y[2])
+        x = [*y[:3], c * y[3] - s * y[4], s * y[3] + c * y[4], y[5]]
+        dx = np.array(body(x, None))
+        a, b = c * dx[3] + s * dx[4], -s * dx[3] + c * dx[4]
+        return np.array([*dx[:3], a + dx[2] * y[4], b - dx[2] * y[3], dx[5]])
+
+    steps = 1e-6 * np.eye(6)
+    columns = [(slopes(reference + e) - slopes(reference - e)) / 2e-6 for e in steps]
+    np.testing.assert_allclose(system.turning_jacobian, np.transpose(columns), atol=1e-7)
+
+
+@pytest.mark.parametrize("angle", [0.7, 2.5, -20.0])
+def test_a_run_does_not_depend_on_the_heading(angle):
+    system, times = turning_body(), np.linspace(0.0, 4.0, 9)
+    ahead = run(system, START, 1e-6, times)
+    elsewhere = run(system, rotated(np.array(START), angle), 1e-6, times)
+    np.testing.assert_allclose(elsewhere.path, rotated(ahead.path, angle), atol=2e-5)
+    assert abs(elsewhere.counts[1] - ahead.counts[1]) < 0.2 * ahead.counts[1]
+    exact = run(system, START, 1e-11, times)
+    np.testing.assert_allclose(ahead.path, exact.path, atol=2e-5)
