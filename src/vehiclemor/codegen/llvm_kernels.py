@@ -268,14 +268,10 @@ def kernel_module(kernels: Sequence[KernelText]) -> ir.Module:
 
 
 def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
-    """Write the instructions of a kernel.
+    """Write the instructions of a kernel where the builder stands.
 
     Parameters
     ----------
-    kernel
-        What to write.
-    builder
-        Where the instructions go.
     pointers
         Argument -> pointer to its first float; the scratch space needs none.
 

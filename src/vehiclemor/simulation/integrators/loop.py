@@ -89,9 +89,9 @@ def integrate(
         if segment >= 0 and spans.segments[span] != segment:
             h = min(h, control.restart)
         segment = spans.segments[span]
-        end = spans.edges[span + 1]
+        times = (t, spans.edges[span + 1])
         status, t, h, sample = over_span(
-            problem, t, end, h, method, control, work, samples, sample, path, counts
+            problem, times, h, method, control, work, output, sample
         )
         if status != FINISHED:
             buffer[0] = t
@@ -130,22 +130,13 @@ def on_span(equations, signal, subspaces, segment, window, sizes, buffer):
     )
 
 
-def over_span(problem, t, end, h, method, control, work, samples, sample, path, counts):
-    """Integrate to the end of one span, recording the states at the sample times inside.
+def over_span(problem, times, h, method, control, work, output, sample):
+    """Integrate from the first of two times to the second, recording the samples between.
 
-    Parameters
-    ----------
-    h
-        First step size to try in s; none if zero.
-    sample
-        Number of the first sample that is not recorded yet.
-
-    Returns
-    -------
-    tuple
-        Status, time, step size for what follows, number of the next sample.
+    Takes the first step size to try in s, none if zero, and the number of the next sample; returns
+    a status, the time, the step size for what follows and the number of the next sample.
     """
-    y, f = work.y, work.f
+    y, f, (t, end), (samples, path, counts) = work.y, work.f, times, output
     begin(problem, t, method, work)
     counts[RHS_CALLS] += 1
     if h <= 0.0:
