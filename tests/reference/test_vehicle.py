@@ -380,7 +380,13 @@ def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize(
     ("solver", "tolerance"),
-    [("dopri5", 1e-10), ("rodas4", 1e-8), ("ros34pw2", 1e-9), ("etdrk4", 1e-7)],
+    [
+        ("dopri5", 1e-10),
+        ("rodas4", 1e-8),
+        ("ros34pw2", 1e-9),
+        ("etdrk4", 1e-7),
+        ("exponential_adams", 1e-9),
+    ],
 )
 def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
     start, expected = reference

@@ -184,7 +184,7 @@ class System:
 
     @cached_property
     def turning_jacobian(self) -> np.ndarray:
-        """The same of the formulation `vehicle_frame`; the heading of the reference is zero."""
+        """The same of `vehicle_frame`, rows of places zero; the reference's heading is zero."""
         jacobian, x = self.frozen_jacobian.copy(), self.reference
         if not len(self.turning):
             return jacobian
@@ -199,6 +199,8 @@ class System:
             jacobian[b, heading] -= rates[a]
             jacobian[a, b] += rates[heading]
             jacobian[b, a] -= rates[heading]
+        # Places: their rates turn with the heading, so they are left to the formulas without modes.
+        jacobian[np.setdiff1d(self.rotating, self.turning)] = 0.0
         return jacobian
 
     @cached_property

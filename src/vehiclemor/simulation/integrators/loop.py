@@ -182,8 +182,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
                 interpolate((samples[sample] - t) / h, h, work)
                 lift(problem, work.middle, path[sample])
                 sample += 1
-        # Proportional and integral control (Hairer, Wanner, Solving Ordinary Differential
-        # Equations II, section IV.2): fewer rejections where stability limits the step.
+        # Proportional and integral control: Hairer, Wanner, Solving ODEs II (1996), section IV.2.
         error = max(error, 1e-10)
         factor = control.safety * error**-control.exponent * before**control.memory_exponent
         before = max(error, control.memory_floor)
