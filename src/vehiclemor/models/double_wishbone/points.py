@@ -5,20 +5,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.parameters import Declared, point
+from vehiclemor.parameters import point
 
 # Hard points at the design position, left side.
-POINTS: dict[str, Declared] = {
-    "upper_arm_front_pivot": point(),
-    "upper_arm_rear_pivot": point(),
-    "upper_ball_joint": point(),
-    "lower_arm_front_pivot": point(),
-    "lower_arm_rear_pivot": point(),
-    "lower_ball_joint": point(),
-    "tie_rod_inner": point(),
-    "tie_rod_outer": point(),
-    "wheel_centre": point(),
-}
+POINTS = dict.fromkeys(
+    (
+        *("upper_arm_front_pivot", "upper_arm_rear_pivot", "upper_ball_joint"),
+        *("lower_arm_front_pivot", "lower_arm_rear_pivot", "lower_ball_joint"),
+        *("tie_rod_inner", "tie_rod_outer", "wheel_centre"),
+    ),
+    point(),
+)
 
 
 def tie_rod_angles(inner: np.ndarray, outer: np.ndarray, side: int = 1) -> tuple[float, float]:

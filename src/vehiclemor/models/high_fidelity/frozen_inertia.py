@@ -15,19 +15,8 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from vehiclemor.models.components import body
-from vehiclemor.models.high_fidelity import frozen_wheels, independent, parts
-from vehiclemor.models.high_fidelity.frozen_quantities import (
-    CONSTANTS,
-    COORDINATES,
-    ENDS,
-    FAMILIES,
-    FAMILY_CHASSIS,
-    SPEEDS,
-    SPRING_DEGREE,
-    N,
-)
-from vehiclemor.models.high_fidelity.quantities import COORDINATES as ALL_COORDINATES
-from vehiclemor.models.high_fidelity.quantities import INPUTS
+from vehiclemor.models.high_fidelity import frozen_quantities as frozen
+from vehiclemor.models.high_fidelity import frozen_wheels, independent, parts, quantities
 from vehiclemor.models.quantities import WHEELS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
@@ -39,10 +28,10 @@ from vehiclemor.symbolic.tape import Tape
 def derive() -> Program:
     """Derive the derivatives and the full vehicle's state; parameters and constants are symbols."""
     tape = Tape()
-    q, nu = body.symbols(COORDINATES), body.symbols(SPEEDS)
-    rack = body.symbols(INPUTS)
+    q, nu = body.symbols(frozen.COORDINATES), body.symbols(frozen.SPEEDS)
+    rack = body.symbols(quantities.INPUTS)
     p, flat = parts.parameters()
-    c = {name: sp.Symbol(f"c_{name}", real=True) for name in CONSTANTS}
+    c = {name: sp.Symbol(f"c_{name}", real=True) for name in frozen.CONSTANTS}
     attitude = body.attitude(tape, q)
     chassis = body.rates(tape, attitude, nu)
     wheels, angles = [], []
@@ -53,7 +42,7 @@ def derive() -> Program:
         angles.append((angle, rate))
         make = frozen_wheels.front_place if k < 2 else frozen_wheels.rear_place
         place = make(tape, c, angle, rate, rack, side)
-        end = ENDS[k // 2]
+        end = frozen.ENDS[k // 2]
         wheels.append(
             frozen_wheels.wheel_on_road(
                 tape, place, attitude.road_normal, q[2], nu, nu[10 + k], p, end
@@ -67,8 +56,11 @@ def derive() -> Program:
         {"x": [*q, *nu], "u": rack},
         [*flat, *c.values()],
         {
-            "derivative": (derivative, (2 * N,)),
-            "full_state": (_full_state(tape, q, nu, chassis, rack, p), (2 * len(ALL_COORDINATES),)),
+            "derivative": (derivative, (2 * frozen.N,)),
+            "full_state": (
+                _full_state(tape, q, nu, chassis, rack, p),
+                (2 * len(quantities.COORDINATES),),
+            ),
         },
     )
 
@@ -110,7 +102,7 @@ def _changes(
     arms = []
     moved = ZERO
     for k, (wheel, (angle, rate)) in enumerate(zip(wheels, angles, strict=True)):
-        end, side = ENDS[k // 2], parts.SIDES[k]
+        end, side = frozen.ENDS[k // 2], parts.SIDES[k]
         first, second = (
             Vector(c[f"{end}_{order}_x"], side * c[f"{end}_{order}_y"], c[f"{end}_{order}_z"])
             for order in ("first", "second")
@@ -136,7 +128,7 @@ def _changes(
     loads = [let(load) for load in loads]
     result: dict[int, sp.Expr] = {}
     halves = []
-    for family, places, sign in zip(FAMILIES, FAMILY_CHASSIS, (1, -1), strict=True):
+    for family, places, sign in zip(frozen.FAMILIES, frozen.FAMILY_CHASSIS, (1, -1), strict=True):
         right = [*(loads[i] for i in places)]
         right += [let(arms[2 * e] + sign * arms[2 * e + 1]) for e in range(2)]
         rows = [
@@ -168,7 +160,7 @@ def _spring(
     rate: sp.Expr,
 ) -> sp.Expr:
     """Generalised force of a spring-damper on its arm."""
-    coefficients = [c[f"{end}_spring_{i}"] for i in range(SPRING_DEGREE + 1)]
+    coefficients = [c[f"{end}_spring_{i}"] for i in range(frozen.SPRING_DEGREE + 1)]
     length = frozen_wheels.horner(tape, coefficients, angle)
     lever = frozen_wheels.horner(tape, frozen_wheels.slope(coefficients), angle)
     damping = tape.let(p[f"{end}_damping"] * tape.let(lever * rate))

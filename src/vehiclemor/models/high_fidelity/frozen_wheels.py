@@ -7,12 +7,7 @@ import sympy as sp
 
 from vehiclemor.models.components import tilted_wheel
 from vehiclemor.models.components.tires import fiala, maximum
-from vehiclemor.models.high_fidelity.frozen_quantities import (
-    DEGREE,
-    FRONT_MAPS,
-    MONOMIALS,
-    REAR_MAPS,
-)
+from vehiclemor.models.high_fidelity import frozen_quantities as frozen
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import UNIT, ZERO
@@ -80,11 +75,11 @@ def front_place(
     let = tape.let
     s, s_dot = side * rack[0], side * rack[1]
     values, by_arm, rates = [], [], []
-    for name in FRONT_MAPS:
+    for name in frozen.FRONT_MAPS:
         # Polynomials in the rack's displacement, whose values are coefficients of the angle.
         rows = [
-            [c[f"{name}_{i}_{j}"] for power, j in MONOMIALS if power == i]
-            for i in range(DEGREE + 1)
+            [c[f"{name}_{i}_{j}"] for power, j in frozen.MONOMIALS if power == i]
+            for i in range(frozen.DEGREE + 1)
         ]
         at_rack = [horner(tape, row, s) for row in rows]
         values.append(horner(tape, at_rack, angle))
@@ -126,7 +121,7 @@ def rear_place(
 ) -> Place:
     """A rear wheel on the chassis; its axle keeps its direction."""
     del rack
-    x, z = ([c[f"{name}_{i}"] for i in range(DEGREE + 1)] for name in REAR_MAPS)
+    x, z = ([c[f"{name}_{i}"] for i in range(frozen.DEGREE + 1)] for name in frozen.REAR_MAPS)
     centre = Vector(horner(tape, x, angle), side * c["rear_centre_y"], horner(tape, z, angle))
     by_arm = g.vector((horner(tape, slope(x), angle), 0, horner(tape, slope(z), angle)))
     rates = g.named(tape, by_arm * rate)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from vehiclemor.models import vehicle_parameters as shared
 from vehiclemor.models.double_wishbone.points import POINTS
 from vehiclemor.models.quantities import (
     CHASSIS_COORDINATES,
@@ -9,17 +10,6 @@ from vehiclemor.models.quantities import (
     TIRE_OUTPUTS,
     WHEELS,
     Quantity,
-)
-from vehiclemor.models.vehicle_parameters import (
-    DAMPING,
-    DROP,
-    GRAVITY,
-    INERTIA,
-    MASS,
-    SLIP_SPEED,
-    STIFFNESS,
-    TIRE,
-    initial_speed,
 )
 from vehiclemor.parameters import Declared, point
 
@@ -74,59 +64,57 @@ CONSTRAINTS = tuple(
     for axis in "xyz"
 )
 # Principal moments of a body.
-_INERTIAS = replace(INERTIA, size=3)
+_INERTIAS = replace(shared.INERTIA, size=3)
+
+
+def _part(name: str) -> dict[str, Declared]:
+    return {f"{name}_mass": shared.MASS, f"{name}_centre": point(), f"{name}_inertia": _INERTIAS}
+
+
 PARAMETERS = {
-    "gravity": GRAVITY,
+    "gravity": shared.GRAVITY,
     "baumgarte_a": Declared("1/s", at_least=0.0, at_most=1e4),
     "baumgarte_b": Declared("1/s", at_least=0.0, at_most=1e4),
     # The stiffness of the slips goes as one over the speed: at a slower pace the explicit reference
     # runs into its limit of calls.
-    "initial_speed": initial_speed(slowest=3.0),
+    "initial_speed": shared.initial_speed(slowest=3.0),
     "front_frame_origin": point(),
     "rear_wheel_centre": point(),
     "chassis_centre": point(),
-    "chassis_mass": MASS,
+    "chassis_mass": shared.MASS,
     "chassis_inertia": _INERTIAS,
     **POINTS,
     "front_spring_chassis_point": point(),
     "front_spring_arm_point": point(),
-    "upper_arm_mass": MASS,
-    "upper_arm_centre": point(),
-    "upper_arm_inertia": _INERTIAS,
-    "lower_arm_mass": MASS,
-    "lower_arm_centre": point(),
-    "lower_arm_inertia": _INERTIAS,
-    "carrier_mass": MASS,
-    "carrier_centre": point(),
-    "carrier_inertia": _INERTIAS,
-    "tie_rod_mass": MASS,
-    "tie_rod_transverse_inertia": INERTIA,
-    "tie_rod_axial_inertia": INERTIA,
-    "front_wheel_mass": MASS,
-    "front_wheel_spin_inertia": INERTIA,
-    "front_wheel_transverse_inertia": INERTIA,
-    "front_stiffness": STIFFNESS,
-    "front_damping": DAMPING,
+    **_part("upper_arm"),
+    **_part("lower_arm"),
+    **_part("carrier"),
+    "tie_rod_mass": shared.MASS,
+    "tie_rod_transverse_inertia": shared.INERTIA,
+    "tie_rod_axial_inertia": shared.INERTIA,
+    "front_wheel_mass": shared.MASS,
+    "front_wheel_spin_inertia": shared.INERTIA,
+    "front_wheel_transverse_inertia": shared.INERTIA,
+    "front_stiffness": shared.STIFFNESS,
+    "front_damping": shared.DAMPING,
     "rear_arm_pivot": point(),
-    "rear_arm_mass": MASS,
-    "rear_arm_centre": point(),
-    "rear_arm_inertia": _INERTIAS,
+    **_part("rear_arm"),
     "rear_arm_inertia_products": Declared("kg m^2", size=3, at_least=-1e6, at_most=1e6),
-    "rear_wheel_mass": MASS,
-    "rear_wheel_spin_inertia": INERTIA,
-    "rear_wheel_transverse_inertia": INERTIA,
+    "rear_wheel_mass": shared.MASS,
+    "rear_wheel_spin_inertia": shared.INERTIA,
+    "rear_wheel_transverse_inertia": shared.INERTIA,
     "rear_spring_chassis_point": point(),
     "rear_spring_arm_point": point(),
-    "rear_stiffness": STIFFNESS,
-    "rear_damping": DAMPING,
-    **TIRE,
+    "rear_stiffness": shared.STIFFNESS,
+    "rear_damping": shared.DAMPING,
+    **shared.TIRE,
     "longitudinal_slip_stiffness": Declared("N", above=0.0),
     "cornering_stiffness": Declared("N/rad", above=0.0),
     "largest_friction": Declared("1", at_least=0.0, at_most=10.0),
     "smallest_friction": Declared("1", at_least=0.0, at_most=10.0),
     "tire_width": Declared("m", at_least=0.0, at_most=5.0),
-    "slip_speed": SLIP_SPEED,
-    **DROP,
+    "slip_speed": shared.SLIP_SPEED,
+    **shared.DROP,
 }
 # Free lengths of the springs (m), with which the design position is the equilibrium.
 SOLVED = ("front_free_length", "rear_free_length")

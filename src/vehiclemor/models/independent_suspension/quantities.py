@@ -1,5 +1,6 @@
 """Coordinates, speeds, inputs, outputs and parameters of the 14-DOF vehicle by name."""
 
+from vehiclemor.models import vehicle_parameters as shared
 from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
 from vehiclemor.models.quantities import (
     CHASSIS_COORDINATES,
@@ -8,18 +9,6 @@ from vehiclemor.models.quantities import (
     TIRE_OUTPUTS,
     WHEELS,
     Quantity,
-)
-from vehiclemor.models.vehicle_parameters import (
-    DAMPING,
-    DROP,
-    GRAVITY,
-    INERTIA,
-    LENGTH,
-    MASS,
-    SLIP_SPEED,
-    STIFFNESS,
-    TIRE,
-    initial_speed,
 )
 from vehiclemor.parameters import Declared
 
@@ -39,30 +28,30 @@ SPEEDS = (
 INPUTS = (Quantity("delta", "rad", "steering angle of both front wheels, positive to the left"),)
 OUTPUTS = (*CHASSIS_OUTPUTS, *TIRE_OUTPUTS)
 PARAMETERS = {
-    "gravity": GRAVITY,
-    "sprung_mass": MASS,
+    "gravity": shared.GRAVITY,
+    "sprung_mass": shared.MASS,
     "unsprung_mass": Declared("kg", above=0.0, at_most=1e4),
-    "roll_inertia": INERTIA,
-    "pitch_inertia": INERTIA,
-    "whole_car_yaw_inertia": INERTIA,
+    "roll_inertia": shared.INERTIA,
+    "pitch_inertia": shared.INERTIA,
+    "whole_car_yaw_inertia": shared.INERTIA,
     "product_of_inertia": Declared("kg m^2", at_least=-1e5, at_most=1e5),
-    "front_axle_distance": LENGTH,
-    "rear_axle_distance": LENGTH,
-    "front_track": LENGTH,
-    "rear_track": LENGTH,
-    "sprung_height": LENGTH,
-    "front_stiffness": STIFFNESS,
-    "rear_stiffness": STIFFNESS,
-    "front_damping": DAMPING,
-    "rear_damping": DAMPING,
-    **TIRE,
+    "front_axle_distance": shared.LENGTH,
+    "rear_axle_distance": shared.LENGTH,
+    "front_track": shared.LENGTH,
+    "rear_track": shared.LENGTH,
+    "sprung_height": shared.LENGTH,
+    "front_stiffness": shared.STIFFNESS,
+    "rear_stiffness": shared.STIFFNESS,
+    "front_damping": shared.DAMPING,
+    "rear_damping": shared.DAMPING,
+    **shared.TIRE,
     "spin_inertia": Declared("kg m^2", above=0.0, at_most=1e4),
     "diametral_inertia": Declared("kg m^2", above=0.0, at_most=1e4),
-    "slip_speed": SLIP_SPEED,
+    "slip_speed": shared.SLIP_SPEED,
     "nominal_load": Declared("N", above=0.0),
     "load_scale": Declared("1", above=0.0),
     **{name: Declared("1") for name in MAGIC_FORMULA},
     # Below walking pace the slip of a rolling wheel has no meaning.
-    "initial_speed": initial_speed(slowest=1.0),
-    **DROP,
+    "initial_speed": shared.initial_speed(slowest=1.0),
+    **shared.DROP,
 }
