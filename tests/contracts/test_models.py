@@ -43,7 +43,7 @@ def test_definition_describes_itself(name: str) -> None:
 
 
 def test_quantities_have_unique_names_units_and_meanings(any_model: AlgebraicModel) -> None:
-    equations = any_model.equations
+    equations = any_model.definition
     kinds: tuple[tuple[Quantity, ...], ...] = (
         equations.coordinates,
         equations.inputs,

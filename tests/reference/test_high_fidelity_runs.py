@@ -182,7 +182,7 @@ def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle, solv
 def test_energy_is_conserved_in_flight_without_dampers():
     model = build(NAME, overrides={"front_damping": 0.0, "rear_damping": 0.0})
     # Arms that swing this far turn the wheels farther than a car's: mechanics all the same.
-    model = replace(model, validity={})
+    model = replace(model, definition=replace(model.definition, validity={}))
     numbers = PARAMETERS | NO_DAMPERS
     start = model.start()
     # High enough to fall for a second; the springs push the arms out.

@@ -90,7 +90,7 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     content = _checked(path, name)
     if content is None:
         content = make()
-        _keep(path, _digest(name, content) + b"\n" + content)
+        _write(path, _digest(name, content) + b"\n" + content)
     return content
 
 
@@ -115,15 +115,15 @@ def _checked(path: Path, name: str) -> bytes | None:
     return None
 
 
-def _keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache that nobody else can write; without room for it, go on."""
+def _write(path: Path, content: bytes) -> None:
+    """Write a file whole, for this user alone; where that fails the next process makes it again."""
 
     def write(temporary: Path) -> None:
-        temporary.touch(0o600)
+        temporary.touch(mode=0o600)
         temporary.write_bytes(content)
 
     try:
-        path.parent.mkdir(mode=0o700, exist_ok=True)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, write)
     except (OSError, FileError) as error:
-        _LOG.warning("%s is not kept: %s", path, error)
+        _LOG.warning("the cache is incomplete: %s", error)

@@ -1,4 +1,4 @@
-"""Trajectories: time histories with solver counts."""
+"""Trajectories: time histories with solver counts, and their labelled dataset."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ DYNAMIC_COUNTS = {
     "factorisations": "LU factorisations of an iteration matrix",
     "linear_solves": "solutions of a linear system, or products with a stored inverse",
 }
+# By kind of model; the second is how often the equations were evaluated.
+COUNTS = {"ae": ALGEBRAIC_COUNTS, "ode": DYNAMIC_COUNTS, "dae": DYNAMIC_COUNTS}
+EVALUATIONS = {"ae": "residual_evaluations", "ode": "rhs_calls", "dae": "rhs_calls"}
 
 
 @dataclass(frozen=True)

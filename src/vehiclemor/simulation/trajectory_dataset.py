@@ -23,43 +23,30 @@ def trajectory_dataset(
     """
     import xarray as xr
 
-    equations = model.equations
-    histories = {
-        "coordinates": ("coordinate", trajectory.coordinates, equations.coordinates),
-        "outputs": ("output", trajectory.outputs, equations.outputs),
-        "inputs": ("input", trajectory.inputs, equations.inputs),
-    }
-    if model.speeds:
-        histories["speeds"] = ("speed", trajectory.speeds, equations.speeds)
     variables: dict[str, tuple] = {}
     coordinates: dict[str, tuple] = {
         "time": ("time", trajectory.time, {"units": "s", "long_name": "time"})
     }
-    for name, (label, values, quantities) in histories.items():
-        variables[name] = (
-            ("time", label),
-            values,
-            {"long_name": name, "units": f"see {label}_unit"},
-        )
-        coordinates[label] = (
-            label,
-            [quantity.name for quantity in quantities],
-            {"long_name": f"name of the {label}"},
-        )
-        coordinates[f"{label}_unit"] = (
-            label,
-            [quantity.unit for quantity in quantities],
-            {"long_name": f"SI unit of the {label}"},
-        )
+    for name in ("coordinates", "outputs", "inputs", "speeds"):
+        quantities, label = getattr(model.definition, name), name.removesuffix("s")
+        if not quantities:
+            continue
+        attributes = {"long_name": name, "units": f"see {label}_unit"}
+        variables[name] = (("time", label), getattr(trajectory, name), attributes)
+        for key, values, text in (
+            (label, [q.name for q in quantities], "name"),
+            (f"{label}_unit", [q.unit for q in quantities], "SI unit"),
+        ):
+            coordinates[key] = label, values, {"long_name": f"{text} of the {label}"}
     for name, long_name in model.counts.items():
         attributes = {"units": "1", "long_name": long_name}
         variables[name] = ((), trajectory.counts.get(name, 0), attributes)
-    variables["seconds"] = (
-        (),
-        trajectory.seconds,
-        {"units": "s", "long_name": "time spent in the compiled loop"},
-    )
-    variables["status"] = ((), trajectory.status, {"long_name": f"one of {', '.join(STATUSES)}"})
-    variables["message"] = ((), trajectory.message, {"long_name": "why the status is not ok"})
-    variables["remark"] = ((), trajectory.remark, {"long_name": "what else there is to know"})
+    seconds = {"units": "s", "long_name": "time spent in the compiled loop"}
+    variables["seconds"] = ((), trajectory.seconds, seconds)
+    for name, long_name in (
+        ("status", f"one of {', '.join(STATUSES)}"),
+        ("message", "why the status is not ok"),
+        ("remark", "what else there is to know"),
+    ):
+        variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
     return xr.Dataset(variables | (further or {}), coordinates)

@@ -6,6 +6,7 @@ import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,8 @@ from vehiclemor.codegen import derivation as kept
 from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation, derived
 from vehiclemor.codegen.kernel_text import operation_counts, reference_source
-from vehiclemor.models import equations
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.models import definition
+from vehiclemor.symbolic.program import Program
 
 NAME = standard_problems.NAME
 
@@ -33,7 +34,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """One entry for each time that the plug-in model was derived."""
     made, real = [], standard_problems.derive
 
-    def derive() -> equations.DynamicEquations:
+    def derive() -> Program:
         made.append("derived")
         return real()
 
@@ -41,10 +42,10 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return made
 
 
-def fetch(name: str = NAME, definition: object = standard_problems) -> Derivation:
+def fetch(name: str = NAME, definition: Any = standard_problems) -> Derivation:
     """As in a process of its own, which remembers nothing."""
     kept._read.cache_clear()
-    return kept.derivation(name, definition)
+    return kept.derivation(name, definition.derive)
 
 
 def test_a_model_is_derived_once_and_read_back_as_it_was(folder: Path, calls: list) -> None:
@@ -57,18 +58,14 @@ def test_a_model_is_derived_once_and_read_back_as_it_was(folder: Path, calls: li
     assert calls == ["derived"]
     assert second == first
     assert second is not first
-    # Down to the types: shapes and quantities are not lists of lists.
+    # Down to the types: shapes are not lists of lists.
     assert repr(second) == repr(first)
     assert [path.stat().st_mtime_ns for path in folder.iterdir()] == [written]
 
 
 def test_a_derivation_describes_its_equations(folder: Path) -> None:
-    program = standard_problems.derive().program
+    program = standard_problems.derive()
     for made in (fetch(), fetch()):
-        assert [q.name for q in made.coordinates] == ["angle", "tracked"]
-        assert [q.name for q in made.inputs] == ["torque", "target", "target_rate"]
-        assert all(isinstance(q, Quantity) for q in made.outputs)
-        assert made.constraints == ()
         assert made.shapes == {
             "derivative": (4,),
             "outputs": (8,),
@@ -101,8 +98,8 @@ def test_the_source_read_back_computes_what_the_model_says(folder: Path, standar
 def test_the_same_process_parses_the_file_once(folder: Path, calls: list) -> None:
     kept._read.cache_clear()
     try:
-        first = kept.derivation(NAME, standard_problems)
-        assert kept.derivation(NAME, standard_problems) is first
+        first = kept.derivation(NAME, standard_problems.derive)
+        assert kept.derivation(NAME, standard_problems.derive) is first
         assert calls == ["derived"]
     finally:
         kept._read.cache_clear()
@@ -166,9 +163,7 @@ DAMAGES = {
     "an empty object": replaced({}),
     "no sources": without_an_entry("sources"),
     "no operations": without_an_entry("operations"),
-    "no constraints": without_an_entry("constraints"),
-    "coordinates of another shape": with_an_entry(coordinates=[["angle", "1", "angle"]]),
-    "coordinates with another entry": with_an_entry(coordinates=[{"name": "angle"}]),
+    "an entry that is none of its own": with_an_entry(coordinates=[]),
     "shapes that are a list": with_an_entry(shapes=[]),
     "shapes that are null": with_an_entry(shapes=None),
     "sources that are null": with_an_entry(sources=None),
@@ -200,7 +195,7 @@ def test_no_unfinished_file_is_left(folder: Path, calls: list) -> None:
 
 
 def test_what_cant_be_derived_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def derive() -> equations.DynamicEquations:
+    def derive() -> Program:
         raise ZeroDivisionError
 
     monkeypatch.setattr(standard_problems, "derive", derive)
@@ -231,8 +226,7 @@ def test_another_source_is_another_derivation(
 
 PLUG_IN = """
 import sympy as sp
-from vehiclemor.models.equations import DynamicEquations
-from vehiclemor.models.quantities import Quantity
+
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -242,9 +236,8 @@ def derive():
     global calls
     calls += 1
     x, p = sp.symbols("x p", real=True)
-    q = (Quantity("x", "1", "x"),)
     results = {"derivative": ([FACTOR * p * x], (1,))}
-    return DynamicEquations(q, (), (), q, assemble(Tape(), {"x": [x]}, [p], results))
+    return assemble(Tape(), {"x": [x]}, [p], results)
 """
 
 
@@ -339,7 +332,9 @@ def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
     layers = ("models",)
-    assert sources.source_digest(layers, (), (equations,)) == sources.source_digest(layers, (), ())
+    assert sources.source_digest(
+        layers, (), (definition.ModelDefinition,)
+    ) == sources.source_digest(layers, (), ())
     plugged = sources.source_digest(layers, (), (standard_problems,))
     assert plugged != sources.source_digest(layers, (), ())
 

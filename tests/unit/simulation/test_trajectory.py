@@ -53,16 +53,16 @@ def test_states_of_a_kinematic_model_are_its_coordinates(full: Trajectory) -> No
 def test_speeds_and_counts_of_a_dynamic_model_are_written(
     model: AlgebraicModel, full: Trajectory
 ) -> None:
-    equations = SimpleNamespace(
-        coordinates=model.equations.coordinates,
+    definition = SimpleNamespace(
+        coordinates=model.definition.coordinates,
         speeds=(Quantity("forward", "m/s", "speed to the front"),),
-        inputs=model.equations.inputs,
-        outputs=model.equations.outputs,
+        inputs=model.definition.inputs,
+        outputs=model.definition.outputs,
     )
-    dynamic = SimpleNamespace(equations=equations, speeds=("forward",), counts=DYNAMIC_COUNTS)
     speeds = np.linspace(0.0, 1.0, 1001)[:, None]
     run = replace(full, speeds=speeds, counts=dict.fromkeys(DYNAMIC_COUNTS, 7))
     np.testing.assert_array_equal(run.states, np.hstack((full.coordinates, speeds)))
+    dynamic = SimpleNamespace(definition=definition, counts=DYNAMIC_COUNTS)
     dataset = trajectory_dataset(dynamic, run)
     forward = dataset["speeds"].sel(speed="forward")
     np.testing.assert_array_equal(forward, speeds[:, 0])

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from tests.oracles.pivots import choose_pivots
 from tests.unit.programs import function_of, pivot_shares, run
 from vehiclemor.codegen.kernel_text import operation_counts, reference_source
 from vehiclemor.models.double_wishbone.equations import PIVOTS
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.elimination import (
     Pivots,
-    choose_pivots,
     eliminate,
-    eliminate_several,
 )
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
@@ -41,7 +40,7 @@ def solver(matrix: np.ndarray, pivots: Pivots) -> tuple[Program, dict[sp.Symbol,
             values[entries[i][j]] = matrix[i, j]
     right_side = [sp.Symbol(f"b_{i}", real=True) for i in range(n)]
     tape = Tape()
-    unknowns = eliminate(tape, entries, right_side, pivots)
+    (unknowns,) = eliminate(tape, entries, [right_side], pivots)
     arguments = {"a": list(values), "b": right_side}
     # The last result gives the program a constant.
     program = assemble(tape, arguments, [p], {"f": ([*unknowns, p], (n + 1,))})
@@ -71,10 +70,10 @@ def test_several_right_sides_are_solved_at_once(seed: int) -> None:
     entries = [[sp.Float(e) if e else sp.Integer(0) for e in row] for row in matrix]
     b = [[sp.Symbol(f"b_{k}_{i}", real=True) for i in range(n)] for k in range(sides)]
     b[0][0] = sp.Integer(0)
-    together = eliminate_several(tape, entries, b, pivots)
+    together = eliminate(tape, entries, b, pivots)
     # What the right sides have in common is there once: one after the other adds nothing to it.
     length = len(tape.definitions)
-    assert [eliminate(tape, entries, side, pivots) for side in b] == together
+    assert [eliminate(tape, entries, [side], pivots)[0] for side in b] == together
     assert len(tape.definitions) == length
     known = [symbol for side in b for symbol in side if symbol.is_Symbol]
     values = right_sides.flat[1:]
@@ -87,7 +86,7 @@ def test_right_sides_do_not_change_their_arguments() -> None:
     a = [[sp.Symbol(f"a_{i}_{j}", real=True) for j in range(3)] for i in range(3)]
     b = [list(sp.symbols(f"b{k}_:3", real=True)) for k in range(2)]
     before = ([row.copy() for row in a], [side.copy() for side in b])
-    eliminate_several(Tape(), a, b, ((0, 0), (1, 1), (2, 2)))
+    eliminate(Tape(), a, b, ((0, 0), (1, 1), (2, 2)))
     assert (a, b) == before
 
 

@@ -256,7 +256,7 @@ def motions(tape: Tape, travel: Travel, acceleration: g.Vector | None = None):
     lever = g.rotate_about_axis(tape, exact(travel.lever), exact(travel.axis), JOINTS[1])
     turn = along(free_rate(7, NU[7]), exact(travel.axis))
     relative = carried(tape, along(free_rate(6, NU[6]), exact(travel.slide)), turn, lever)
-    place = g.add(g.scale(JOINTS[0], exact(travel.slide)), lever)
+    place = exact(travel.slide) * JOINTS[0] + lever
     return frame, frame.point(tape, place, relative), turn
 
 

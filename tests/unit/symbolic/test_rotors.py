@@ -105,7 +105,7 @@ def arm_with_wheel(as_rotor: bool) -> Callable:
 
     def centre(design: np.ndarray) -> m.Motion:
         now = lever(design)
-        return frame.point(tape, g.add(exact(PIVOT), now), carried(tape, STILL, turn, now))
+        return frame.point(tape, exact(PIVOT) + now, carried(tape, STILL, turn, now))
 
     axle, force, moment = lever(AXLE), loads[:3], loads[3:6]
     on_arm, moment_on_arm = loads[6:9], loads[9:]
@@ -117,16 +117,16 @@ def arm_with_wheel(as_rotor: bool) -> Callable:
         design += point_tensor(ARM_MASS, ARM_CENTRE - middle)
         design += point_tensor(WHEEL_MASS, WHEEL_CENTRE - middle)
         tensor = m.turned_tensor(tape, tensor_of(design), hinge, angle)
-        about = g.add(moment, moment_on_arm)
-        about = g.add(about, g.cross(lever(WHEEL_CENTRE - middle), force))
-        about = g.add(about, g.cross(lever(ARM_CENTRE - middle), on_arm))
-        rotor = m.Rotor(7, speeds[7], axle, sp.Float(ABOUT), g.dot(moment, axle))
+        about = moment + moment_on_arm
+        about = about + lever(WHEEL_CENTRE - middle).cross(force)
+        about = about + lever(ARM_CENTRE - middle).cross(on_arm)
+        rotor = m.Rotor(7, speeds[7], axle, sp.Float(ABOUT), moment @ axle)
         rotation = m.with_inertia(tape, tensor, turning)
         bodies = [
             m.Body(
                 sp.Float(total),
                 centre(middle),
-                g.add(force, on_arm),
+                force + on_arm,
                 rotation,
                 tensor,
                 about,

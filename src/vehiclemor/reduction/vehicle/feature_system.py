@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,11 +18,12 @@ def feature_columns(
     features: Features, z: np.ndarray, u: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
     """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""
+    kernels = _column_kernels(features)
     sizes = features.states, features.inputs, len(features.terms)
-    return along(_column_kernels(features), "columns", parameters, (z, u), sizes)
+    return along(kernels, "columns", parameters, (z, u), sizes)
 
 
-@cache
+@lru_cache(maxsize=64)
 def _column_kernels(features: Features) -> Kernels:
     return Kernels(kernel_sources(columns_text(features)))
 

@@ -10,8 +10,6 @@ order derivatives for network pruning: optimal brain surgeon, NIPS 5 (1992), 164
 groups of coefficients, since a feature that one equation needs costs the others nothing).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -36,16 +34,10 @@ def pruned(
     slow: np.ndarray,
     kept: int,
 ) -> tuple[ReducedVehicle, FeatureTable]:
-    """A reduced vehicle whose equations have fewer terms; the lifting keeps its own.
+    """A reduced vehicle of `kept` lateral terms beyond the linear ones; the lifting keeps its own.
 
-    Parameters
-    ----------
-    goals
-        Training runs in reduced states, near which the coefficients are best; all must finish.
-    slow
-        Slow coordinates and speed (samples, states) of the training runs.
-    kept
-        Number of lateral terms beyond the linear ones.
+    Its coefficients are best near the goals, all of which it must finish; `slow` are slow
+    coordinates and speed (samples, states) of the training runs.
     """
     k = reduced.features.states - 1
     normal = normal_matrix(reduced, goals, table.free)

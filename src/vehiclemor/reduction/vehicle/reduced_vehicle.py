@@ -1,7 +1,5 @@
 """Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -122,12 +120,12 @@ class ReducedVehicle:
             self.model,
             self.system,
             whole_space(self.effective_rank),
-            self.encoded,
-            self.lifted,
             self.effective_rank,
             self.offline,
             self.solver,
             self.tolerance,
+            self.encoded,
+            self.lifted,
         )
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
 from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.steering_maneuvers import rack_lane_change
 
 INDEPENDENT = np.concatenate([np.array(PLACES), 26 + np.array(PLACES)])
 DERIVATIVE, FULL = 28, 52

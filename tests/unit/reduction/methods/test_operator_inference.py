@@ -7,12 +7,12 @@ from scipy.integrate import solve_ivp
 import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import lane_change, straight_ahead
 from vehiclemor.reduction.methods.operator_inference import operators, reflected
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.steering_maneuvers import lane_change, straight_ahead
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 

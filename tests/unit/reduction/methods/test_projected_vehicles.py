@@ -8,11 +8,6 @@ from scipy.linalg import solve_continuous_lyapunov
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import (
-    lane_change,
-    rack_lane_change,
-    straight_ahead,
-)
 from vehiclemor.reduction.methods import (
     balanced_pod,
     fixed_basis,
@@ -26,7 +21,13 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.linearisation import reduced_jacobian
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
-from vehiclemor.steering_maneuvers import rack_step_steer, step_steer
+from vehiclemor.steering_maneuvers import (
+    lane_change,
+    rack_lane_change,
+    rack_step_steer,
+    step_steer,
+    straight_ahead,
+)
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 TIGHT = 1e-8

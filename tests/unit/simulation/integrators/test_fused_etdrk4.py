@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.vehicle.feature_kernels import diagonal_blocks
 from vehiclemor.reduction.vehicle.feature_system import feature_system
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
+from vehiclemor.steering_maneuvers import lane_change
 
 # A damped oscillator and a decay, pushed by the inputs and by cubic terms, and a place.
 FEATURES = Features(
