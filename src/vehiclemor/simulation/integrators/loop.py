@@ -90,9 +90,7 @@ def integrate(
             h = min(h, control.restart)
         segment = spans.segments[span]
         times = (t, spans.edges[span + 1])
-        status, t, h, sample = over_span(
-            problem, times, h, method, control, work, output, sample
-        )
+        status, t, h, sample = over_span(problem, times, h, method, control, work, output, sample)
         if status != FINISHED:
             buffer[0] = t
             return status
