@@ -8,7 +8,6 @@ import inspect
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from types import ModuleType
 from typing import Any, get_args
@@ -18,6 +17,7 @@ import numpy as np
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.machine_code import MachineCode
 from vehiclemor.codegen.object_cache import compiler_identity, fetched
+from vehiclemor.codegen.once import once
 from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
@@ -144,7 +144,7 @@ def loops(
     )
 
 
-@cache
+@once
 def _loops(
     modules: tuple[str, ...],
     entries: tuple[str, ...],

@@ -1,7 +1,8 @@
 """Object code in memory: loaded with LLVM's own loader, without what has compiled it."""
 
-from functools import cache
 from typing import Any
+
+from vehiclemor.codegen.once import once
 
 
 class MachineCode:
@@ -16,8 +17,9 @@ class MachineCode:
     def __init__(self, content: bytes) -> None:
         import llvmlite.binding as llvm
 
-        # The engine owns the memory in which the code lies.
-        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+        # The engine owns the memory in which the code lies, and its target machine.
+        machine = _target().create_target_machine()
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
         self._engine.finalize_object()
 
@@ -29,10 +31,10 @@ class MachineCode:
         return found
 
 
-@cache
-def _target_machine() -> Any:
+@once
+def _target() -> Any:
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine()
+    return llvm.Target.from_triple(llvm.get_process_triple())
