@@ -8,7 +8,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
-from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -18,6 +17,7 @@ from vehiclemor.simulation.integrators.catalogue import problem_size, rhs_loop
 from vehiclemor.simulation.integrators.structures import FINISHED, Place
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
+from vehiclemor.steering_maneuvers import rack_lane_change
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

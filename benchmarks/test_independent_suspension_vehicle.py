@@ -6,7 +6,6 @@ Timings are reported, never gated.  Counts and operation counts stand beside the
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -14,6 +13,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators.structures import FINISHED
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
+from vehiclemor.steering_maneuvers import lane_change
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

@@ -32,7 +32,7 @@ hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN
 COMPILATIONS = (
     """
 import vehiclemor as vm
-from vehiclemor.maneuvers import straight_ahead
+from vehiclemor.steering_maneuvers import straight_ahead
 vm.model("independent_suspension_vehicle").simulate(straight_ahead, tolerance=1e-2)
 """,
     """

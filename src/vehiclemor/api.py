@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor import registry
 from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,9 +37,9 @@ def maneuvers() -> dict[str, str]:
 def _summaries(kind: str, attribute: str) -> dict[str, str]:
     """One line for each component; a broken plug-in is listed with what is wrong with it."""
     lines = {}
-    for name in registry.names(kind):
+    for name in names(kind):
         try:
-            lines[name] = str(getattr(registry.component(kind, name), attribute))
+            lines[name] = str(getattr(component(kind, name), attribute))
         except InputError as error:
             lines[name] = f"broken: {error}"
     return lines
@@ -77,7 +77,7 @@ def model(
     """
     from vehiclemor.simulation.build import build
 
-    registry.component("model", name)
+    component("model", name)
     return build(name, Path(parameter_file) if parameter_file else None, parameters)
 
 
@@ -141,8 +141,8 @@ def simulate(
 
     ready = _model(model) if isinstance(model, str) else model
     if isinstance(maneuver, str) or maneuver is None:
-        default = registry.component("model", ready.name).maneuver
-        base: Maneuver = registry.component("maneuver", maneuver or default)
+        default = component("model", ready.name).maneuver
+        base: Maneuver = component("maneuver", maneuver or default)
     else:
         base = maneuver
     if rtol is not None:

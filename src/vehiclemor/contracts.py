@@ -38,16 +38,22 @@ def check_model(name: str) -> None:
     model, definition = build(name), _definition(name)
     for kind in ("coordinates", "speeds", "inputs", "outputs"):
         quantities = getattr(definition, kind)
-        derived = getattr(model, kind)
-        declared = tuple(quantity.name for quantity in quantities)
-        assert derived == declared, f"{name}: {kind} {derived} are derived, not {declared}"
+        declared = [quantity.name for quantity in quantities]
         assert len(set(declared)) == len(declared), f"{name}: a name occurs twice in {declared}"
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
+    equations = "residual" if model.kind == "ae" else "derivative"
+    for function, size in (
+        (equations, len(definition.states)),
+        ("outputs", len(definition.outputs)),
+    ):
+        derived = model.equations.shapes[function]
+        assert derived == (size,), f"{name}: {function} has shape {derived}, not ({size},)"
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
     timed = {case.method for case in timing_cases(definition)}
     assert timed <= set(names("method")), f"{name}: unknown methods among {sorted(timed)} are timed"
     maneuver = _nominal(model)
-    assert maneuver.inputs == model.inputs, f"{name}: its maneuver gives other inputs"
+    inputs = tuple(quantity.name for quantity in definition.inputs)
+    assert maneuver.inputs == inputs, f"{name}: its maneuver gives other inputs"
     if isinstance(model, AlgebraicModel):
         _check_algebraic(model, maneuver)
     else:

@@ -1,4 +1,4 @@
-"""Open-loop steering tests of the vehicles: step, sine sweep, multisine.
+"""Open-loop steering of the vehicles: lane change, straight ahead, step, sine sweep, multisine.
 
 Each shape is smooth to its second derivative, since a steering rack whose velocity jumps would need
 an infinite force.  ISO 7401 (lateral transient response): a step to a lateral acceleration of
@@ -7,23 +7,26 @@ about 2 m/s^2 (sweep, multisine) at 20 m/s.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.maneuvers import (
-    LANE_CHANGE_AMPLITUDE,
-    LANE_CHANGE_START,
-    RACK_AMPLITUDE,
-    Maneuver,
-)
+from vehiclemor.maneuvers import Maneuver, smooth
 
-BEGIN = LANE_CHANGE_START
+BEGIN = 1.0
+# Single lane change, a pulse that is smooth to its second derivative.  The amplitudes are
+# calibrated: 3.5 m to the left at 20 m/s, of the 14-DOF vehicle after 25 s by the steering angle
+# (rad), of the high-fidelity vehicle after 10 s by the rack (m, negative to the left).
+LANE_CHANGE_LENGTH = 2.5
+LANE_CHANGE_AMPLITUDE = 0.0300768
+RACK_AMPLITUDE = -0.0046903
+LANE_CHANGE_DURATION = 25.0
 # Length (s) of the ramp of a step, and of the ramp at which a periodic signal sets in.
 STEP_RAMP = 0.2
 ONSET = 1.0
 STEP_DURATION = 5.0
 DURATION = 10.0
-# Output times per second, as of the lane change.
+# Output times per second.
 RATE = 50
 # Sizes as parts of the lane change's amplitude.
 STEP_SIZE = 0.9
@@ -35,7 +38,24 @@ MULTISINE = np.array([0.15, 0.35, 0.6, 0.95, 1.4])
 # Phases after M. R. Schroeder, IEEE Trans. Inf. Theory 16 (1970), 85-89: a low peak.
 PHASES = -np.pi * np.arange(5) * np.arange(1, 6) / 5
 
+# (Times (n,) in s, frequency factor) -> signal (n, 3) with first and second derivatives.
 Shape = Callable[[np.ndarray, float], np.ndarray]
+
+
+def _pulse(times: np.ndarray, frequency: float) -> np.ndarray:
+    """Pulse of the lane change, of about unit size."""
+    part = (times - BEGIN) * frequency / LANE_CHANGE_LENGTH
+    angle = 2.0 * np.pi * np.clip(part, 0.0, 1.0)
+    rate = 2.0 * np.pi * frequency / LANE_CHANGE_LENGTH
+    pulse = np.column_stack(
+        [
+            np.sin(angle) - 0.5 * np.sin(2.0 * angle),
+            rate * (np.cos(angle) - np.cos(2.0 * angle)),
+            rate**2 * (2.0 * np.sin(2.0 * angle) - np.sin(angle)),
+        ]
+    )
+    inside = (part > 0.0) & (part < 1.0)
+    return np.where(inside[:, None], pulse, 0.0)
 
 
 def _ramp(part: np.ndarray, length: float) -> np.ndarray:
@@ -90,6 +110,10 @@ def _multisine(times: np.ndarray, frequency: float) -> np.ndarray:
     return MULTISINE_SIZE * _product(_ramp(t / ONSET, ONSET), waves)
 
 
+def _pulse_corners(frequency: float) -> tuple[float, ...]:
+    return BEGIN, BEGIN + LANE_CHANGE_LENGTH / frequency
+
+
 def _step_corners(frequency: float) -> tuple[float, ...]:
     return BEGIN, BEGIN + STEP_RAMP / frequency
 
@@ -99,62 +123,88 @@ def _periodic_corners(frequency: float) -> tuple[float, ...]:
     return BEGIN, BEGIN + ONSET
 
 
-def _steered(shape: Shape) -> Callable[[np.ndarray, float, float], np.ndarray]:
-    """Steering angle (n, 1) of the 14-DOF vehicle."""
+def _steered(
+    name: str, summary: str, shape: Shape, corners: Callable, duration: float = DURATION
+) -> Maneuver:
+    """Steering angle of the 14-DOF vehicle."""
 
     def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         return amplitude * LANE_CHANGE_AMPLITUDE * shape(times, frequency)[:, :1]
 
-    return signal
+    samples = round(duration * RATE) + 1
+    return Maneuver(name, summary, signal, ("delta",), duration, samples, corners)
 
 
-def _racked(shape: Shape) -> Callable[[np.ndarray, float, float], np.ndarray]:
-    """Displacement, velocity and acceleration (n, 3) of the steering rack."""
+def _racked(steered: Maneuver, shape: Shape, summary: str = "") -> Maneuver:
+    """Displacement, velocity and acceleration of the rack instead; no longer than 10 s."""
 
     def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         return amplitude * RACK_AMPLITUDE * shape(times, frequency)
 
+    duration = min(steered.duration, DURATION)
+    return replace(
+        steered,
+        name=f"rack_{steered.name}",
+        summary=summary or f"{steered.summary}, of the rack",
+        signal=signal,
+        inputs=("s", "s_dot", "s_ddot"),
+        duration=duration,
+        samples=round(duration * RATE) + 1,
+    )
+
+
+def _held(inputs: int) -> Callable[[np.ndarray, float, float], np.ndarray]:
+    """No steering."""
+
+    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+        del frequency, amplitude
+        return np.zeros((len(times), inputs))
+
     return signal
 
 
-def _pair(
-    name: str, summary: str, shape: Shape, corners: Callable, duration: float
-) -> tuple[Maneuver, Maneuver]:
-    """The maneuver for the steered wheels and for the rack."""
-    samples = round(duration * RATE) + 1
-    steered = Maneuver(
-        name, summary, _steered(shape), ("delta",), duration, samples, corners=corners
-    )
-    racked = Maneuver(
-        f"rack_{name}",
-        f"{summary}, of the rack",
-        _racked(shape),
-        ("s", "s_dot", "s_ddot"),
-        duration,
-        samples,
-        corners=corners,
-    )
-    return steered, racked
-
-
-step_steer, rack_step_steer = _pair(
+lane_change = _steered(
+    "lane_change",
+    "single lane change of 3.5 m at 20 m/s, a steering pulse of 2.5 s from 1 s on, 25 s",
+    _pulse,
+    _pulse_corners,
+    LANE_CHANGE_DURATION,
+)
+rack_lane_change = _racked(
+    lane_change,
+    _pulse,
+    "single lane change of 3.5 m at 20 m/s, a pulse of the rack of 2.5 s from 1 s on, 10 s",
+)
+straight_ahead = replace(
+    lane_change,
+    name="straight_ahead",
+    summary="no steering, 25 s",
+    signal=_held(1),
+    corners=smooth,
+)
+rack_straight_ahead = replace(
+    rack_lane_change,
+    name="rack_straight_ahead",
+    summary="rack held in the middle, 10 s",
+    signal=_held(3),
+    corners=smooth,
+)
+step_steer = _steered(
     "step_steer",
     "step of the steering to 4 m/s^2 at 20 m/s within 0.2 s, 5 s",
     _step,
     _step_corners,
     STEP_DURATION,
 )
-sine_sweep, rack_sine_sweep = _pair(
-    "sine_sweep",
-    "steering swept from 0.2 to 1.6 Hz, 10 s",
-    _sweep,
-    _periodic_corners,
-    DURATION,
+rack_step_steer = _racked(step_steer, _step)
+sine_sweep = _steered(
+    "sine_sweep", "steering swept from 0.2 to 1.6 Hz, 10 s", _sweep, _periodic_corners
 )
-multisine, rack_multisine = _pair(
+rack_sine_sweep = _racked(sine_sweep, _sweep)
+multisine = _steered(
     "multisine",
     "steering at five frequencies from 0.15 to 1.4 Hz, 10 s",
     _multisine,
     _periodic_corners,
-    DURATION,
 )
+rack_multisine = _racked(multisine, _multisine)

@@ -16,7 +16,8 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import STATUSES, Trajectory, trajectory_dataset
+from vehiclemor.simulation.trajectory import STATUSES, Trajectory
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
 METHODS = names("method")
 

@@ -8,7 +8,7 @@ from vehiclemor.models.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.trajectory import trajectory_dataset
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
 SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m", "1"} | {
     "kg",
@@ -43,7 +43,7 @@ def test_definition_describes_itself(name: str) -> None:
 
 
 def test_quantities_have_unique_names_units_and_meanings(any_model: AlgebraicModel) -> None:
-    equations = any_model.equations
+    equations = any_model.definition
     kinds: tuple[tuple[Quantity, ...], ...] = (
         equations.coordinates,
         equations.inputs,

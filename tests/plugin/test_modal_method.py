@@ -12,10 +12,11 @@ import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.contracts import check_method
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver, lane_change
+from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.steering_maneuvers import lane_change
 
 # Two masses of 1 kg in a chain from the wall: stiffness in N/m, damping in proportion to it.
 STIFFNESS = 40.0 * np.array([[2.0, -1.0], [-1.0, 1.0]])

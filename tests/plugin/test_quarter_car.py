@@ -14,7 +14,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
-SOLVERS = {"explicit": 1e-10, "rodas4": 1e-9, "ros34pw2": 1e-8, "etdrk4": 1e-8}
+SOLVERS = {"dopri5": 1e-10, "rodas4": 1e-9, "ros34pw2": 1e-8, "etdrk4": 1e-8}
 
 
 @pytest.fixture(scope="module")

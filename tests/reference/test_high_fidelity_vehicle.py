@@ -134,13 +134,12 @@ def random_motion(model: DynamicModel, number: int) -> tuple[np.ndarray, np.ndar
     x = np.tile(model.start(), (number, 1))
     x[:, N:] = 0.0
     x[:, [10, 17]] = scale * rng.uniform(-0.35, 0.35, (number, 2))
-    work, pairs = np.zeros(model.kernels.WORK), np.empty((number, LOOPS, 2))
-    rows = np.empty((number, N + LOOPS, N + 1))
+    pairs, rows = np.empty((number, LOOPS, 2)), np.empty((number, N + LOOPS, N + 1))
 
     def to_close(column: int) -> np.ndarray:
         for k in range(number):
-            model.kernels.violations(x[k], u[k], model.constants, work, pairs[k])
-            model.kernels.descriptor(x[k], u[k], model.constants, work, rows[k])
+            model.kernels.call("violations", x[k], u[k], model.constants, pairs[k])
+            model.kernels.call("descriptor", x[k], u[k], model.constants, rows[k])
         jacobians = rows[:, N:, :N][:, :, DEPENDENT]
         return np.linalg.solve(jacobians, pairs[:, :, column, None])[..., 0]
 

@@ -8,7 +8,7 @@ import pytest
 from vehiclemor.cli import main
 from vehiclemor.report import errors, tables
 from vehiclemor.report.comparison.paper import paper_comparison
-from vehiclemor.report.comparison.row import COLUMNS
+from vehiclemor.report.comparison.rows import COLUMNS
 from vehiclemor.report.comparison.times import slower_row, time_rows
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES

@@ -1,6 +1,7 @@
 """One rule for failures, whether a study is a grid or a protocol."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -37,7 +38,7 @@ def raised(request, monkeypatch):
         raise error
 
     evaluate._kept_fit.cache_clear()
-    monkeypatch.setattr(fixed_basis, "fit", broken)
+    monkeypatch.setattr(fixed_basis, "METHOD", replace(fixed_basis.METHOD, fit=broken))
     monkeypatch.setattr(timing, "PROTOCOL_ROUNDS", 1)
     yield status, message
     evaluate._kept_fit.cache_clear()

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from vehiclemor.report.predictive_text import printed
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
-from vehiclemor.report.predictive import method_rows, predictive_comparison, protocol_of
+from vehiclemor.report.predictive.rows import method_rows, predictive_comparison, protocol_of
+from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose
@@ -178,7 +178,7 @@ def test_the_comparison_marks_the_winner_and_judges_it(done):
     targets = rows[rows["kind"] == "target"]
     assert set(targets["verdict"]) <= {"met", "missed"}
     assert "worst largest error of second_euler_angle" in set(targets["item"])
-    text = printed(rows)
+    text = predictive_text(rows)
     assert "* fixed basis" in text
     assert "newton 1e-6" in text
     json.loads(rows.to_json(orient="records"))

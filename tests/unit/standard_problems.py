@@ -12,10 +12,9 @@ import sympy as sp
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.parameters import Declared
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 NAME = "standard_problems"
@@ -37,7 +36,7 @@ def starts(p: Mapping[str, float]) -> dict[str, np.ndarray]:
     return {"only": np.array([p["angle"], p["tracked"], 0.0, p["exploding"]])}
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     x = sp.symbols("angle tracked angular_speed exploding", real=True)
     torque, target, target_rate = u = sp.symbols("torque target target_rate", real=True)
     p = {name: sp.Symbol(f"p_{name}", real=True) for name in PARAMETERS}
@@ -56,8 +55,7 @@ def derive() -> DynamicEquations:
         "second_order": (zeros, (2, 3)),
         "speeds": (list(x[2:]), (2,)),
     }
-    program = assemble(tape, {"x": x, "u": u}, list(p.values()), functions)
-    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program)
+    return assemble(tape, {"x": x, "u": u}, list(p.values()), functions)
 
 
 DEFINITION = ModelDefinition(

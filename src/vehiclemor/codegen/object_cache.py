@@ -87,15 +87,19 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
         Gives the content.
     """
     path = cache_folder() / name
-    content = _checked(path)
+    content = _checked(path, name)
     if content is None:
         content = make()
-        digest = hashlib.sha256(content).hexdigest().encode()
-        _keep(path, digest + b"\n" + content)
+        _write(path, _digest(name, content) + b"\n" + content)
     return content
 
 
-def _checked(path: Path) -> bytes | None:
+def _digest(name: str, content: bytes) -> bytes:
+    """Hash by which a file is checked; it does not hold under another name."""
+    return hashlib.sha256(name.encode() + b"\n" + content).hexdigest().encode()
+
+
+def _checked(path: Path, name: str) -> bytes | None:
     """Content of a file, if it can be trusted."""
     try:
         with path.open("rb") as file:
@@ -105,21 +109,21 @@ def _checked(path: Path) -> bytes | None:
         return None
     except OSError as error:
         digest, content, reason = b"", b"", error.strerror or "it can't be read"
-    if not reason and hashlib.sha256(content).hexdigest().encode() == digest:
+    if not reason and _digest(name, content) == digest:
         return content
     _LOG.warning("%s is made again: %s", path, reason or "the file is damaged")
     return None
 
 
-def _keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache that nobody else can write; without room for it, go on."""
+def _write(path: Path, content: bytes) -> None:
+    """Write a file whole, for this user alone; where that fails the next process makes it again."""
 
     def write(temporary: Path) -> None:
-        temporary.touch(0o600)
+        temporary.touch(mode=0o600)
         temporary.write_bytes(content)
 
     try:
-        path.parent.mkdir(mode=0o700, exist_ok=True)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, write)
     except (OSError, FileError) as error:
-        _LOG.warning("%s is not kept: %s", path, error)
+        _LOG.warning("the cache is incomplete: %s", error)

@@ -15,7 +15,7 @@ from vehiclemor.models.report import ModelReport
 from vehiclemor.parameters import Declared
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import AlgebraicEquations, DynamicEquations
+    from vehiclemor.symbolic.program import Program
 
 # Algebraic equations; ordinary differential equations; those with constraints.
 KINDS = ("ae", "ode", "dae")
@@ -62,8 +62,10 @@ class ModelDefinition:
         Name -> unit, size and bounds.
     parameter_file
         Values with their sources; the package's own data by default.
+    joints
+        Names of the moving points and directions that the function `joints` returns (kind `ae`).
     derive
-        Derives the equations; parameters stay symbols.
+        Derives the program of the equations; parameters stay symbols.
     check
         Raises `GeometryError` where no such vehicle can exist.
     design_coordinates
@@ -97,6 +99,19 @@ class ModelDefinition:
     ------
     InputError
         If the declaration contradicts itself.
+
+    Notes
+    -----
+    The program of kind `ae` has functions over `q` (n) and `u`: `residual` (n), `residual_jacobian`
+    (n x (n + 1): Jacobian, then residual), `newton_step` (n), `outputs`, and `joints` (points x 3).
+
+    That of the other kinds has functions over `x` (2 n) and `u`: `derivative` (2 n) and `outputs`;
+    for mechanical models also `second_order` (n x (n + 1): mass matrix M and forces F of M q'' = F
+    in the coordinates, forces of constraints included), and `speeds` (n: the speeds where x holds
+    the rates of the coordinates in their place).  Models with c constraints have `descriptor`
+    ((n + c) x (n + 1): mass matrix and applied forces, less inertial ones, below them Jacobian and
+    right side of the stabilised constraints on q'') and `violations` (c x 2: constraints and their
+    rates).
     """
 
     name: str
@@ -107,9 +122,10 @@ class ModelDefinition:
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
     parameters: Mapping[str, Declared]
-    derive: Callable[[], AlgebraicEquations | DynamicEquations]
+    derive: Callable[[], Program]
     speeds: tuple[Quantity, ...] = ()
     equations: tuple[Quantity, ...] = ()
+    joints: tuple[str, ...] = ()
     constraints: tuple[Quantity, ...] = ()
     parameter_file: Path | None = None
     check: Callable[[Values], None] = _anything

@@ -165,23 +165,34 @@ def default_rank(definition: Reported) -> int:
     return max(1, min(LARGEST_DEFAULT_RANK, len(definition.coordinates) - 1))
 
 
+def reduced_case(
+    method: str,
+    rank: int,
+    preset: str = "recommended",
+    tolerance: float | None = None,
+    **more: Value,
+) -> TimingCase:
+    """Row of a reduced model; its label tells what differs from the recommended settings."""
+    words = [method.replace("_", " "), *([preset] if preset != "recommended" else [])]
+    label = " ".join([*words, *(str(value) for value in more.values()), f"r={rank}"])
+    settings: dict[str, Value] = {"rank": rank, **more}
+    if tolerance is not None:
+        label += f", {tolerance:.0e}".replace("e-0", "e-")
+        settings["tolerance"] = tolerance
+    name = label.replace(",", "").replace("=", "").replace(" ", "_")
+    return TimingCase(name, label, method, preset, settings)
+
+
 def timing_cases(definition: Reported) -> tuple[TimingCase, ...]:
     """Rows of a model's cost table: by default full-order solvers, replay, and POD both ways."""
     if definition.report.timing:
         return definition.report.timing
     rank = default_rank(definition)
-    reduced = (("pod", "recommended", "pod"), ("pod", "literal", "pod literal"))
-    reduced += (("fixed_basis", "recommended", "fixed basis"),)
-    cases = [
-        TimingCase(
-            f"{label.replace(' ', '_')}_r{rank}",
-            f"{label} r={rank}",
-            method,
-            preset,
-            {"rank": rank},
-        )
-        for method, preset, label in reduced
-    ]
+    cases = (
+        reduced_case("pod", rank),
+        reduced_case("pod", rank, "literal"),
+        reduced_case("fixed_basis", rank),
+    )
     return (*DEFAULTS[definition.kind].timing, *cases)
 
 

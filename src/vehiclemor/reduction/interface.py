@@ -3,8 +3,6 @@
 The entry point of a method, in the group `vehiclemor.methods`, names a `Method`.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +12,7 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -40,13 +38,7 @@ class Offline:
 def offline_cost(
     began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0
 ) -> Offline:
-    """Cost since `began` (`time.perf_counter()`), with the evaluations of training runs.
-
-    Parameters
-    ----------
-    further
-        Evaluations of the full model's equations besides those of the runs.
-    """
+    """Seconds since `began` (`time.perf_counter()`), evaluations of the runs and `further` ones."""
     evaluations = sum(run.counts[model.evaluations] for run in runs) + further
     return Offline(time.perf_counter() - began, evaluations)
 
@@ -110,7 +102,7 @@ class Method:
     name: str
     summary: str
     settings: Mapping[str, type[Settings]]
-    fit: Callable[[Any, Sequence[TrainingRun], Any], ReducedModel]
+    fit: Callable[[Any, Training, Any], ReducedModel]
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all

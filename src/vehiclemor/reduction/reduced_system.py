@@ -1,7 +1,5 @@
 """A dynamic model in other states than its own: encode, integrate, lift."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,11 +7,20 @@ import numpy as np
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
+
+
+def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
+    return state
+
+
+def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
+    return run.path
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +35,15 @@ class ReducedSystem:
         The equations that are integrated.
     spaces
         Their form, and their subspaces if they are projected.
-    encode
-        (full state (2 n,), inputs) -> state (dim,) of the system.
-    lift
-        (run of the system, inputs (samples, inputs), full state at the start) -> full states.
     effective_rank
         Number of coordinates or modes that stand for the model's.
     solver, tolerance
         Integrator and its tolerance.
+    encode
+        (full state (2 n,), inputs) -> state (dim,) of the system; the same by default.
+    lift
+        (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
+        default the run's own.
     project
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     """
@@ -43,12 +51,12 @@ class ReducedSystem:
     model: DynamicModel
     system: System
     spaces: ProjectionWindows
-    encode: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray]
     effective_rank: int
     offline: Offline
     solver: str
     tolerance: float
+    encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
+    lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
     def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
@@ -68,3 +76,37 @@ class ReducedSystem:
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Projection of full states (samples, 2 n), if there is a subspace."""
         return None if self.project is None else self.project(states)
+
+
+def transformed_system(
+    model: DynamicModel,
+    system: System,
+    encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    offline: Offline,
+    settings: OnlineSettings,
+) -> ReducedSystem:
+    """Equations in other states than the model's.
+
+    Parameters
+    ----------
+    system
+        The equations; its kernel `full_state` gives the full state of a transformed one.
+    encode
+        (full state (2 n,), inputs) -> transformed state (dim,).
+    """
+    dim = len(system.reference)
+
+    def lift(run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
+        return system.along("full_state", run.path, inputs, 2 * len(model.coordinates))
+
+    return ReducedSystem(
+        model,
+        system,
+        whole_space(dim),
+        dim,
+        offline,
+        settings.solver,
+        settings.tolerance,
+        encode,
+        lift,
+    )

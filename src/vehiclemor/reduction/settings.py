@@ -1,7 +1,5 @@
 """What the settings of all methods share: one pydantic class by method and kind of model."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import numpy as np

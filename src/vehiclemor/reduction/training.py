@@ -39,6 +39,9 @@ class TrainingRun:
         return self.at(np.linspace(0.0, self.maneuver.duration, count))
 
 
+Training = Sequence[TrainingRun]
+
+
 def training_runs(
     model: Model,
     maneuver: Maneuver,
@@ -46,17 +49,7 @@ def training_runs(
     policy: str,
     factors: Sequence[tuple[float, float]] = (),
 ) -> tuple[TrainingRun, ...]:
-    """Training runs of a policy for a test maneuver.
-
-    Parameters
-    ----------
-    model, maneuver, start
-        What the reduced model will be tested on.
-    policy
-        One of `POLICIES`.
-    factors
-        (frequency, amplitude) factors of the policy `set`.
-    """
+    """Training runs for what a reduced model is tested on, see `policy_factors`."""
     pairs = policy_factors(maneuver, policy, factors)
     return tuple(TrainingRun(model, maneuver.perturbed(*pair), start) for pair in pairs)
 
@@ -64,7 +57,7 @@ def training_runs(
 def policy_factors(
     maneuver: Maneuver, policy: str, factors: Sequence[tuple[float, float]] = ()
 ) -> tuple[tuple[float, float], ...]:
-    """(frequency, amplitude) factors of the training runs of a policy for a test maneuver.
+    """(frequency, amplitude) factors of the runs of one of `POLICIES`; those of `set` are given.
 
     Raises
     ------

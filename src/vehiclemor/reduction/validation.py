@@ -1,7 +1,5 @@
 """The border where settings come in: one clear line for whatever is wrong with them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

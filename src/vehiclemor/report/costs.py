@@ -1,9 +1,9 @@
 """Cost table: seconds, counts, speed-up against both baselines, offline cost, break-even."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
+import xarray as xr
 
 from vehiclemor.models.report import baselines, printed_counts, printed_outputs, timing_cases
 from vehiclemor.registry import component
@@ -11,10 +11,6 @@ from vehiclemor.report.labels import label_of
 from vehiclemor.report.printing import Row, fixed, power, table_text, wrapped
 from vehiclemor.simulation.build import build
 from vehiclemor.study.timing import timed_model
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
@@ -28,8 +24,6 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         solver), errors, `offline_us`, and the number of runs after which a reduced model has paid
         for its training against either baseline (missing where it never does).
     """
-    import pandas as pd
-
     data = _timing(model, folder)
     rows = [
         _row(data.sel(start=start, case=case), list(printed_counts(component("model", model))))

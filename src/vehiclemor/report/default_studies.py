@@ -4,8 +4,6 @@ What the model declares, or the package has, is taken; else a study file is writ
 results, so that it runs, resumes and can be read and changed like any other.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,11 +1,11 @@
 """Error tables: every cell of a study, and the largest errors by groups of quantities."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
+import xarray as xr
 
 from vehiclemor.models.report import tabled_outputs
 from vehiclemor.registry import component
@@ -13,10 +13,6 @@ from vehiclemor.report.default_studies import nominal, perturbed
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 
 def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
@@ -30,8 +26,6 @@ def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
 
 def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 1) -> pd.DataFrame:
     """RMS errors, floors, counts and status of every cell of studies of a model."""
-    import pandas as pd
-
     outputs = tabled_outputs(component("model", model))
     datasets = {k: v for study in studies for k, v in run_studies(study, results, jobs).items()}
     parts = [
@@ -47,14 +41,7 @@ def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 
 def settings_table(
     study: str, outputs: tuple[str, ...], results: Path, jobs: int = 1
 ) -> pd.DataFrame:
-    """Control-period POD on a vehicle with every combination of its settings.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Errors and floors of a few outputs, evaluations, largest growth rate of a reduced Jacobian,
-        status and reason of each combination.
-    """
+    """Control-period POD on a vehicle with every combination of its settings, as of `flat`."""
     dataset = next(iter(run_studies(study, results, jobs).values()))
     return flat(dataset, outputs)
 
@@ -68,8 +55,6 @@ def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
         For each method, start, group of quantities and unit: the largest RMS error, and of which
         quantity it is.  For constraints it is the RMS of the violation itself.
     """
-    import pandas as pd
-
     study = component("model", model).report.study or nominal(model, results)
     dataset = next(iter(run_studies(study, results, jobs).values()))
     rows: list[dict[str, object]] = []

@@ -1,11 +1,8 @@
 """Words, symbols and short headings of outputs, for figures and printed tables."""
 
-from __future__ import annotations
+from typing import NamedTuple
 
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    import xarray as xr
+import xarray as xr
 
 
 class Label(NamedTuple):

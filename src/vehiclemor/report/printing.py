@@ -1,7 +1,5 @@
 """Tables as text: one printer for all tables that are shown in a terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from io import StringIO
 from typing import NamedTuple

@@ -122,12 +122,7 @@ Entry = TypeVar("Entry", bound=Printed)
 
 
 def load_published(path: Path | None = None) -> Published:
-    """Load and validate what the paper prints.
-
-    Parameters
-    ----------
-    path
-        File of printed numbers and claims; the package's own by default.
+    """Load and validate what the paper prints, by default from the package's own file.
 
     Raises
     ------

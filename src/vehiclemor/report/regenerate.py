@@ -19,23 +19,9 @@ FORMATS = ("svg", "png")
 def regenerate_figures(
     results: Path, out: Path, only: Sequence[str] = (), jobs: int = 1
 ) -> list[Path]:
-    """Draw figures and an index of their captions.
+    """Draw figures, by default those of the paper and an index of their captions; files written.
 
-    Parameters
-    ----------
-    results
-        Results folder; studies that it lacks are run.
-    out
-        Folder of the figures.
-    only
-        Names of figures, see `figures/catalogue.py`; those of the paper if empty.
-    jobs
-        Number of processes for missing studies.
-
-    Returns
-    -------
-    list of Path
-        Files written.
+    Studies that the results folder lacks are run.
 
     Raises
     ------

@@ -1,9 +1,8 @@
 """Tables of the comparison, costs, errors, equation order and operations: CSV, Markdown, LaTeX."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
@@ -13,20 +12,11 @@ from vehiclemor.report.errors import error_table, quantity_table, settings_table
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.simulation.build import build
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 LATEX_SPECIAL = {"\\": r"\textbackslash{}"} | {c: f"\\{c}" for c in "&%$#_{}"} | {"^": r"\^{}"}
 
 
 def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
-    """Write every table of every registered model in three formats.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-    """
+    """Write every table of every registered model in three formats; the files written."""
     tables = {"comparison": paper_comparison(results, jobs)}
     for model in names("model"):
         tables |= {f"{name}-{model}": t for name, t in model_tables(model, results, jobs).items()}
@@ -45,8 +35,6 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
 
 def model_tables(model: str, results: Path, jobs: int = 1) -> dict[str, pd.DataFrame]:
     """Tables that every model has: costs, errors, paper's terms, operations, quantities."""
-    import pandas as pd
-
     tables = {
         "costs": cost_table(model, results),
         "errors": error_table(model, results, jobs),
@@ -66,8 +54,6 @@ def settings_studies() -> dict[str, tuple[str, ...]]:
 
 def operation_table(model: str) -> pd.DataFrame:
     """Exact operation counts of a model's generated kernels."""
-    import pandas as pd
-
     counts = build(model).operation_counts
     return pd.DataFrame([{"kernel": name, **count} for name, count in counts.items()])
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.parameters import ParameterSet
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
-from vehiclemor.simulation.checks import check_inputs, checked_array
-from vehiclemor.simulation.paths import along
+from vehiclemor.simulation.checks import check_inputs
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 from vehiclemor.simulation.travel_limits import reachable_range
@@ -30,7 +26,7 @@ ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_dense", "chord")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
-STARTS = ("equilibrium",)
+START = "equilibrium"
 # Rack displacements at which the limits of travel are found; between them the tighter ones count.
 RACKS_OF_REACH = 9
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -50,116 +46,34 @@ REASONS = {
 
 
 @dataclass(frozen=True, eq=False)
-class AlgebraicModel:
-    """Compiled residual equations Phi(q; u) = 0 of one mechanism.
-
-    Attributes
-    ----------
-    name, summary, kind
-        Registered name, one line, and `ae`.
-    equations
-        Named quantities and what was derived.
-    parameters
-        Validated parameter set.
-    kernel_hash
-        Hash of the kernels' source and of the compiler's versions.
-    constants
-        Hoisted constants of the parameter set.
-    design
-        Coordinates (n,) at the design position, where all inputs are zero.
-    travel_limit
-        Travel in m up to which the limits of reach are looked for.
-    """
-
-    name: str
-    summary: str
-    kind: str
-    equations: Derivation
-    parameters: ParameterSet
-    kernel_hash: str
-    constants: np.ndarray
-    design: np.ndarray
-    travel_limit: float
+class AlgebraicModel(Model):
+    """Compiled residual equations Phi(q; u) = 0 of one mechanism."""
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates."""
-        return tuple(quantity.name for quantity in self.equations.coordinates)
-
-    @property
-    def speeds(self) -> tuple[str, ...]:
-        """Names of the speeds: none, the equations are algebraic."""
-        return ()
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return tuple(quantity.name for quantity in self.equations.inputs)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs."""
-        return tuple(quantity.name for quantity in self.equations.outputs)
-
-    @property
-    def starts(self) -> tuple[str, ...]:
-        """Names of the initial conditions: where the iteration starts."""
-        return STARTS
-
-    @property
-    def counts(self) -> Mapping[str, str]:
-        """What the solvers count: name -> meaning."""
-        return ALGEBRAIC_COUNTS
-
-    @property
-    def evaluations(self) -> str:
-        """Name of the count of evaluations of the equations."""
-        return "residual_evaluations"
-
-    @cached_property
-    def operation_counts(self) -> dict[str, dict[str, int]]:
-        """Operations of each generated function, by kind and in total."""
-        return self.equations.operations
-
-    def start(self, name: Start = STARTS[0]) -> np.ndarray:
-        """Coordinates (n,) from which a simulation starts its first iteration."""
-        if isinstance(name, np.ndarray):
-            return self._coordinates(name).copy()
-        if name not in STARTS:
-            raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(STARTS)}")
-        return self.design.copy()
+    def design(self) -> np.ndarray:
+        """Coordinates (n,) at the design position, where all inputs are zero."""
+        return self.initial[START]
 
     def residual(self, q: Any, u: Any) -> np.ndarray:
         """Residual Phi(q; u), shape (n,)."""
-        q, u = self._coordinates(q), self._inputs(u)
-        result = np.empty(len(q))
-        self.equations.kernels.call("residual", q, u, self.constants, result)
-        return result
+        return self.evaluated("residual", q, u)
 
     def jacobian(self, q: Any, u: Any) -> np.ndarray:
         """Analytic Jacobian of the residual with respect to q, shape (n, n)."""
-        q, u = self._coordinates(q), self._inputs(u)
-        result = np.empty((len(q), len(q) + 1))
-        self.equations.kernels.call("residual_jacobian", q, u, self.constants, result)
-        return result[:, :-1].copy()
+        return self.evaluated("residual_jacobian", q, u)[:, :-1].copy()
 
     def newton_step(self, q: Any, u: Any) -> np.ndarray:
         """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
-        q, u = self._coordinates(q), self._inputs(u)
-        result = np.empty(len(q))
-        self.equations.kernels.call("newton_step", q, u, self.constants, result)
-        return result
+        return self.evaluated("newton_step", q, u)
 
-    def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Outputs (samples, number of outputs) along a path of coordinates and inputs."""
-        return self._along("outputs", states, inputs, len(self.outputs))
+    def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Residuals (samples, n) along a path of coordinates and inputs."""
+        return self.along("residual", coordinates, inputs)
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
-        result = np.empty(self.equations.shapes["joints"])
-        q, u = self._coordinates(q), np.zeros(len(self.inputs))
-        self.equations.kernels.call("joints", q, u, self.constants, result)
-        return dict(zip(self.equations.joints, result, strict=True))
+        places = self.evaluated("joints", q, np.zeros(len(self.inputs)))
+        return dict(zip(self.definition.joints, places, strict=True))
 
     def solve(self, u: Any) -> np.ndarray:
         """Coordinates (n,) at inputs u, on the branch of the design position.
@@ -176,7 +90,7 @@ class AlgebraicModel:
         """Lowest and highest reachable wheel travel (m) at a rack displacement (m)."""
         known: dict[float, tuple[float, float]] = self.__dict__.setdefault("_reach", {})
         if rack not in known:
-            known[rack] = reachable_range(self, rack, self.travel_limit)
+            known[rack] = reachable_range(self, rack, self.definition.travel_limit)
         return known[rack]
 
     def simulate(
@@ -212,7 +126,7 @@ class AlgebraicModel:
             If an iteration fails; time and reachable range are named.
         """
         check_inputs(maneuver, self.name, self.inputs)
-        self.start(STARTS[0] if start is None else start)
+        self.start(start)
         times = maneuver.times if times is None else np.asarray(times, dtype=float)
         return self.solve_path(
             times,
@@ -283,14 +197,6 @@ class AlgebraicModel:
             message,
         )
 
-    def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Residuals (samples, n) along a path of coordinates and inputs."""
-        return self._along("residual", coordinates, inputs, len(self.coordinates))
-
-    def _along(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
-        sizes = len(self.coordinates), len(self.inputs)
-        return along(self.equations.kernels, kernel, self.constants, (path, inputs), (*sizes, size))
-
     def loop(self, name: str, *further: str) -> Loop:
         """A compiled loop with the model's kernels inlined.
 
@@ -343,12 +249,6 @@ class AlgebraicModel:
                 f"reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
                 f"(rack at {racks[sample]:g} m)"
             )
-
-    def _coordinates(self, q: Any) -> np.ndarray:
-        return checked_array(q, len(self.coordinates), "q", self.name)
-
-    def _inputs(self, u: Any) -> np.ndarray:
-        return checked_array(u, len(self.inputs), "u", self.name)
 
 
 def new_counts() -> np.ndarray:

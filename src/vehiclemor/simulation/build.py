@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
     from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
+    from vehiclemor.symbolic.program import Program
 
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
 CLOSED = 1e-9
@@ -64,21 +65,12 @@ def build(
 def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> AlgebraicModel:
     """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
     # Imported here: a model of one kind needs nothing of the other.
-    from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
+    from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, START, AlgebraicModel
 
     design = definition.design_coordinates(parameters.values())
-    equations, digest = compiled(definition.name, definition, KINEMATIC_LOOPS)
-    model = AlgebraicModel(
-        name=definition.name,
-        summary=definition.summary,
-        kind=definition.kind,
-        equations=equations,
-        parameters=parameters,
-        kernel_hash=digest,
-        constants=hoisted_constants(equations, parameters, []),
-        design=design,
-        travel_limit=definition.travel_limit,
-    )
+    equations, digest = compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
+    constants = hoisted_constants(equations, parameters, [])
+    model = AlgebraicModel(definition, equations, parameters, digest, constants, {START: design})
     nothing = np.zeros(len(model.inputs))
     gap = float(np.abs(model.residual(design, nothing)).max())
     if not gap < CLOSED:
@@ -101,50 +93,25 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
         for key, declared in definition.parameters.items()
     }
     definition.check(values)
-    equations, digest = compiled(definition.name, definition)
+    equations, digest = compiled(definition.name, definition.derive)
     values |= solved_parameters(definition, values, parameters, equations)
     solved = [float(values[key]) for key in definition.solved]
-    states = definition.states
-    # The heading comes after the place; it matters where states turn with it.
-    rotating = [definition.planar[2]] if definition.heading_pairs else []
-    rotating += [state for pair in definition.heading_pairs for state in pair]
-    return DynamicModel(
-        name=definition.name,
-        summary=definition.summary,
-        kind=definition.kind,
-        equations=equations,
-        parameters=parameters,
-        kernels=equations.kernels,
-        kernel_hash=digest,
-        constants=hoisted_constants(equations, parameters, solved),
-        initial=definition.starts(values),
-        active=_numbers(states, [state for state in states if state not in definition.cyclic]),
-        error_scale=np.array([definition.error_scale.get(state, 1.0) for state in states]),
-        validity=definition.validity,
-        loads=definition.loads,
-        rotating=_numbers(states, rotating),
-        planar=_numbers(states, definition.planar),
-    )
-
-
-def _numbers(states: tuple[str, ...], chosen: list[str] | tuple[str, ...]) -> np.ndarray:
-    """Places of some states among all."""
-    return np.array([states.index(state) for state in chosen], dtype=np.int64)
+    constants = hoisted_constants(equations, parameters, solved)
+    initial = definition.starts(values)
+    return DynamicModel(definition, equations, parameters, digest, constants, initial)
 
 
 def compiled(
-    name: str, definition: Any, loops: Sequence[str] = LOOP_SOURCES
+    name: str, derive: Callable[[], Program], loops: Sequence[str] = LOOP_SOURCES
 ) -> tuple[Derivation, str]:
     """Derivation of a model, and the hash of its kernels and loops; parameters play no part here.
 
     Parameters
     ----------
-    definition
-        What has `derive`: a model's definition, or a module of equations.
     loops
         Modules of the loops that run it.
     """
-    made = derivation(name, definition)
+    made = derivation(name, derive)
     return made, kernel_hash(f"{made.source}\n{loops_digest(loops)}")
 
 

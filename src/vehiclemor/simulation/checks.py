@@ -10,7 +10,7 @@ from vehiclemor.maneuvers import Maneuver
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
-    """A finite array (size,) of floats, as compiled functions want it.
+    """A finite array (size,) of floats, as compiled functions want it; a number is one entry.
 
     Raises
     ------
@@ -18,7 +18,7 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
         If the shape is another one or an entry isn't finite.
     """
     try:
-        array = loop_array(value)
+        array = np.atleast_1d(loop_array(value))
     except (TypeError, ValueError):
         raise InputError(f"{name} is {value!r}, {model} needs {size} numbers") from None
     if array.shape != (size,):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def jacobian(model: DynamicModel, x: Any, u: Any) -> np.ndarray:
     """df/dx (2 n, 2 n) by central differences; columns of cyclic states are zero."""
     x = checked_array(x, 2 * len(model.coordinates), "x", model.name)
-    u = checked_array(np.atleast_1d(u), len(model.inputs), "u", model.name)
+    u = checked_array(u, len(model.inputs), "u", model.name)
     return model.system.jacobian(x, u)
 
 

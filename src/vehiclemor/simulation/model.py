@@ -1,98 +1,138 @@
-"""What every model offers, whatever its kind."""
+"""What every model that is ready to run offers, whatever its kind."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
-from functools import cached_property
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.derivation import Derivation
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.checks import checked_array
+from vehiclemor.simulation.paths import along
+from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Start, Trajectory
+
+NEEDED_FOR = {
+    "second_order": "equations of motion can't be projected in the coordinates, nor weighed by "
+    "energy",
+    "speeds": "rates of the coordinates can't be turned into speeds",
+    "descriptor": "there are no equations before elimination",
+    "violations": "there are no constraints",
+}
 
 
-class Model(Protocol):
-    """A model ready to run, as studies, methods and reports see it.
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A model with one parameter set, as studies, methods and reports see it.
 
     A state is the coordinates and, after them, the speeds; kinematic models have no speeds.
+
+    Attributes
+    ----------
+    definition
+        What was declared of it.
+    equations
+        What was derived.
+    parameters
+        Validated parameter set.
+    kernel_hash
+        Hash of the source of kernels and loops, and of the compiler's versions.
+    constants
+        Hoisted constants of the parameter set.
+    initial
+        Start -> state (n,); the default first.
     """
+
+    definition: ModelDefinition
+    equations: Derivation
+    parameters: ParameterSet
+    kernel_hash: str
+    constants: np.ndarray
+    initial: Mapping[str, np.ndarray]
 
     @property
     def name(self) -> str:
         """Registered name."""
-        ...
+        return self.definition.name
 
     @property
     def summary(self) -> str:
         """One line."""
-        ...
+        return self.definition.summary
 
     @property
     def kind(self) -> str:
         """One of `KINDS`."""
-        ...
-
-    @property
-    def equations(self) -> Any:
-        """Named quantities `coordinates`, `inputs`, `outputs` and, if there are any, `speeds`."""
-        ...
-
-    @property
-    def parameters(self) -> ParameterSet:
-        """Validated parameter set."""
-        ...
-
-    @property
-    def kernel_hash(self) -> str:
-        """Hash of the kernels' source and of the compiler's versions."""
-        ...
+        return self.definition.kind
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates."""
-        ...
+        return tuple(q.name for q in self.definition.coordinates)
 
     @property
     def speeds(self) -> tuple[str, ...]:
         """Names of the speeds."""
-        ...
+        return tuple(q.name for q in self.definition.speeds)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs."""
-        ...
+        return tuple(q.name for q in self.definition.inputs)
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs."""
-        ...
+        return tuple(q.name for q in self.definition.outputs)
 
     @property
     def starts(self) -> tuple[str, ...]:
         """Names of the initial conditions, the default first."""
-        ...
+        return tuple(self.initial)
 
     @property
     def counts(self) -> Mapping[str, str]:
         """What its solvers count: name -> meaning."""
-        ...
+        return COUNTS[self.kind]
 
     @property
     def evaluations(self) -> str:
         """Name of the count that tells how often its equations were evaluated."""
-        ...
+        return EVALUATIONS[self.kind]
 
-    @cached_property
+    @property
     def operation_counts(self) -> dict[str, dict[str, int]]:
         """Operations of each generated function, by kind and in total."""
-        ...
+        return self.equations.operations
 
-    def start(self, name: Start) -> np.ndarray:
-        """State (n,) of an initial condition, or the one given; `InputError` if it is neither."""
-        ...
+    @property
+    def kernels(self) -> Kernels:
+        """Kernels of the equations, each compiled when it is first used."""
+        return self.equations.kernels
 
+    def start(self, name: Start | None = None) -> np.ndarray:
+        """State (n,) of an initial condition (the first by default), or a copy of the one given.
+
+        Raises
+        ------
+        InputError
+            If it is neither a known name nor a state.
+        """
+        if isinstance(name, np.ndarray):
+            return self._state(name, "start").copy()
+        name = name or self.starts[0]
+        if name not in self.initial:
+            raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")
+        return self.initial[name].copy()
+
+    @abstractmethod
     def simulate(
         self,
         maneuver: Maneuver,
@@ -102,8 +142,39 @@ class Model(Protocol):
         tolerance: float | None = None,
     ) -> Trajectory:
         """Full-order solution; where None, the model's first start, output times and defaults."""
-        ...
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
-        ...
+        return self.along("outputs", states, inputs)
+
+    def along(self, function: str, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Results (samples, size) of a function of the equations along a path."""
+        sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
+        return along(self.kernels, function, self.constants, (states, inputs), sizes)
+
+    def require(self, *functions: str) -> None:
+        """Raise `InputError` if the model's equations lack one of these functions."""
+        for name in functions:
+            if name not in self.equations.shapes:
+                raise InputError(f"{self.name} has no {name}: {NEEDED_FOR[name]}")
+
+    def evaluated(self, function: str, state: Any, u: Any) -> np.ndarray:
+        """Result of a function of the equations at a state (n,) and inputs.
+
+        Raises
+        ------
+        InputError
+            If the model has no such function, or a value isn't finite.
+        """
+        if function in NEEDED_FOR:
+            self.require(function)
+        result = np.empty(self.equations.shapes[function])
+        state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
+        self.kernels.call(function, state, u, self.constants, result)
+        return result
+
+    def _state(self, state: Any, name: str) -> np.ndarray:
+        return checked_array(state, len(self.definition.states), name, self.name)
+
+    def _inputs(self, u: Any) -> np.ndarray:
+        return checked_array(u, len(self.inputs), "u", self.name)

@@ -15,7 +15,6 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.simulation.checks import check_positive, check_times, loop_array
 from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.exponential_functions import block_functions
 from vehiclemor.simulation.integrators.structures import (
     NOT_FINITE,
     SINGULAR,
@@ -186,9 +185,8 @@ class System:
             chosen = catalogue.integrator(solver)
             if chosen.operators is None:
                 operators = np.zeros((1, 1, 1))
-            elif solver in self.fused and self.diagonal:
-                blocks = self.diagonal
-                operators = block_functions(self.frozen_jacobian, blocks, catalogue.STEP_GRID)
+            elif solver in self.fused and chosen.block_operators:
+                operators = chosen.block_operators(self.frozen_jacobian, self.diagonal)
             else:
                 operators = chosen.operators(self.frozen_jacobian, active)
             grid = catalogue.STEP_GRID
@@ -237,6 +235,7 @@ class System:
         fused = self.fused.get(name, "") if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(state)
+        assert dim == n or not full, f"{n} states in a space of {dim} dimensions"
         arguments = RunArguments(
             loop_array(state),
             self.called(windows.formulation, fused),

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from vehiclemor.errors import UnreachableError
-
-if TYPE_CHECKING:
-    from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.model import Model
 
 # Steps of the continuation (m): larger Newton steps can jump to another branch beyond the fold.
 FIRST_STEP = 5e-4
@@ -21,7 +17,7 @@ TOLERANCE = 1e-11
 LARGEST_CHANGE = 0.1
 
 
-def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[float, float]:
+def reachable_range(model: Model, rack: float, limit: float) -> tuple[float, float]:
     """Lowest and highest reachable height (m) at a rack displacement.
 
     Parameters
@@ -43,7 +39,7 @@ def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[f
     UnreachableError
         If not even the design height can be reached at this rack displacement.
     """
-    q = model.design
+    q = model.start()
     steps = max(1, int(np.ceil(abs(rack) / FIRST_STEP)))
     for step in range(1, steps + 1):
         moved = _solve(model, q, np.array([0.0, rack * step / steps]))
@@ -55,7 +51,7 @@ def reachable_range(model: AlgebraicModel, rack: float, limit: float) -> tuple[f
     return _limit(model, q, rack, -limit), _limit(model, q, rack, limit)
 
 
-def _limit(model: AlgebraicModel, q: np.ndarray, rack: float, limit: float) -> float:
+def _limit(model: Model, q: np.ndarray, rack: float, limit: float) -> float:
     direction = 1.0 if limit > 0.0 else -1.0
     step, travelled = FIRST_STEP, 0.0
     sign = _orientation(model, q, np.array([0.0, rack]))
@@ -72,14 +68,15 @@ def _limit(model: AlgebraicModel, q: np.ndarray, rack: float, limit: float) -> f
     return direction * travelled
 
 
-def _orientation(model: AlgebraicModel, q: np.ndarray, u: np.ndarray) -> float:
-    return float(np.linalg.slogdet(model.jacobian(q, u)).sign)
+def _orientation(model: Model, q: np.ndarray, u: np.ndarray) -> float:
+    jacobian = model.evaluated("residual_jacobian", q, u)[:, :-1]
+    return float(np.linalg.slogdet(jacobian).sign)
 
 
-def _solve(model: AlgebraicModel, start: np.ndarray, u: np.ndarray) -> np.ndarray | None:
+def _solve(model: Model, start: np.ndarray, u: np.ndarray) -> np.ndarray | None:
     q = start
     for _ in range(ITERATIONS):
-        step = model.newton_step(q, u)
+        step = model.evaluated("newton_step", q, u)
         q = q - step
         if not np.isfinite(q).all() or np.abs(q - start).max() > LARGEST_CHANGE:
             return None

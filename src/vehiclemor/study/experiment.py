@@ -65,13 +65,7 @@ def make_experiment(
     test: tuple[Scenario, ...],
     keep: Keep = "trajectories",
 ) -> Experiment:
-    """An experiment with the present kernels, parameters and source.
-
-    Parameters
-    ----------
-    settings
-        All settings of the method, from `complete_settings`.
-    """
+    """An experiment with present kernels, parameters and source; settings are complete ones."""
     if keep != "errors" and len(test) != 1:
         raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
     return Experiment(

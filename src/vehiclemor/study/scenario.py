@@ -1,7 +1,5 @@
 """Scenarios: what a reduced model is trained, chosen or tested on."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Sequence
@@ -110,14 +108,7 @@ def training_run(model: Model, scenario: Scenario) -> TrainingRun:
 def training_scenarios(
     test: Scenario, policy: str, factors: Sequence[tuple[float, float]] = ()
 ) -> tuple[Scenario, ...]:
-    """What a training policy trains on before a test scenario.
-
-    Parameters
-    ----------
-    policy
-        One of `reduction.training.POLICIES`.
-    factors
-        (frequency, amplitude) factors of the policy `set`.
+    """What a training policy trains on before a test scenario, see `policy_factors`.
 
     Raises
     ------

@@ -40,13 +40,7 @@ def cell_path(folder: Path, key: str) -> Path:
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a dataset as a whole file.
-
-    Raises
-    ------
-    FileError
-        If the folder can't be written.
-    """
+    """Write a dataset as a whole file."""
     write_whole(path, lambda temporary: dataset.to_netcdf(temporary, engine="netcdf4"))
 
 

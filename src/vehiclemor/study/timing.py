@@ -28,6 +28,7 @@ from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.scenario import Scenario, start_of
 from vehiclemor.study.store import prepare_folder, stored
+from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,22 +40,15 @@ REPEATS, LONG_RUN = 4, 2e-3
 # Fits whose median counts, as long as they take no more than these seconds together; and the length
 # (s) of a fit beside which loading machine code is nothing.
 FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 10.0
-# Variable -> case against which it is the speed-up, and in words.
-SPEED_UPS = {
-    "speed_up": ("baseline", "against the paper's kind of baseline, median of rounds"),
-    "speed_up_strongest": ("strongest", "against the strongest full order, median"),
-}
+# Variable -> case against which it is the speed-up, and quantiles of a run's seconds.
+SPEED_UPS = {"speed_up": "baseline", "speed_up_strongest": "strongest"}
+QUANTILES = {"seconds_median": 0.5, "seconds_lower": 0.25, "seconds_upper": 0.75}
 
 
 def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: str) -> xr.Dataset:
     """Stored timing of cases on the model's nominal maneuver, from every start.
 
-    Measured first if it is missing or out of date.
-
-    Parameters
-    ----------
-    name
-        Of the file in the folder `studies`.
+    Measured first if the file `studies/<name>.nc` is missing or out of date.
 
     Returns
     -------
@@ -131,19 +125,18 @@ def timed_cases(
     timed = _dataset(experiments, seconds, offline, points).isel(scenario=0, drop=True)
     dataset = dataset.merge(timed)
     tolerances = [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()]
-    columns: dict[str, tuple] = {
-        "seconds_per_sample": (timed["seconds"].values / maneuver.samples, "s", "for a time point"),
-        "tolerance": (tolerances, "1", "tolerance of the solver"),
+    columns: dict[str, object] = {
+        "seconds_per_sample": timed["seconds"].values / maneuver.samples,
+        "tolerance": tolerances,
     }
     # Round by round, so that a burst of other load on the machine hits both alike.
     own = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
-    for name, (against, text) in SPEED_UPS.items():
+    for name, against in SPEED_UPS.items():
         if against in experiments:
             baseline = seconds[:, [list(experiments).index(against)], 0]
-            columns[name] = (np.median(baseline / own, axis=0), "1", text)
-    for name, (values, unit, text) in columns.items():
-        dataset[name] = ("case", values, {"units": unit, "long_name": text})
-    dataset = dataset.assign_coords(start=start, label=("case", [case.label for case in cases]))
+            columns[name] = np.median(baseline / own, axis=0)
+    labels = ("case", [case.label for case in cases])
+    dataset = dataset.assign(variables(columns, "case")).assign_coords(start=start, label=labels)
     return dataset.assign_attrs(timed.attrs)
 
 
@@ -173,22 +166,14 @@ def _dataset(
     """Median and quartiles of rounds (rounds, cases, scenarios)."""
     import xarray as xr
 
-    text = f"median of {len(seconds)} rounds, in the compiled loop"
-    quantiles = {
-        "seconds": (0.5, text),
-        "seconds_lower": (0.25, "lower quartile"),
-        "seconds_upper": (0.75, "upper quartile"),
-    }
-    variables: dict[str, tuple] = {}
-    for name, (share, text) in quantiles.items():
-        values = np.quantile(seconds, share, axis=0)
-        variables[name] = (("case", "scenario"), values, {"units": "s", "long_name": text})
-    text = "training simulations and fit"
-    variables["offline_seconds"] = ("case", offline, {"units": "s", "long_name": text})
+    quantiles = {name: np.quantile(seconds, share, axis=0) for name, share in QUANTILES.items()}
+    found = variables(quantiles, "case", "scenario")
+    found |= variables({"offline_seconds": offline}, "case")
+    found["seconds"] = found.pop("seconds_median")
     first = next(iter(experiments.values()))
     labels = {"case": list(experiments), "scenario": [scenario.label for scenario in first.test]}
     title = f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}"
-    return xr.Dataset(variables, labels, attributes(title, first.kernel, model=first.model))
+    return xr.Dataset(found, labels, attributes(title, first.kernel, model=first.model))
 
 
 def _rounds(

@@ -19,16 +19,9 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass
 class Workers:
-    """Evaluates what is missing of some experiments and stores it.
+    """Evaluates what is missing of some experiments, in so many jobs, and stores it.
 
-    Attributes
-    ----------
-    name
-        Study that is told to `progress`.
-    jobs
-        Number of processes.
-    progress
-        Called with (study, finished experiments, all experiments).
+    `progress` is called with (name, finished experiments, all experiments).
     """
 
     name: str

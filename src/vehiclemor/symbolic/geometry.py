@@ -1,69 +1,89 @@
 """Vectors and rotations whose components are named on a tape.
 
-A vector is a tuple of three SymPy scalars in one frame; a rotation is a tuple of three rows.
+Components are SymPy scalars; a rotation is a tuple of three rows.
 """
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 
 import sympy as sp
 
 from vehiclemor.symbolic.tape import Tape
 
-Vector = tuple[sp.Expr, sp.Expr, sp.Expr]
+
+@dataclass(frozen=True)
+class Vector:
+    """Three components in one frame; `a @ b` is the scalar product."""
+
+    x: sp.Expr
+    y: sp.Expr
+    z: sp.Expr
+
+    def __iter__(self) -> Iterator[sp.Expr]:
+        return iter((self.x, self.y, self.z))
+
+    def __getitem__(self, place: int) -> sp.Expr:
+        return (self.x, self.y, self.z)[place]
+
+    def __add__(self, other: Vector) -> Vector:
+        return Vector(self.x + other.x, self.y + other.y, self.z + other.z)
+
+    def __sub__(self, other: Vector) -> Vector:
+        return Vector(self.x - other.x, self.y - other.y, self.z - other.z)
+
+    def __mul__(self, factor: sp.Expr | int) -> Vector:
+        return Vector(factor * self.x, factor * self.y, factor * self.z)
+
+    def __matmul__(self, other: Vector) -> sp.Expr:
+        return self.x * other.x + self.y * other.y + self.z * other.z
+
+    def cross(self, other: Vector) -> Vector:
+        """Vector product."""
+        return Vector(
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
+        )
+
+
 Rotation = tuple[Vector, Vector, Vector]
 # An angle in rad, or its cosine and sine where no angle is known.
 Angle = sp.Expr | tuple[sp.Expr, sp.Expr]
 
 
-def vector(components: Sequence[sp.Expr | float]) -> Vector:
+def vector(components: Iterable[sp.Expr | float]) -> Vector:
     """Make a vector from three components."""
     x, y, z = (sp.sympify(component) for component in components)
-    return x, y, z
+    return Vector(x, y, z)
 
 
-def named(tape: Tape, components: Sequence[sp.Expr]) -> Vector:
+def named(tape: Tape, components: Iterable[sp.Expr]) -> Vector:
     """Name each component on the tape."""
     x, y, z = (tape.let(component) for component in components)
-    return x, y, z
+    return Vector(x, y, z)
 
 
-def add(a: Vector, b: Vector) -> Vector:
-    """Sum a + b."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+def matrix(entry: Callable[[int, int], sp.Expr]) -> Rotation:
+    """Three rows from their entries (row, column)."""
+    rows = [Vector(entry(i, 0), entry(i, 1), entry(i, 2)) for i in range(3)]
+    return rows[0], rows[1], rows[2]
 
 
-def subtract(a: Vector, b: Vector) -> Vector:
-    """Difference a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def scale(factor: sp.Expr, a: Vector) -> Vector:
-    """Product of a scalar and a vector."""
-    return factor * a[0], factor * a[1], factor * a[2]
-
-
-def dot(a: Vector, b: Vector) -> sp.Expr:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+def column(rotation: Rotation, number: int) -> Vector:
+    """A column of a rotation: where it turns a unit vector."""
+    return Vector(rotation[0][number], rotation[1][number], rotation[2][number])
 
 
 def length(tape: Tape, a: Vector) -> sp.Expr:
     """Euclidean length, named on the tape."""
-    return tape.let(sp.sqrt(tape.let(dot(a, a))))
+    return tape.let(sp.sqrt(tape.let(a @ a)))
 
 
 def rotate(tape: Tape, rotation: Rotation, a: Vector) -> Vector:
     """Components of the rotated vector, named on the tape."""
-    return named(tape, [dot(row, a) for row in rotation])
+    return named(tape, [row @ a for row in rotation])
 
 
 def euler_321(tape: Tape, yaw: sp.Expr, pitch: sp.Expr, roll: sp.Expr) -> Rotation:
@@ -95,8 +115,8 @@ def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: Angle) -> Vect
     The part along the axis and the two vectors that span the circle are named on the tape, so that
     they are hoisted out of the kernel where they depend on parameters alone.
     """
-    along = named(tape, scale(tape.let(dot(axis, a)), axis))
-    across = named(tape, subtract(a, along))
-    quarter_turn = named(tape, cross(axis, a))
+    along = named(tape, axis * tape.let(axis @ a))
+    across = named(tape, a - along)
+    quarter_turn = named(tape, axis.cross(a))
     c, s = cosine(tape, angle), sine(tape, angle)
-    return named(tape, add(along, add(scale(c, across), scale(s, quarter_turn))))
+    return named(tape, along + across * c + quarter_turn * s)

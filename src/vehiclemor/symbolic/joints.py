@@ -37,8 +37,8 @@ def free_rate(number: int, speed: sp.Expr) -> Rate:
 
 def along(rate: Rate, direction: Vector) -> Motion:
     """Translation along, or rotation about, a direction that is fixed in the frame."""
-    columns = {k: g.scale(factor, direction) for k, factor in rate.columns.items()}
-    return Motion(g.scale(rate.value, direction), columns, g.scale(rate.bias, direction))
+    columns = {k: direction * factor for k, factor in rate.columns.items()}
+    return Motion(direction * rate.value, columns, direction * rate.bias)
 
 
 def successive(tape: Tape, rates: Sequence[Rate], axes: Sequence[Vector]) -> Motion:
@@ -53,11 +53,11 @@ def successive(tape: Tape, rates: Sequence[Rate], axes: Sequence[Vector]) -> Mot
     columns: dict[int, Vector] = {}
     for rate, axis in zip(rates, axes, strict=True):
         part = along(rate, axis)
-        swept = g.cross(value, part.value)
-        bias = g.named(tape, g.add(bias, g.add(part.bias, swept)))
-        value = g.named(tape, g.add(value, part.value))
+        swept = value.cross(part.value)
+        bias = g.named(tape, bias + part.bias + swept)
+        value = g.named(tape, value + part.value)
         for k, column in part.columns.items():
-            columns[k] = g.add(columns.get(k, ZERO), column)
+            columns[k] = columns.get(k, ZERO) + column
     return Motion(value, {k: g.named(tape, c) for k, c in columns.items()}, bias)
 
 
@@ -70,12 +70,12 @@ def carried(tape: Tape, base: Motion, rotation: Motion, lever: Vector) -> Motion
         From the other point to this one.
     """
     turn = rotation.value
-    swept = g.named(tape, g.cross(turn, lever))
-    value = g.named(tape, g.add(base.value, swept))
-    bias = g.add(base.bias, g.add(g.cross(rotation.bias, lever), g.cross(turn, swept)))
+    swept = g.named(tape, turn.cross(lever))
+    value = g.named(tape, base.value + swept)
+    bias = base.bias + rotation.bias.cross(lever) + turn.cross(swept)
     columns = dict(base.columns)
     for k, column in rotation.columns.items():
-        columns[k] = g.add(columns.get(k, ZERO), g.cross(column, lever))
+        columns[k] = columns.get(k, ZERO) + column.cross(lever)
     columns = {k: g.named(tape, column) for k, column in columns.items()}
     return Motion(value, columns, g.named(tape, bias))
 

@@ -16,15 +16,11 @@ from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.tape import Tape
 
-Tensor = tuple[Vector, Vector, Vector]
+Tensor = g.Rotation
 Matrix = Sequence[Sequence[sp.Expr]]
 
-ZERO: Vector = (sp.Integer(0), sp.Integer(0), sp.Integer(0))
-UNIT: tuple[Vector, Vector, Vector] = (
-    g.vector((1, 0, 0)),
-    g.vector((0, 1, 0)),
-    g.vector((0, 0, 1)),
-)
+ZERO = g.vector((0, 0, 0))
+UNIT = g.vector((1, 0, 0)), g.vector((0, 1, 0)), g.vector((0, 0, 1))
 
 
 @dataclass(frozen=True)
@@ -129,7 +125,7 @@ class MovingFrame:
         """Motion of the origin."""
         bias = self.acceleration
         if bias is None:
-            bias = g.named(tape, g.cross(self.angular_velocity, self.velocity))
+            bias = g.named(tape, self.angular_velocity.cross(self.velocity))
         return Motion(self.velocity, {self.first + i: UNIT[i] for i in range(3)}, bias)
 
     def point(self, tape: Tape, place: Vector, relative: Motion | None = None) -> Motion:
@@ -141,16 +137,16 @@ class MovingFrame:
             Motion of the point relative to the frame; its bias is the relative acceleration.
         """
         origin, turn = self.origin(tape), self.angular_velocity
-        velocity = g.add(self.velocity, g.cross(turn, place))
+        velocity = self.velocity + turn.cross(place)
         columns = dict(origin.columns)
-        columns |= {self.first + 3 + i: g.cross(UNIT[i], place) for i in range(3)}
-        lever = g.named(tape, g.cross(turn, place))
-        bias = g.add(origin.bias, g.cross(turn, lever))
+        columns |= {self.first + 3 + i: UNIT[i].cross(place) for i in range(3)}
+        lever = g.named(tape, turn.cross(place))
+        bias = origin.bias + turn.cross(lever)
         if relative is not None:
-            velocity = g.add(velocity, relative.value)
+            velocity = velocity + relative.value
             columns |= relative.columns
-            coriolis = g.scale(sp.Integer(2), g.cross(turn, relative.value))
-            bias = g.add(bias, g.add(coriolis, relative.bias))
+            coriolis = turn.cross(relative.value) * sp.Integer(2)
+            bias = bias + coriolis + relative.bias
         return Motion(g.named(tape, velocity), columns, g.named(tape, bias))
 
     def turning(self, tape: Tape, relative: Motion) -> Motion:
@@ -163,8 +159,8 @@ class MovingFrame:
         """
         turn = self.angular_velocity
         columns = {self.first + 3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
-        bias = g.add(g.cross(turn, relative.value), relative.bias)
-        return Motion(g.named(tape, g.add(turn, relative.value)), columns, g.named(tape, bias))
+        bias = turn.cross(relative.value) + relative.bias
+        return Motion(g.named(tape, turn + relative.value), columns, g.named(tape, bias))
 
     def rotation(
         self,
@@ -186,10 +182,10 @@ class MovingFrame:
         value, columns = turn, {self.first + 3 + i: UNIT[i] for i in range(3)}
         if spin is not None:
             number, speed, axis = spin
-            value = g.named(tape, g.add(turn, g.scale(speed, axis)))
+            value = g.named(tape, turn + axis * speed)
             columns[number] = axis
         momentum = g.named(tape, product(inertia, value))
-        return Motion(value, columns, g.named(tape, g.cross(turn, momentum)))
+        return Motion(value, columns, g.named(tape, turn.cross(momentum)))
 
 
 def with_inertia(tape: Tape, inertia: Tensor, turning: Motion) -> Motion:
@@ -201,23 +197,19 @@ def with_inertia(tape: Tape, inertia: Tensor, turning: Motion) -> Motion:
         Tensor about the centre of mass, components in the frame at this moment.
     """
     momentum = g.named(tape, product(inertia, turning.value))
-    bias = g.add(product(inertia, turning.bias), g.cross(turning.value, momentum))
+    bias = product(inertia, turning.bias) + turning.value.cross(momentum)
     return Motion(turning.value, turning.columns, g.named(tape, bias))
 
 
 def product(tensor: Tensor, a: Vector) -> Vector:
     """Product of a tensor and a vector."""
-    return g.dot(tensor[0], a), g.dot(tensor[1], a), g.dot(tensor[2], a)
+    return Vector(tensor[0] @ a, tensor[1] @ a, tensor[2] @ a)
 
 
 def axisymmetric_inertia(about_axis: sp.Expr, across: sp.Expr, axis: Vector) -> Tensor:
     """Inertia tensor of a body of revolution about a unit axis."""
     excess = about_axis - across
-
-    def row(i: int) -> Vector:
-        return g.vector([excess * axis[i] * axis[j] + (across if i == j else 0) for j in range(3)])
-
-    return row(0), row(1), row(2)
+    return g.matrix(lambda i, j: excess * axis[i] * axis[j] + (across if i == j else 0))
 
 
 def kane(
@@ -227,26 +219,26 @@ def kane(
     mass: list[list[sp.Expr]] = [[sp.Integer(0)] * speeds for _ in range(speeds)]
     force: list[sp.Expr] = [sp.Integer(0)] * speeds
     for body in bodies:
-        free = g.subtract(body.force, g.scale(body.mass, body.centre.bias))
+        free = body.force - body.centre.bias * body.mass
         loads = [(body.centre.columns, g.named(tape, free))]
         # Columns beside their images: mass times velocity, inertia times angular velocity.
         columns = body.centre.columns
-        images = [(columns, {k: g.scale(body.mass, column) for k, column in columns.items()})]
+        images = [(columns, {k: column * body.mass for k, column in columns.items()})]
         if body.rotation is not None and body.inertia is not None:
             columns = body.rotation.columns
             images.append((columns, {k: product(body.inertia, c) for k, c in columns.items()}))
-            turning = g.subtract(body.moment, body.rotation.bias)
+            turning = body.moment - body.rotation.bias
             if body.rotor is not None:
-                turning = g.subtract(turning, _add_rotor(tape, body, mass, force))
+                turning = turning - _add_rotor(tape, body, mass, force)
             loads.append((columns, g.named(tape, turning)))
         for columns, weighted in images:
             for k, image in weighted.items():
                 for j, other in columns.items():
                     if j >= k:
-                        mass[j][k] += g.dot(other, image)
+                        mass[j][k] += other @ image
         for columns, load in loads:
             for j, column in columns.items():
-                force[j] += g.dot(column, load)
+                force[j] += column @ load
     lower = [[tape.let(mass[j][k]) for k in range(j + 1)] for j in range(speeds)]
     full = [[lower[max(j, k)][min(j, k)] for k in range(speeds)] for j in range(speeds)]
     return full, [tape.let(f) for f in force]
@@ -258,13 +250,13 @@ def _add_rotor(tape: Tape, body: Body, mass: list[list[sp.Expr]], force: list[sp
     assert rotor is not None
     assert rotation is not None
     assert body.acceleration is not None
-    momentum = g.named(tape, g.scale(rotor.inertia, rotor.axis))
+    momentum = g.named(tape, rotor.axis * rotor.inertia)
     for k, column in rotation.columns.items():
-        mass[max(rotor.number, k)][min(rotor.number, k)] += g.dot(momentum, column)
+        mass[max(rotor.number, k)][min(rotor.number, k)] += momentum @ column
     mass[rotor.number][rotor.number] += rotor.inertia
-    force[rotor.number] += rotor.moment - g.dot(momentum, body.acceleration)
-    spin = g.named(tape, g.scale(rotor.speed, momentum))
-    return g.cross(rotation.value, spin)
+    force[rotor.number] += rotor.moment - (momentum @ body.acceleration)
+    spin = g.named(tape, momentum * rotor.speed)
+    return rotation.value.cross(spin)
 
 
 def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: g.Angle) -> Tensor:
@@ -281,7 +273,7 @@ def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: g.Angle) -> T
     def sandwich(left: Matrix, right: Matrix) -> list[list[sp.Expr]]:
         """Product left T right^T."""
         columns = [g.named(tape, product(tensor, g.vector(row))) for row in right]
-        return [[tape.let(g.dot(g.vector(row), column)) for column in columns] for row in left]
+        return [[tape.let(g.vector(row) @ column) for column in columns] for row in left]
 
     sine, cosine = g.sine(tape, angle), g.cosine(tape, angle)
     both, square = tape.let(sine * cosine), tape.let(sine * sine)
@@ -304,12 +296,12 @@ def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: g.Angle) -> T
 def rotated_tensor(tape: Tape, tensor: Tensor, rotation: Tensor) -> Tensor:
     """Tensor R T R^T."""
     inner = [g.named(tape, product(tensor, row)) for row in rotation]
-    return _symmetric(lambda i, j: tape.let(g.dot(rotation[i], inner[j])))
+    return _symmetric(lambda i, j: tape.let(rotation[i] @ inner[j]))
 
 
 def point_mass_tensor(mass: sp.Expr, lever: Vector) -> Tensor:
     """Tensor of a point mass about a point from which the lever leads to it."""
-    square = g.dot(lever, lever)
+    square = lever @ lever
     return _symmetric(
         lambda i, j: mass * ((square if i == j else sp.Integer(0)) - lever[i] * lever[j])
     )
@@ -317,8 +309,4 @@ def point_mass_tensor(mass: sp.Expr, lever: Vector) -> Tensor:
 
 def _symmetric(entry: Callable[[int, int], sp.Expr]) -> Tensor:
     e = {(i, j): entry(i, j) for i in range(3) for j in range(i + 1)}
-    return (
-        (e[0, 0], e[1, 0], e[2, 0]),
-        (e[1, 0], e[1, 1], e[2, 1]),
-        (e[2, 0], e[2, 1], e[2, 2]),
-    )
+    return g.matrix(lambda i, j: e[max(i, j), min(i, j)])

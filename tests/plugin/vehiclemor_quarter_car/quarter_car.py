@@ -7,7 +7,6 @@ import sympy as sp
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.equations import DynamicEquations
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.models.vehicle_parameters import DAMPING, LENGTH, MASS, STIFFNESS
 from vehiclemor.symbolic.program import assemble
@@ -38,8 +37,7 @@ def derive():
         "second_order": ([m_s, sp.Integer(0), strut, sp.Integer(0), m_u, tire - strut], (2, 3)),
         "speeds": ([v_s, v_u], (2,)),
     }
-    program = assemble(tape, {"x": x_u[:4], "u": x_u[4:]}, p, functions)
-    return DynamicEquations(**QUANTITIES, program=program)
+    return assemble(tape, {"x": x_u[:4], "u": x_u[4:]}, p, functions)
 
 
 def starts(p):

@@ -68,24 +68,21 @@ def angle_bias(tape: Tape, chassis: Attitude, turning: Vector) -> Vector:
     """Rate of the angular velocity where yaw, pitch and roll have no second derivatives."""
     yaw, pitch, roll = angle_rates(tape, chassis, turning)
     s, c, sp_, cp = chassis.sin_roll, chassis.cos_roll, chassis.sin_pitch, chassis.cos_pitch
-    return (
-        tape.let(-yaw * cp * pitch),
-        tape.let(yaw * (c * cp * roll - s * sp_ * pitch) - pitch * s * roll),
-        tape.let(yaw * (-s * cp * roll - c * sp_ * pitch) - pitch * c * roll),
-    )
+    second = yaw * (c * cp * roll - s * sp_ * pitch) - pitch * s * roll
+    third = yaw * (-s * cp * roll - c * sp_ * pitch) - pitch * c * roll
+    return g.named(tape, (-yaw * cp * pitch, second, third))
 
 
 def _speeds_per_rates(chassis: Attitude) -> tuple[Rotation, Rotation]:
     """Matrices that turn rates of position and of angles into speeds."""
-    rows = chassis.rotation
-    turned = tuple((rows[0][i], rows[1][i], rows[2][i]) for i in range(3))
+    turned = g.matrix(lambda i, j: chassis.rotation[j][i])
     s, c = chassis.sin_roll, chassis.cos_roll
     angular = (
         g.vector((-chassis.sin_pitch, 0, 1)),
         g.vector((s * chassis.cos_pitch, c, 0)),
         g.vector((c * chassis.cos_pitch, -s, 0)),
     )
-    return (turned[0], turned[1], turned[2]), angular
+    return turned, angular
 
 
 def speeds(tape: Tape, chassis: Attitude, rate: Sequence[sp.Expr]) -> list[sp.Expr]:
@@ -119,7 +116,7 @@ def in_coordinates(
     # nu = P q', so that d(nu)/dt = P q'' + bias and P^T (M P q'' + M bias - F) = 0.
     turning = g.vector(nu[3:6])
     if velocity_bias is None:
-        swept = g.cross(turning, g.vector(nu[:3]))
+        swept = turning.cross(g.vector(nu[:3]))
         velocity_bias = g.named(tape, [-component for component in swept])
     bias = [*velocity_bias, *angle_bias(tape, chassis, turning)]
     n = len(mass)
@@ -192,22 +189,22 @@ def contact(
         Speed (m/s) below which slip is regularised.
     """
     up = chassis.road_normal
-    above = tape.let(height + tape.let(g.dot(up, place)))
-    along = g.named(tape, g.cross(axle, up))
+    above = tape.let(height + tape.let(up @ place))
+    along = g.named(tape, axle.cross(up))
     inverse = tape.let(1 / g.length(tape, along))
-    heading = g.named(tape, g.scale(inverse, along))
-    leftward = g.named(tape, g.cross(up, heading))
-    arm = g.named(tape, g.scale(-above, up))
-    sliding = g.named(tape, g.add(velocity, g.cross(rotation, arm)))
-    forward = tape.let(g.dot(heading, velocity))
+    heading = g.named(tape, along * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    arm = g.named(tape, up * -above)
+    sliding = g.named(tape, velocity + rotation.cross(arm))
+    forward = tape.let(heading @ velocity)
     speed = tape.let(sp.sqrt(tape.let(forward**2 + slip_speed**2)))
-    lateral = tape.let(tape.let(g.dot(leftward, sliding)) / speed)
+    lateral = tape.let(tape.let(leftward @ sliding) / speed)
     return Contact(
         above,
-        tape.let(g.dot(up, velocity)),
+        tape.let(up @ velocity),
         heading,
         leftward,
-        tape.let(-tape.let(g.dot(heading, sliding)) / speed),
+        tape.let(-tape.let(heading @ sliding) / speed),
         tape.let(sp.atan(lateral)),
         tape.let(1 / sp.sqrt(tape.let(1 + lateral**2))),
     )

@@ -41,11 +41,9 @@ class TiltedContact:
 
     def loads(self, tape: Tape, tire: TireForces) -> tuple[Vector, Vector]:
         """Force on the wheel and its moment about the wheel centre."""
-        shear = g.add(
-            g.scale(tire.longitudinal, self.heading), g.scale(tire.lateral, self.leftward)
-        )
-        force = g.named(tape, g.add(shear, g.scale(self.load, self.up)))
-        moment = g.add(g.cross(self.arm, force), g.scale(tire.aligning, self.up))
+        shear = self.heading * tire.longitudinal + self.leftward * tire.lateral
+        force = g.named(tape, shear + self.up * self.load)
+        moment = self.arm.cross(force) + self.up * tire.aligning
         return force, g.named(tape, moment)
 
 
@@ -77,18 +75,18 @@ def tilted_contact(
         `tire_radius`, `tire_stiffness`, `tire_damping`, `slip_speed`.
     """
     let = tape.let
-    across = g.named(tape, g.cross(axle, up))
+    across = g.named(tape, axle.cross(up))
     # The length of axle x up is the cosine of the camber angle.
     cosine = g.length(tape, across)
     inverse = let(1 / cosine)
-    heading = g.named(tape, g.scale(inverse, across))
-    leftward = g.named(tape, g.cross(up, heading))
-    down = g.named(tape, g.cross(axle, heading))
+    heading = g.named(tape, across * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    down = g.named(tape, axle.cross(heading))
     radius = let(height * inverse)
-    arm = g.named(tape, g.scale(radius, down))
-    sliding = g.named(tape, g.add(velocity, g.cross(turning, arm)))
-    forward, lateral = let(g.dot(sliding, heading)), let(g.dot(sliding, leftward))
-    rise = let(g.dot(sliding, up))
+    arm = g.named(tape, down * radius)
+    sliding = g.named(tape, velocity + turning.cross(arm))
+    forward, lateral = let(sliding @ heading), let(sliding @ leftward)
+    rise = let(sliding @ up)
 
     load = vertical_load(tape, radius, rise * inverse, p)
     per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))

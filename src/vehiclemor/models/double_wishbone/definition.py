@@ -11,15 +11,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.double_wishbone import quantities
 from vehiclemor.models.double_wishbone.points import POINTS, design_coordinates
-from vehiclemor.models.double_wishbone.quantities import COORDINATES, EQUATIONS, INPUTS, OUTPUTS
-from vehiclemor.models.report import ALGEBRAIC_BASELINES, ModelReport, TimingCase
+from vehiclemor.models.report import ALGEBRAIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import AlgebraicEquations
+    from vehiclemor.symbolic.program import Program
 
 
-def derive() -> AlgebraicEquations:
+def derive() -> Program:
     """Derive residual, analytic Jacobian and outputs; the hard points stay symbols."""
     from vehiclemor.models.double_wishbone import equations
 
@@ -32,13 +32,13 @@ REPORT = ModelReport(
     printed_outputs=("second_euler_angle",),
     timing=(
         *ALGEBRAIC_BASELINES,
-        TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
-        TimingCase("pod_r3_1e-6", "pod r=3, 1e-6", "pod", settings={"rank": 3, "tolerance": 1e-6}),
-        TimingCase("pod_literal_r3", "pod literal r=3", "pod", "literal", {"rank": 3}),
-        TimingCase("pod_r4", "pod r=4", "pod", settings={"rank": 4}),
-        TimingCase("pod_literal_r6", "pod literal r=6", "pod", "literal", {"rank": 6}),
-        TimingCase("fixed_basis_r3", "fixed basis r=3", "fixed_basis", settings={"rank": 3}),
-        TimingCase("fixed_basis_r4", "fixed basis r=4", "fixed_basis", settings={"rank": 4}),
+        reduced_case("pod", 3),
+        reduced_case("pod", 3, tolerance=1e-6),
+        reduced_case("pod", 3, "literal"),
+        reduced_case("pod", 4),
+        reduced_case("pod", 6, "literal"),
+        reduced_case("fixed_basis", 3),
+        reduced_case("fixed_basis", 4),
     ),
     bounds={"spindle_y": "dw_rms_spindle_y", "second_euler_angle": "dw_rms_second_euler_angle"},
     paper_fixed={"rank": 3, "control_period": 5.0},
@@ -48,10 +48,11 @@ DEFINITION = ModelDefinition(
     kind="ae",
     summary="double-wishbone suspension, kinematics, 8 joint coordinates (algebraic equations)",
     maneuver="sine_travel",
-    coordinates=COORDINATES,
-    inputs=INPUTS,
-    outputs=OUTPUTS,
-    equations=EQUATIONS,
+    coordinates=quantities.COORDINATES,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    equations=quantities.EQUATIONS,
+    joints=quantities.JOINTS,
     parameters=POINTS,
     derive=derive,
     design_coordinates=design_coordinates,

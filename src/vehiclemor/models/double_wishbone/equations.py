@@ -4,30 +4,22 @@ from typing import cast
 
 import sympy as sp
 
-from vehiclemor.models.double_wishbone import linkage
+from vehiclemor.models.double_wishbone import linkage, quantities
 from vehiclemor.models.double_wishbone.points import POINTS
-from vehiclemor.models.double_wishbone.quantities import (
-    COORDINATES,
-    EQUATIONS,
-    INPUTS,
-    JOINTS,
-    OUTPUTS,
-)
-from vehiclemor.models.equations import AlgebraicEquations
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.elimination import eliminate
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 # Pivots (equation, coordinate) of the Newton step, by Markowitz' rule at the design position.
 PIVOTS = ((7, 7), (3, 5), (5, 6), (2, 4), (6, 3), (1, 2), (0, 1), (4, 0))
 
 
-def derive() -> AlgebraicEquations:
+def derive() -> Program:
     """Derive residual, analytic Jacobian and outputs; the hard points stay symbols."""
     tape = Tape()
-    q = sp.symbols([c.name for c in COORDINATES], real=True)
-    u = sp.symbols([i.name for i in INPUTS], real=True)
+    q = sp.symbols([c.name for c in quantities.COORDINATES], real=True)
+    u = sp.symbols([i.name for i in quantities.INPUTS], real=True)
     points = {
         name: g.vector(sp.symbols([f"{name}_{axis}" for axis in "xyz"], real=True))
         for name in POINTS
@@ -35,10 +27,10 @@ def derive() -> AlgebraicEquations:
     position = _positions(tape, q, points)
 
     closures = [
-        *g.subtract(position["lower_ball_joint"], position["lower_ball_joint_arm"]),
-        *g.subtract(position["tie_rod_outer"], position["tie_rod_outer_rod"]),
+        *position["lower_ball_joint"] - position["lower_ball_joint_arm"],
+        *position["tie_rod_outer"] - position["tie_rod_outer_rod"],
     ]
-    centre = g.subtract(position["wheel_centre"], points["wheel_centre"])
+    centre = position["wheel_centre"] - points["wheel_centre"]
     residual = [tape.let(e) for e in [*closures, centre[2] - u[0], q[7] - u[1]]]
     jacobian = tape.jacobian(residual, q)
     axle = position["axle_direction"]
@@ -50,10 +42,10 @@ def derive() -> AlgebraicEquations:
         sp.asin(axle[2]),
         q[7],
     ]
-    step = eliminate(tape, jacobian, residual, PIVOTS)
+    (step,) = eliminate(tape, jacobian, [residual], PIVOTS)
     augmented = [e for row, phi in zip(jacobian, residual, strict=True) for e in [*row, phi]]
-    n = len(COORDINATES)
-    program = assemble(
+    n = len(quantities.COORDINATES)
+    return assemble(
         tape,
         {"q": q, "u": u},
         cast("list[sp.Symbol]", [component for point in points.values() for component in point]),
@@ -61,14 +53,13 @@ def derive() -> AlgebraicEquations:
             "residual": (residual, (n,)),
             "residual_jacobian": (augmented, (n, n + 1)),
             "newton_step": (step, (n,)),
-            "outputs": (outputs, (len(OUTPUTS),)),
+            "outputs": (outputs, (len(quantities.OUTPUTS),)),
             "joints": (
-                [c for name in JOINTS for c in position[name]],
-                (len(JOINTS), 3),
+                [c for name in quantities.JOINTS for c in position[name]],
+                (len(quantities.JOINTS), 3),
             ),
         },
     )
-    return AlgebraicEquations(COORDINATES, INPUTS, OUTPUTS, EQUATIONS, JOINTS, program)
 
 
 def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> dict[str, g.Vector]:
@@ -82,5 +73,5 @@ def _positions(tape: Tape, q: list[sp.Symbol], points: dict[str, g.Vector]) -> d
         "tie_rod_outer": corner.on_carrier(tape, points["tie_rod_outer"]),
         "tie_rod_outer_rod": g.named(tape, corner.rod_end),
         "wheel_centre": corner.on_carrier(tape, points["wheel_centre"]),
-        "axle_direction": (corner.carrier[0][1], corner.carrier[1][1], corner.carrier[2][1]),
+        "axle_direction": g.column(corner.carrier, 1),
     }

@@ -32,13 +32,13 @@ class Arm:
 
     def axis(self, tape: Tape) -> g.Vector:
         """Unit axis."""
-        between = g.named(tape, g.subtract(self.front, self.rear))
-        return g.named(tape, g.scale(1 / g.length(tape, between), between))
+        between = g.named(tape, self.front - self.rear)
+        return g.named(tape, between * (1 / g.length(tape, between)))
 
     def lever(self, tape: Tape, place: g.Vector) -> g.Vector:
         """From the rear pivot to where a point has moved, given its design position."""
         axis = self.axis(tape)
-        design = g.named(tape, g.subtract(place, self.rear))
+        design = g.named(tape, place - self.rear)
         return g.rotate_about_axis(tape, design, axis, self.angle)
 
 
@@ -75,21 +75,21 @@ class Linkage:
 
     def carrier_lever(self, tape: Tape, place: g.Vector) -> g.Vector:
         """From the upper ball joint to a point of the carrier, given its design position."""
-        design = g.named(tape, g.subtract(place, self.design_ball_joint))
+        design = g.named(tape, place - self.design_ball_joint)
         return g.rotate(tape, self.carrier, design)
 
     def on_carrier(self, tape: Tape, place: g.Vector) -> g.Vector:
         """Where a point of the carrier has moved, given its design position."""
-        return g.named(tape, g.add(self.upper_ball_joint, self.carrier_lever(tape, place)))
+        return g.named(tape, self.upper_ball_joint + self.carrier_lever(tape, place))
 
     def on_lower_arm(self, tape: Tape, place: g.Vector) -> g.Vector:
         """Where a point of the lower arm has moved, given its design position."""
-        return g.named(tape, g.add(self.lower.rear, self.lower.lever(tape, place)))
+        return g.named(tape, self.lower.rear + self.lower.lever(tape, place))
 
     @property
     def rod_end(self) -> g.Vector:
         """Outer end of the tie rod; not named on a tape."""
-        return g.add(self.rack_end, self.rod)
+        return self.rack_end + self.rod
 
 
 def assembled(
@@ -120,14 +120,14 @@ def assembled(
 
     upper = arm("upper", theta_u)
     ball = points["upper_ball_joint"]
-    ball_joint = g.named(tape, g.add(upper.rear, upper.lever(tape, ball)))
+    ball_joint = g.named(tape, upper.rear + upper.lever(tape, ball))
     carrier = g.euler_321(tape, zeta, eta, xi)
     inner, outer = points["tie_rod_inner"], points["tie_rod_outer"]
-    rod_length = g.length(tape, g.named(tape, g.subtract(outer, inner)))
+    rod_length = g.length(tape, g.named(tape, outer - inner))
     cos_beta = tape.let(sp.cos(beta))
     direction = g.vector((-sp.sin(alpha) * cos_beta, sp.cos(alpha) * cos_beta, sp.sin(beta)))
     rack_end = g.named(tape, (inner[0], inner[1] + rack, inner[2]))
-    rod = g.scale(side * rod_length, direction)
+    rod = direction * (side * rod_length)
     return Linkage(
         upper, arm("lower", theta_l), ball_joint, carrier, ball, rack_end, rod, direction
     )

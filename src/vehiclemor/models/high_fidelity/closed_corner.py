@@ -87,21 +87,22 @@ def closed(
     ball, outer = points["upper_ball_joint"], points["tie_rod_outer"]
     lower = Arm(points["lower_arm_rear_pivot"], points["lower_arm_front_pivot"], angle)
     lever = lower.lever(tape, points["lower_ball_joint"])
-    low = g.named(tape, g.add(lower.rear, lever))
+    low = g.named(tape, lower.rear + lever)
     upper, distance = _upper_arm(tape, low, points)
-    high = g.named(tape, g.add(upper.rear, upper.lever(tape, ball)))
-    between = g.named(tape, g.scale(let(1 / distance), g.named(tape, g.subtract(low, high))))
+    high = g.named(tape, upper.rear + upper.lever(tape, ball))
+    inverse = let(1 / distance)
+    between = g.named(tape, g.named(tape, low - high) * inverse)
 
     # The tie-rod joint beside the line through the ball joints, at the design position.
-    line = g.named(tape, g.subtract(points["lower_ball_joint"], ball))
-    design_between = g.named(tape, g.scale(let(1 / distance), line))
-    arm = g.named(tape, g.subtract(outer, ball))
-    part = let(g.dot(arm, design_between))
-    across = g.named(tape, g.subtract(arm, g.scale(part, design_between)))
+    line = g.named(tape, points["lower_ball_joint"] - ball)
+    design_between = g.named(tape, line * inverse)
+    arm = g.named(tape, outer - ball)
+    part = let(arm @ design_between)
+    across = g.named(tape, arm - design_between * part)
     offset = g.length(tape, across)
-    design_off = g.named(tape, g.scale(let(1 / offset), across))
+    design_off = g.named(tape, across * let(1 / offset))
     inner = points["tie_rod_inner"]
-    length = g.length(tape, g.named(tape, g.subtract(outer, inner)))
+    length = g.length(tape, g.named(tape, outer - inner))
     square = let(offset**2 - length**2)
 
     rack_end = g.named(tape, (inner[0], inner[1] + rack, inner[2]))
@@ -115,13 +116,13 @@ def closed(
         square,
         _sign(
             tape,
-            g.dot(design_off, g.named(tape, g.cross(design_between, g.subtract(inner, ball)))),
+            design_off @ g.named(tape, design_between.cross(inner - ball)),
         ),
     )
     carrier = _carrier(tape, (design_between, design_off), (between, off))
-    reach = g.named(tape, g.add(g.scale(part, between), g.scale(offset, off)))
-    rod = g.named(tape, g.add(g.subtract(high, rack_end), reach))
-    direction = g.named(tape, g.scale(let(side / length), rod))
+    reach = g.named(tape, between * part + off * offset)
+    rod = g.named(tape, high - rack_end + reach)
+    direction = g.named(tape, rod * let(side / length))
     linkage = Linkage(upper, lower, high, carrier, ball, rack_end, rod, direction)
     return ClosedCorner(linkage, between, distance, off, offset, reach, rod)
 
@@ -131,18 +132,18 @@ def _upper_arm(tape: Tape, low: Vector, points: Mapping[str, Vector]) -> tuple[A
     let = tape.let
     rear, front = points["upper_arm_rear_pivot"], points["upper_arm_front_pivot"]
     ball, design = points["upper_ball_joint"], points["lower_ball_joint"]
-    distance = g.length(tape, g.named(tape, g.subtract(design, ball)))
+    distance = g.length(tape, g.named(tape, design - ball))
     axis = Arm(rear, front, sp.Integer(0)).axis(tape)
-    lever = g.named(tape, g.subtract(ball, rear))
-    along_axis = g.named(tape, g.scale(let(g.dot(axis, lever)), axis))
-    across = g.named(tape, g.subtract(lever, along_axis))
-    quarter = g.named(tape, g.cross(axis, lever))
-    centre = g.named(tape, g.add(rear, along_axis))
-    gap = g.named(tape, g.subtract(low, centre))
-    a, b = let(g.dot(across, gap)), let(g.dot(quarter, gap))
-    c = let((let(g.dot(across, across) - distance**2) + g.dot(gap, gap)) / 2)
+    lever = g.named(tape, ball - rear)
+    along_axis = g.named(tape, axis * let(axis @ lever))
+    across = g.named(tape, lever - along_axis)
+    quarter = g.named(tape, axis.cross(lever))
+    centre = g.named(tape, rear + along_axis)
+    gap = g.named(tape, low - centre)
+    a, b = let(across @ gap), let(quarter @ gap)
+    c = let((let((across @ across) - distance**2) + (gap @ gap)) / 2)
     square = let(a**2 + b**2)
-    branch = _sign(tape, g.dot(quarter, g.named(tape, g.subtract(design, centre))))
+    branch = _sign(tape, quarter @ g.named(tape, design - centre))
     root = let(branch * sp.sqrt(let(square - c**2)))
     inverse = let(1 / square)
     cosine, sine = let((a * c + b * root) * inverse), let((b * c - a * root) * inverse)
@@ -161,16 +162,16 @@ def _off(
 ) -> Vector:
     """Unit vector from the line through the ball joints towards the outer tie-rod joint."""
     let = tape.let
-    gap = g.named(tape, g.subtract(g.subtract(rack_end, high), g.scale(part, between)))
-    height = let(g.dot(gap, between))
-    across = g.named(tape, g.subtract(gap, g.scale(height, between)))
-    wide = let(g.dot(across, across))
+    gap = g.named(tape, rack_end - high - between * part)
+    height = let(gap @ between)
+    across = g.named(tape, gap - between * height)
+    wide = let(across @ across)
     c = let(let((let(square) + height**2 + wide) / 2) / offset)
-    quarter = g.named(tape, g.cross(between, across))
+    quarter = g.named(tape, between.cross(across))
     root = let(branch * sp.sqrt(let(wide - c**2)))
     inverse = let(1 / wide)
     first, second = let(c * inverse), let(root * inverse)
-    return g.named(tape, g.add(g.scale(first, across), g.scale(second, quarter)))
+    return g.named(tape, across * first + quarter * second)
 
 
 def _sign(tape: Tape, value: sp.Expr) -> sp.Expr:
@@ -182,12 +183,9 @@ def _sign(tape: Tape, value: sp.Expr) -> sp.Expr:
 def _carrier(tape: Tape, before: tuple[Vector, Vector], now: tuple[Vector, Vector]) -> Rotation:
     """Rotation that turns one pair of perpendicular unit vectors into another."""
     pairs = [*zip(before, now, strict=True)]
-    pairs.append((g.named(tape, g.cross(*before)), g.named(tape, g.cross(*now))))
-
-    def row(i: int) -> Vector:
-        return g.named(tape, [sp.Add(*[b[i] * a[j] for a, b in pairs]) for j in range(3)])
-
-    return row(0), row(1), row(2)
+    third = (g.named(tape, before[0].cross(before[1])), g.named(tape, now[0].cross(now[1])))
+    pairs.append(third)
+    return g.matrix(lambda i, j: tape.let(sp.Add(*[b[i] * a[j] for a, b in pairs])))
 
 
 def motions(
@@ -228,15 +226,16 @@ def _upper_rate(
 ) -> Rate:
     """Rate of the upper arm that keeps the distance of the ball joints."""
     let, e = tape.let, corner.between
-    per_rate = g.named(tape, g.cross(axis, lever))
-    inverse = let(1 / let(g.dot(e, per_rate)))
-    factor = let(g.dot(e, low.columns[number]) * inverse)
-    rate = let(g.dot(e, low.value) * inverse)
-    apart = g.named(tape, g.subtract(low.value, g.scale(rate, per_rate)))
-    inwards = g.scale(let(rate**2), g.named(tape, g.cross(axis, per_rate)))
-    bias = g.named(tape, g.subtract(low.bias, inwards))
-    closing = let(g.dot(apart, apart) * let(1 / corner.distance))
-    return Rate(rate, {number: factor}, let((g.dot(e, bias) + closing) * inverse))
+    per_rate = g.named(tape, axis.cross(lever))
+    inverse = let(1 / let(e @ per_rate))
+    factor = let((e @ low.columns[number]) * inverse)
+    rate = let((e @ low.value) * inverse)
+    apart = g.named(tape, low.value - per_rate * rate)
+    square = let(rate**2)
+    inwards = g.named(tape, axis.cross(per_rate)) * square
+    bias = g.named(tape, low.bias - inwards)
+    closing = let((apart @ apart) * let(1 / corner.distance))
+    return Rate(rate, {number: factor}, let(((e @ bias) + closing) * inverse))
 
 
 def _carrier_motion(
@@ -249,33 +248,33 @@ def _carrier_motion(
     let, e, rod, arm = tape.let, corner.between, corner.rod, corner.outer
     per_length = let(1 / corner.distance)
     line = relative(tape, low, high)
-    along_rod = let(corner.offset * g.dot(rod, g.named(tape, g.cross(e, corner.off))))
+    along_rod = let(corner.offset * (rod @ g.named(tape, e.cross(corner.off))))
     inverse = let(-1 / along_rod)
 
     def swing(change: Vector) -> Vector:
         """Rotation that goes with a change of the line."""
-        return g.named(tape, g.scale(per_length, g.cross(e, change)))
+        return g.named(tape, e.cross(change) * per_length)
 
     def about(turn: Vector, velocity: Vector) -> sp.Expr:
         """Turn about the line that leaves the end of the rod at its distance."""
-        moved = g.named(tape, g.add(velocity, g.cross(turn, arm)))
-        return let(g.dot(rod, moved) * inverse)
+        moved = g.named(tape, velocity + turn.cross(arm))
+        return let((rod @ moved) * inverse)
 
     column = swing(line.columns[number])
     turn = about(column, high.columns[number])
-    column = g.named(tape, g.add(column, g.scale(turn, e)))
+    column = g.named(tape, column + e * turn)
     value = swing(line.value)
-    turn = about(value, g.subtract(high.value, rack_end.value))
-    direction_rate = g.named(tape, g.scale(per_length, line.value))
-    value = g.named(tape, g.add(value, g.scale(turn, e)))
+    turn = about(value, high.value - rack_end.value)
+    direction_rate = g.named(tape, line.value * per_length)
+    value = g.named(tape, value + e * turn)
 
-    bias = g.named(tape, g.add(swing(line.bias), g.scale(turn, direction_rate)))
-    swept = g.named(tape, g.cross(value, arm))
-    apart = g.named(tape, g.add(g.subtract(high.value, rack_end.value), swept))
-    inwards = g.add(g.subtract(high.bias, rack_end.bias), g.cross(value, swept))
-    closing = let(g.dot(apart, apart))
+    bias = g.named(tape, swing(line.bias) + direction_rate * turn)
+    swept = g.named(tape, value.cross(arm))
+    apart = g.named(tape, high.value - rack_end.value + swept)
+    inwards = high.bias - rack_end.bias + value.cross(swept)
+    closing = let(apart @ apart)
     turn = let(about(bias, inwards) + closing * inverse)
-    return Motion(value, {number: column}, g.named(tape, g.add(bias, g.scale(turn, e))))
+    return Motion(value, {number: column}, g.named(tape, bias + e * turn))
 
 
 def _universal_joint(tape: Tape, rod: Vector, end: Motion) -> Motion:
@@ -294,13 +293,14 @@ def _universal_joint(tape: Tape, rod: Vector, end: Motion) -> Motion:
     still, turned = let(x * inverse), let(y * inverse)
 
     def rotation(change: Vector) -> Vector:
-        return turned * change[2], -still * change[2], still * change[1] - turned * change[0]
+        x, y, z = change
+        return Vector(turned * z, -still * z, still * y - turned * x)
 
     v = end.value
     value = g.named(tape, rotation(v))
     # Derivatives of the coefficients: of x and y, then of the squared length they are divided by.
-    shrink = let(-2 * (still * v[0] + turned * v[1]))
-    moved = (let(v[1] * v[2] * inverse), let(-v[0] * v[2] * inverse), sp.Integer(0))
-    bias = g.add(rotation(end.bias), g.add(moved, g.scale(shrink, value)))
+    shrink = let(-2 * (still * v.x + turned * v.y))
+    moved = g.named(tape, (v.y * v.z * inverse, -v.x * v.z * inverse, sp.Integer(0)))
+    bias = rotation(end.bias) + moved + value * shrink
     columns = {k: g.named(tape, rotation(c)) for k, c in end.columns.items()}
     return Motion(value, columns, g.named(tape, bias))

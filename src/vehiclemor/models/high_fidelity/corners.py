@@ -5,7 +5,7 @@ are speeds of their own the result is the unconstrained system, where they follo
 arm's by the closures it is the constrained one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,57 +15,17 @@ from vehiclemor.models.components import tilted_wheel
 from vehiclemor.models.components.tires import TireForces
 from vehiclemor.models.double_wishbone.linkage import Arm, Linkage
 from vehiclemor.models.high_fidelity.linkage_motions import LinkageMotions
+from vehiclemor.models.high_fidelity.parts import SIDES, Vehicle
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.joints import STILL, Rate, along, carried
-from vehiclemor.symbolic.mechanics import Body, Motion, MovingFrame, Rotor, Tensor
+from vehiclemor.symbolic.mechanics import Body, Motion, Rotor, Tensor
 from vehiclemor.symbolic.tape import Tape
 
 Parameters = Mapping[str, sp.Expr]
-Points = Mapping[str, Vector]
-
-
-@dataclass(frozen=True)
-class Chassis:
-    """Moving frame of the chassis on the road.
-
-    Attributes
-    ----------
-    frame
-        Its origin is the chassis' centre of mass.
-    up
-        Road normal, chassis components.
-    height
-        Height of the origin above the road.
-    """
-
-    frame: MovingFrame
-    up: Vector
-    height: sp.Expr
-
-
-class Place(NamedTuple):
-    """Where a corner is, and which speeds are its own.
-
-    Attributes
-    ----------
-    points
-        Design points of this side: hard points or pivot, centres of mass, wheel centre and ends of
-        the spring.
-    arm, spin
-        Numbers of the speeds of the arm that carries the spring, and of the wheel's spin.
-    spin_speed
-        The latter speed.
-    side
-        1 for the left, -1 for the right side.
-    """
-
-    points: Points
-    arm: int
-    spin: int
-    spin_speed: sp.Expr
-    side: int
+# Of the corners in order.
+ENDS = ("front", "front", "rear", "rear")
 
 
 class _WheelCarrier(NamedTuple):
@@ -112,21 +72,16 @@ class Corner:
 
 
 def front_corner(
-    tape: Tape,
-    chassis: Chassis,
-    linkage: Linkage,
-    motions: LinkageMotions,
-    place: Place,
-    p: Parameters,
+    tape: Tape, v: Vehicle, k: int, linkage: Linkage, motions: LinkageMotions
 ) -> Corner:
-    """Arms, wheel carrier with its wheel, and tie rod of a front corner."""
-    frame, points = chassis.frame, place.points
+    """Arms, wheel carrier with its wheel, and tie rod of the left (k = 0) or right (1) corner."""
+    frame, points, p = v.frame, v.points[k], v.p
 
     def arm(name: str, turn: Motion) -> Body:
         part = linkage.upper if name == "upper" else linkage.lower
         lever = part.lever(tape, points[f"{name}_arm_centre"])
-        centre_now = g.named(tape, g.add(part.rear, lever))
-        design = _arm_tensor(tape, part, name, place, p)
+        centre_now = g.named(tape, part.rear + lever)
+        design = _arm_tensor(tape, v, k, part, name)
         tensor = m.turned_tensor(tape, design, part.axis(tape), part.angle)
         centre = frame.point(tape, centre_now, carried(tape, STILL, turn, lever))
         rotation = m.with_inertia(tape, tensor, frame.turning(tape, turn))
@@ -134,12 +89,12 @@ def front_corner(
 
     along_rod, transverse = p["tie_rod_axial_inertia"], p["tie_rod_transverse_inertia"]
     tensor = m.axisymmetric_inertia(along_rod, transverse, g.named(tape, linkage.rod_direction))
-    half = g.named(tape, g.scale(sp.Rational(1, 2), linkage.rod))
+    half = g.named(tape, linkage.rod * sp.Rational(1, 2))
     rod = Body(
         p["tie_rod_mass"],
         frame.point(
             tape,
-            g.named(tape, g.add(linkage.rack_end, half)),
+            g.named(tape, linkage.rack_end + half),
             carried(tape, motions.rack_end, motions.rod, half),
         ),
         m.ZERO,
@@ -155,7 +110,6 @@ def front_corner(
         p,
         "front",
     )
-    axle = (linkage.carrier[0][1], linkage.carrier[1][1], linkage.carrier[2][1])
     wheeled = _WheelCarrier(
         mass,
         m.rotated_tensor(tape, tensor, linkage.carrier),
@@ -164,42 +118,38 @@ def front_corner(
         motions.carrier,
         linkage.carrier_lever(tape, centre),
         linkage.carrier_lever(tape, points["wheel_centre"]),
-        axle,
+        g.column(linkage.carrier, 1),
     )
-    carrier, contact, tire = _wheeled_body(tape, chassis, wheeled, place, p, "front")
+    carrier, contact, tire = _wheeled_body(tape, v, k, wheeled)
     lever = linkage.lower.lever(tape, points["front_spring_arm_point"])
     moment = _spring(
         tape,
-        g.subtract(g.add(linkage.lower.rear, lever), points["front_spring_chassis_point"]),
+        linkage.lower.rear + lever - points["front_spring_chassis_point"],
         carried(tape, STILL, motions.lower, lever),
-        place.arm,
-        p,
-        "front",
+        v,
+        k,
     )
     bodies = (arm("upper", motions.upper), arm("lower", motions.lower), carrier, rod)
     return Corner(bodies, moment, contact, tire)
 
 
-def rear_corner(
-    tape: Tape,
-    chassis: Chassis,
-    angle: sp.Symbol,
-    rate: Rate,
-    place: Place,
-    p: Parameters,
-) -> Corner:
-    """Trailing arm with its wheel; it turns about the chassis' lateral axis."""
-    points, side = place.points, place.side
-    pivot, axis = points["rear_arm_pivot"], m.UNIT[1]
-    turn = along(rate, axis)
+def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner:
+    """Trailing arm with its wheel, left (k = 2) or right (3); it turns about the lateral axis."""
+    points, side, p, number = v.points[k], SIDES[k], v.p, v.numbers.arms[k]
+    pivot, axis, angle = points["rear_arm_pivot"], m.UNIT[1], v.q[number]
+    turn = along(rates[number], axis)
 
     def lever(name: str) -> Vector:
-        design = g.named(tape, g.subtract(points[name], pivot))
+        design = g.named(tape, points[name] - pivot)
         return g.rotate_about_axis(tape, design, axis, angle)
 
     xy, xz, yz = (p[f"rear_arm_inertia_products_{a}"] for a in "xyz")
     xx, yy, zz = (p[f"rear_arm_inertia_{a}"] for a in "xyz")
-    arm_tensor = ((xx, side * xy, xz), (side * xy, yy, side * yz), (xz, side * yz, zz))
+    arm_tensor = (
+        Vector(xx, side * xy, xz),
+        Vector(side * xy, yy, side * yz),
+        Vector(xz, side * yz, zz),
+    )
     mass, centre, tensor = _with_wheel(
         tape,
         p["rear_arm_mass"],
@@ -209,7 +159,7 @@ def rear_corner(
         p,
         "rear",
     )
-    to_centre = g.rotate_about_axis(tape, g.named(tape, g.subtract(centre, pivot)), axis, angle)
+    to_centre = g.rotate_about_axis(tape, g.named(tape, centre - pivot), axis, angle)
     wheeled = _WheelCarrier(
         mass,
         m.turned_tensor(tape, tensor, axis, angle),
@@ -220,61 +170,53 @@ def rear_corner(
         lever("rear_wheel_centre"),
         axis,
     )
-    arm, contact, tire = _wheeled_body(tape, chassis, wheeled, place, p, "rear")
+    arm, contact, tire = _wheeled_body(tape, v, k, wheeled)
     to_spring = lever("rear_spring_arm_point")
     moment = _spring(
         tape,
-        g.subtract(g.add(pivot, to_spring), points["rear_spring_chassis_point"]),
+        pivot + to_spring - points["rear_spring_chassis_point"],
         carried(tape, STILL, turn, to_spring),
-        place.arm,
-        p,
-        "rear",
+        v,
+        k,
     )
     return Corner((arm,), moment, contact, tire)
 
 
 def _wheeled_body(
-    tape: Tape, chassis: Chassis, part: _WheelCarrier, place: Place, p: Parameters, end: str
+    tape: Tape, v: Vehicle, k: int, part: _WheelCarrier
 ) -> tuple[Body, tilted_wheel.TiltedContact, TireForces]:
     """A carrier or arm together with its wheel, and the wheel on the road."""
-    frame, axle = chassis.frame, part.axle
+    frame, axle, spin = v.frame, part.axle, v.numbers.spins[k]
     levers = (part.to_centre, part.to_wheel)
-    places = [g.named(tape, g.add(part.base, lever)) for lever in levers]
+    places = [g.named(tape, part.base + lever) for lever in levers]
     centre, wheel = (
         frame.point(tape, point, carried(tape, part.motion, part.turn, lever))
         for point, lever in zip(places, levers, strict=True)
     )
     turning = frame.turning(tape, part.turn)
-    height = tape.let(chassis.height + tape.let(g.dot(chassis.up, places[1])))
+    height = tape.let(v.q[2] + tape.let(v.up @ places[1]))
     contact = tilted_wheel.tilted_contact(
-        tape, chassis.up, height, axle, wheel.value, turning.value, place.spin_speed, p
+        tape, v.up, height, axle, wheel.value, turning.value, v.rates[spin], v.p
     )
-    tire = tilted_wheel.tire_on(tape, contact, p)
+    tire = tilted_wheel.tire_on(tape, contact, v.p)
     force, moment = contact.loads(tape, tire)
-    arm = g.named(tape, g.subtract(places[1], places[0]))
-    rotor = Rotor(
-        place.spin,
-        place.spin_speed,
-        axle,
-        p[f"{end}_wheel_spin_inertia"],
-        tape.let(g.dot(moment, axle)),
-    )
+    arm = g.named(tape, places[1] - places[0])
+    inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
+    rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle))
     body = Body(
         part.mass,
         centre,
         force,
         m.with_inertia(tape, part.tensor, turning),
         part.tensor,
-        g.named(tape, g.add(moment, g.cross(arm, force))),
+        g.named(tape, moment + arm.cross(force)),
         rotor,
         turning.bias,
     )
     return body, contact, tire
 
 
-def _spring(
-    tape: Tape, gap: Vector, motion: Motion, number: int, p: Parameters, end: str
-) -> sp.Expr:
+def _spring(tape: Tape, gap: Vector, motion: Motion, v: Vehicle, k: int) -> sp.Expr:
     """Generalised force of a spring-damper that ends on a moving point of an arm.
 
     Parameters
@@ -283,16 +225,15 @@ def _spring(
         From the end on the chassis to the end on the arm.
     motion
         Of the end on the arm, relative to the chassis.
-    number
-        Number of the arm's speed.
     """
+    p, end = v.p, ENDS[k]
     gap = g.named(tape, gap)
     length = g.length(tape, gap)
-    direction = g.named(tape, g.scale(tape.let(1 / length), gap))
-    rate = tape.let(g.dot(direction, motion.value))
+    direction = g.named(tape, gap * tape.let(1 / length))
+    rate = tape.let(direction @ motion.value)
     compression = tape.let(p[f"{end}_free_length"] - length)
     force = tape.let(p[f"{end}_stiffness"] * compression - p[f"{end}_damping"] * rate)
-    return tape.let(force * tape.let(g.dot(direction, motion.columns[number])))
+    return tape.let(force * tape.let(direction @ motion.columns[v.numbers.arms[k]]))
 
 
 def _with_wheel(
@@ -307,14 +248,14 @@ def _with_wheel(
     """Mass, centre of mass and tensor of a carrier with its wheel, at the design position."""
     wheel = p[f"{end}_wheel_mass"]
     total = tape.let(mass + wheel)
-    weighted = g.add(g.scale(mass, centre), g.scale(wheel, wheel_centre))
-    both = g.named(tape, g.scale(1 / total, weighted))
+    weighted = centre * mass + wheel_centre * wheel
+    both = g.named(tape, weighted * (1 / total))
     transverse, spin = p[f"{end}_wheel_transverse_inertia"], p[f"{end}_wheel_spin_inertia"]
     parts = (
         tensor,
         m.axisymmetric_inertia(spin, transverse, m.UNIT[1]),
-        m.point_mass_tensor(mass, g.named(tape, g.subtract(centre, both))),
-        m.point_mass_tensor(wheel, g.named(tape, g.subtract(wheel_centre, both))),
+        m.point_mass_tensor(mass, g.named(tape, centre - both)),
+        m.point_mass_tensor(wheel, g.named(tape, wheel_centre - both)),
     )
     rows = [
         g.named(tape, [sp.Add(*[part[i][j] for part in parts]) for j in range(3)]) for i in range(3)
@@ -328,15 +269,15 @@ def diagonal(p: Parameters, name: str) -> Tensor:
     return g.vector((x, 0, 0)), g.vector((0, y, 0)), g.vector((0, 0, z))
 
 
-def _arm_tensor(tape: Tape, arm: Arm, name: str, place: Place, p: Parameters) -> Tensor:
+def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: Arm, name: str) -> Tensor:
     """Tensor of a control arm at the design position, from that in its own axes."""
     axis = arm.axis(tape)
-    lever = g.named(tape, g.subtract(place.points[f"{name}_ball_joint"], arm.rear))
+    lever = g.named(tape, v.points[k][f"{name}_ball_joint"] - arm.rear)
     # Upwards on both sides; the second axis then is the third times the first.
-    normal = g.named(tape, g.scale(sp.Integer(place.side), g.cross(axis, lever)))
-    up = g.named(tape, g.scale(1 / g.length(tape, normal), normal))
-    out = g.named(tape, g.cross(up, axis))
+    normal = g.named(tape, axis.cross(lever) * sp.Integer(SIDES[k]))
+    up = g.named(tape, normal * (1 / g.length(tape, normal)))
+    out = g.named(tape, up.cross(axis))
     frame = tuple(g.vector([axis[i], out[i], up[i]]) for i in range(3))
     return m.rotated_tensor(
-        tape, diagonal(p, f"{name}_arm_inertia"), (frame[0], frame[1], frame[2])
+        tape, diagonal(v.p, f"{name}_arm_inertia"), (frame[0], frame[1], frame[2])
     )

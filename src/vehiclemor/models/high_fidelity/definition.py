@@ -9,25 +9,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.high_fidelity import quantities
 from vehiclemor.models.high_fidelity.equilibrium import check, solve_equilibrium, starts
-from vehiclemor.models.high_fidelity.quantities import (
-    CONSTRAINTS,
-    COORDINATES,
-    FRONT,
-    INPUTS,
-    OUTPUTS,
-    PARAMETERS,
-    SOLVED,
-    SPEEDS,
-)
 from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, TimingCase
+from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import DynamicEquations
+    from vehiclemor.symbolic.program import Program
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
     from vehiclemor.models.high_fidelity import equations
 
@@ -50,17 +41,12 @@ REPORT = ModelReport(
     printed_outputs=("lateral_speed", "vertical_speed", "lateral_position"),
     timing=(
         *DYNAMIC_BASELINES,
-        TimingCase("pod_r1", "pod r=1", "pod", settings={"rank": 1}),
-        TimingCase("pod_r1_1e-4", "pod r=1, 1e-4", "pod", settings={"rank": 1, "tolerance": 1e-4}),
-        TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
-        TimingCase(
-            "pod_coordinates_r3",
-            "pod coordinates r=3",
-            "pod",
-            settings={"rank": 3, "formulation": "coordinates"},
-        ),
-        TimingCase("pod_literal_r1", "pod literal r=1", "pod", "literal", {"rank": 1}),
-        TimingCase("fixed_basis_r3", "fixed basis r=3", "fixed_basis", settings={"rank": 3}),
+        reduced_case("pod", 1),
+        reduced_case("pod", 1, tolerance=1e-4),
+        reduced_case("pod", 3),
+        reduced_case("pod", 3, formulation="coordinates"),
+        reduced_case("pod", 1, "literal"),
+        reduced_case("fixed_basis", 3),
     ),
     bounds={"lateral_speed": "hfv_rms_lateral_speed", "vertical_speed": "hfv_rms_vertical_speed"},
     paper_fixed={"rank": 1, "control_period": 0.1},
@@ -70,29 +56,29 @@ DEFINITION = ModelDefinition(
     kind="dae",
     summary="vehicle with 26 coordinates and 12 constraints, double wishbones, Fiala tires (DAE)",
     maneuver="rack_lane_change",
-    coordinates=COORDINATES,
-    speeds=SPEEDS,
-    inputs=INPUTS,
-    outputs=OUTPUTS,
-    constraints=CONSTRAINTS,
-    parameters=PARAMETERS,
+    coordinates=quantities.COORDINATES,
+    speeds=quantities.SPEEDS,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    constraints=quantities.CONSTRAINTS,
+    parameters=quantities.PARAMETERS,
     derive=derive,
     check=check,
     starts=starts,
-    solved=SOLVED,
+    solved=quantities.SOLVED,
     solve_equilibrium=solve_equilibrium,
     cyclic=("x", "y", *(f"gamma_{wheel}" for wheel in WHEELS)),
     planar=("x", "y", "psi"),
     heading_pairs=(("x", "y"), ("x_dot", "y_dot")),
     # A heading that is off integrates to a lateral position that is off: no other error matters
     # as much.
-    error_scale=dict.fromkeys([q.name for q in (*COORDINATES, *SPEEDS)], 10.0)
+    error_scale=dict.fromkeys([q.name for q in (*quantities.COORDINATES, *quantities.SPEEDS)], 10.0)
     | {"psi": 1.0, "psi_dot": 1.0},
     # Slips need forward motion.  At 1.3 rad of steering the linkage locks; another branch lies
     # beyond.
     validity={
         "longitudinal_speed": FORWARD,
-        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in FRONT},
+        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in quantities.FRONT},
         **UPRIGHT,
     },
     loads=TIRE_LOADS,

@@ -13,26 +13,18 @@ import sympy as sp
 
 from vehiclemor.models.components import body
 from vehiclemor.models.double_wishbone import linkage
-from vehiclemor.models.equations import DynamicEquations
-from vehiclemor.models.high_fidelity import corners, linkage_motions, parts
-from vehiclemor.models.high_fidelity.quantities import (
-    CONSTRAINTS,
-    COORDINATES,
-    INPUTS,
-    OUTPUTS,
-    SPEEDS,
-)
+from vehiclemor.models.high_fidelity import assembly, corners, linkage_motions, parts, quantities
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
-from vehiclemor.symbolic.elimination import eliminate_several
+from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.joints import Rate, free_rate
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 # Places of the front corners' coordinates, and of the arms that carry the springs.
 CORNER = (range(6, 13), range(13, 20))
 LOWER_ARMS = (10, 17)
-NUMBERS = parts.Numbers(len(COORDINATES), LOWER_ARMS, (20, 21), (22, 23, 24, 25))
+NUMBERS = parts.Numbers(len(quantities.COORDINATES), (*LOWER_ARMS, 20, 21), (22, 23, 24, 25))
 # Pivots (closure, coordinate of the six without the lower arm's) at the design position.
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
 
@@ -46,11 +38,11 @@ class _Mechanism:
     rack: tuple[sp.Symbol, ...]
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
     tape = Tape()
-    q, rates = body.symbols(COORDINATES), body.symbols(SPEEDS)
-    rack = body.symbols(INPUTS)
+    q, rates = body.symbols(quantities.COORDINATES), body.symbols(quantities.SPEEDS)
+    rack = body.symbols(quantities.INPUTS)
     p, flat = parts.parameters()
     vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
     mechanism = _Mechanism(
@@ -73,16 +65,16 @@ def derive() -> DynamicEquations:
 
     bound = _bound_rates(tape, motions, gamma, free)
     closed = _corners(tape, mechanism, bound)
-    solved = parts.solved(tape, vehicle, closed)
+    solved = assembly.solved(tape, vehicle, closed)
     accelerations = [
-        *parts.chassis_accelerations(tape, attitude, solved, speeds),
+        *assembly.chassis_accelerations(tape, attitude, solved, speeds),
         *_joint_accelerations(tape, bound, solved)[6:],
     ]
 
-    mass, force = parts.kane(tape, vehicle, _corners(tape, mechanism, free))
+    mass, force = assembly.kane(tape, vehicle, _corners(tape, mechanism, free))
     zero = g.vector((0, 0, 0))
     open_form = body.in_coordinates(tape, attitude, speeds, mass, force, velocity_bias=zero)
-    n = len(COORDINATES)
+    n = len(quantities.COORDINATES)
     rows = [open_form[j * (n + 1) : (j + 1) * (n + 1)] for j in range(n)]
     second_order = [
         e
@@ -95,7 +87,7 @@ def derive() -> DynamicEquations:
     descriptor = [*open_form]
     for row, right in zip(_rows(motions, range(n)), gamma, strict=True):
         descriptor += [*row, right]
-    program = assemble(
+    return assemble(
         tape,
         {"x": [*q, *rates], "u": rack},
         flat,
@@ -103,18 +95,17 @@ def derive() -> DynamicEquations:
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (
                 _outputs(tape, mechanism, closed, speeds, gaps, gap_rates),
-                (len(OUTPUTS),),
+                (len(quantities.OUTPUTS),),
             ),
             "second_order": (second_order, (n, n + 1)),
             "speeds": (list(rates), (n,)),
-            "descriptor": (descriptor, (n + len(CONSTRAINTS), n + 1)),
+            "descriptor": (descriptor, (n + len(quantities.CONSTRAINTS), n + 1)),
             "violations": (
                 [e for pair in zip(gaps, gap_rates, strict=True) for e in pair],
-                (len(CONSTRAINTS), 2),
+                (len(quantities.CONSTRAINTS), 2),
             ),
         },
     )
-    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program, CONSTRAINTS)
 
 
 def _motions(
@@ -165,7 +156,7 @@ def _bound_rates(
         lower, pair = LOWER_ARMS[k], closures[2 * k : 2 * k + 2]
         dependent = [j for j in CORNER[k] if j != lower]
         driving = [-row[0] for row in _rows(pair, [lower])]
-        follow, bias = eliminate_several(
+        follow, bias = eliminate(
             tape, _rows(pair, dependent), [driving, gamma[6 * k : 6 * k + 6]], PIVOTS
         )
         for place, j in enumerate(dependent):
@@ -175,10 +166,10 @@ def _bound_rates(
 
 def _corners(tape: Tape, m: _Mechanism, rates: Sequence[Rate]) -> list[corners.Corner]:
     front = [
-        parts.front_corner(tape, m.vehicle, m.linkages[k], _motions(tape, m, rates, k), k)
+        corners.front_corner(tape, m.vehicle, k, m.linkages[k], _motions(tape, m, rates, k))
         for k in range(2)
     ]
-    return [*front, *(parts.rear_corner(tape, m.vehicle, rates, k) for k in (2, 3))]
+    return [*front, *(corners.rear_corner(tape, m.vehicle, k, rates) for k in (2, 3))]
 
 
 def _joint_accelerations(
@@ -208,7 +199,7 @@ def _outputs(
 
     carriers = [part.carrier for part in m.linkages]
     return [
-        *parts.outputs(tape, m.vehicle, corner_parts, speeds, carriers),
+        *assembly.outputs(tape, m.vehicle, corner_parts, speeds, carriers),
         norm(gaps),
         norm(gap_rates),
     ]

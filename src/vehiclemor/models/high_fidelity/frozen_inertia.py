@@ -15,8 +15,7 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from vehiclemor.models.components import body
-from vehiclemor.models.equations import DynamicEquations
-from vehiclemor.models.high_fidelity import closed_corner, frozen_wheels, independent, parts
+from vehiclemor.models.high_fidelity import frozen_wheels, independent, parts
 from vehiclemor.models.high_fidelity.frozen_quantities import (
     CONSTANTS,
     COORDINATES,
@@ -33,11 +32,11 @@ from vehiclemor.models.quantities import WHEELS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import ZERO
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive the derivatives and the full vehicle's state; parameters and constants are symbols."""
     tape = Tape()
     q, nu = body.symbols(COORDINATES), body.symbols(SPEEDS)
@@ -63,7 +62,7 @@ def derive() -> DynamicEquations:
     changes = _changes(tape, c, p, nu, wheels, angles, attitude.road_normal)
     own = [tape.let(nu[10 + k] - wheel.turn) for k, wheel in enumerate(wheels)]
     derivative = [*chassis, *nu[6:10], *own, *changes, *(wheel.spin for wheel in wheels)]
-    program = assemble(
+    return assemble(
         tape,
         {"x": [*q, *nu], "u": rack},
         [*flat, *c.values()],
@@ -75,7 +74,6 @@ def derive() -> DynamicEquations:
             ),
         },
     )
-    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, (), program)
 
 
 def _full_state(
@@ -88,17 +86,8 @@ def _full_state(
 ) -> list[sp.Expr]:
     """State of the full vehicle with the same independent coordinates and speeds."""
     points = parts.design_points(tape, p)
-    turning = g.vector(nu[3:6])
-    corners, motions, turns = [], [], []
-    for k in range(2):
-        corner = closed_corner.closed(tape, q[6 + k], rack[0], points[k], parts.SIDES[k])
-        moved = (rack[1], rack[2])
-        motion = closed_corner.motions(tape, corner, 6 + k, nu[6 + k], moved, points[k])
-        axle = g.vector([row[1] for row in corner.linkage.carrier])
-        turns.append(g.dot(axle, g.add(turning, motion.bodies.carrier.value)))
-        corners.append(corner)
-        motions.append(motion)
-    turns += [turning[1] + nu[8], turning[1] + nu[9]]
+    corners, motions = independent.closed_corners(tape, q, nu, rack, points)
+    turns = independent.carrier_turns(g.vector(nu[3:6]), corners, motions, nu)
     spins = [tape.let(nu[10 + k] - turn) for k, turn in enumerate(turns)]
     rates = [*chassis, *nu[6:10], *spins]
     return independent.full_state(tape, q, rates, corners, motions)
@@ -119,37 +108,33 @@ def _changes(
     force = g.named(tape, [sp.Add(*[wheel.force[i] for wheel in wheels]) for i in range(3)])
     moment = [sp.Add(*[wheel.moment[i] for wheel in wheels]) for i in range(3)]
     # The acceleration that everything has, beside which the others are small.
-    common = g.named(tape, g.scale(let(1 / c["total_mass"]), force))
+    common = g.named(tape, force * let(1 / c["total_mass"]))
 
     arms = []
     moved = ZERO
     for k, (wheel, (angle, rate)) in enumerate(zip(wheels, angles, strict=True)):
         end, side = ENDS[k // 2], parts.SIDES[k]
         first, second = (
-            (
-                c[f"{end}_{order}_x"],
-                side * c[f"{end}_{order}_y"],
-                c[f"{end}_{order}_z"],
-            )
+            Vector(c[f"{end}_{order}_x"], side * c[f"{end}_{order}_y"], c[f"{end}_{order}_z"])
             for order in ("first", "second")
         )
-        moved = g.add(moved, g.scale(angle, first))
+        moved = moved + first * angle
         pull = _spring(tape, c, p, end, angle, rate)
-        arms.append(let(wheel.arm + pull - angle * let(g.dot(second, common))))
+        arms.append(let(wheel.arm + pull - angle * let(second @ common)))
     moved = g.named(tape, moved)
 
     # Inertial forces of the rigid vehicle.
     offset = g.vector((c["offset_x"], 0, c["offset_z"]))
-    swept = g.named(tape, g.cross(turning, offset))
+    swept = g.named(tape, turning.cross(offset))
     tensor = (
-        (c["tensor_xx"], sp.Integer(0), c["tensor_xz"]),
-        (sp.Integer(0), c["tensor_yy"], sp.Integer(0)),
-        (c["tensor_xz"], sp.Integer(0), c["tensor_zz"]),
+        g.vector((c["tensor_xx"], 0, c["tensor_xz"])),
+        g.vector((0, c["tensor_yy"], 0)),
+        g.vector((c["tensor_xz"], 0, c["tensor_zz"])),
     )
-    momentum = g.named(tape, [g.dot(row, turning) for row in tensor])
+    momentum = g.named(tape, [row @ turning for row in tensor])
     loads = [
-        *g.subtract(force, g.cross(turning, swept)),
-        *g.subtract(g.vector(moment), g.add(g.cross(turning, momentum), g.cross(moved, common))),
+        *force - turning.cross(swept),
+        *g.vector(moment) - (turning.cross(momentum) + moved.cross(common)),
     ]
     loads = [let(load) for load in loads]
     result: dict[int, sp.Expr] = {}
@@ -164,8 +149,8 @@ def _changes(
         result |= dict(zip(places, rows[:3], strict=True))
         halves.append(rows[3:])
     # Gravity and the turning axes accelerate the chassis' speeds alike.
-    falling = g.add(g.cross(turning, g.vector(nu[:3])), g.scale(p["gravity"], up))
-    linear = g.subtract(g.vector([result[i] for i in range(3)]), falling)
+    falling = turning.cross(g.vector(nu[:3])) + up * p["gravity"]
+    linear = g.vector([result[i] for i in range(3)]) - falling
     even, odd = halves
     return [
         *g.named(tape, linear),

@@ -94,11 +94,11 @@ def front_place(
         rates.append(let(by_arm[-1] * rate + by_rack * s_dot))
 
     def centre(v: Sequence[sp.Expr]) -> Vector:
-        return v[0], side * v[1], v[2]
+        return Vector(v[0], side * v[1], v[2])
 
     def axle(x: sp.Expr, y: sp.Expr, z: sp.Expr) -> Vector:
         # It points to the left on both sides.
-        return side * x, y, side * z
+        return Vector(side * x, y, side * z)
 
     # The axle is a unit vector near y: to fourth order of its other components.
     x, z = values[3:]
@@ -127,13 +127,9 @@ def rear_place(
     """A rear wheel on the chassis; its axle keeps its direction."""
     del rack
     x, z = ([c[f"{name}_{i}"] for i in range(DEGREE + 1)] for name in REAR_MAPS)
-    centre = (horner(tape, x, angle), side * c["rear_centre_y"], horner(tape, z, angle))
-    by_arm = (
-        horner(tape, slope(x), angle),
-        sp.Integer(0),
-        horner(tape, slope(z), angle),
-    )
-    rates = g.named(tape, g.scale(rate, by_arm))
+    centre = Vector(horner(tape, x, angle), side * c["rear_centre_y"], horner(tape, z, angle))
+    by_arm = g.vector((horner(tape, slope(x), angle), 0, horner(tape, slope(z), angle)))
+    rates = g.named(tape, by_arm * rate)
     return Place(centre, UNIT[1], by_arm, ZERO, rates, ZERO, rate)
 
 
@@ -153,23 +149,21 @@ def wheel_on_road(
     """
     let, axle = tape.let, place.axle
     turning = g.vector(nu[3:6])
-    tilt = let(g.dot(axle, up))
+    tilt = let(axle @ up)
     # The axle is a unit vector; the cosine is that of the camber angle.
     cosine = let(sp.sqrt(let(1 - tilt**2)))
     inverse = let(1 / cosine)
-    heading = g.named(tape, g.scale(inverse, g.cross(axle, up)))
-    radius = let((height + g.dot(up, place.centre)) * inverse)
-    velocity = g.named(
-        tape, g.add(g.vector(nu[:3]), g.add(g.cross(turning, place.centre), place.centre_rate))
-    )
+    heading = g.named(tape, axle.cross(up) * inverse)
+    radius = let((height + (up @ place.centre)) * inverse)
+    velocity = g.named(tape, g.vector(nu[:3]) + turning.cross(place.centre) + place.centre_rate)
     # The axle's change gives the part of the carrier's rotation across the axle; that about it
     # is in the spin.
-    change = g.named(tape, g.add(g.cross(turning, axle), place.axle_rate))
-    rise, tilting = let(g.dot(velocity, up)), let(g.dot(change, up))
-    turn = let(g.dot(turning, axle) + place.turn)
-    ahead = let(g.dot(velocity, heading))
+    change = g.named(tape, turning.cross(axle) + place.axle_rate)
+    rise, tilting = let(velocity @ up), let(change @ up)
+    turn = let((turning @ axle) + place.turn)
+    ahead = let(velocity @ heading)
     forward = let(ahead - radius * turn)
-    lateral = let((g.dot(velocity, axle) - tilt * rise) * inverse + radius * tilting)
+    lateral = let(((velocity @ axle) - tilt * rise) * inverse + radius * tilting)
     rate = let(rise + let(radius * tilt) * let(tilting * inverse)) * inverse
     load = tilted_wheel.vertical_load(tape, radius, rate, p)
     per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
@@ -182,22 +176,19 @@ def wheel_on_road(
     upwards = let(load - sideways * tilt)
     force = g.named(
         tape,
-        g.add(
-            g.scale(tire.longitudinal, heading),
-            g.add(g.scale(sideways, axle), g.scale(upwards, up)),
-        ),
+        heading * tire.longitudinal + axle * sideways + up * upwards,
     )
     # Moment about the wheel centre, without its part about the axle, which turns the wheel.
     along = let(tire.lateral * cosine + load * tilt)
     rolling, twist = let(radius * along), tire.aligning
     momentum = let(p[f"{end}_wheel_spin_inertia"] * spin)
-    free = g.add(g.scale(rolling, heading), g.scale(twist, g.subtract(up, g.scale(tilt, axle))))
-    free = g.named(tape, g.subtract(free, g.scale(momentum, change)))
-    on_arm = g.dot(force, place.centre_by_arm)
+    free = heading * rolling + (up - axle * tilt) * twist
+    free = g.named(tape, free - change * momentum)
+    on_arm = force @ place.centre_by_arm
     if place.axle_by_arm != ZERO:
         # The axle turns with its arm about axle x (its derivative).
-        on_arm += g.dot(place.axle_by_arm, g.named(tape, g.cross(free, axle)))
-    moment = g.add(free, g.cross(place.centre, force))
+        on_arm += place.axle_by_arm @ g.named(tape, free.cross(axle))
+    moment = free + place.centre.cross(force)
     driving = let(twist * tilt - radius * tire.longitudinal)
     return Wheel(
         force,

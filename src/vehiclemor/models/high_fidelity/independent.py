@@ -4,16 +4,16 @@ Its front corners close in closed form (`closed_corner.py`), so that these equat
 ones of `equations.py` on the manifold where all constraints hold.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
 from vehiclemor.models.components import body
-from vehiclemor.models.equations import DynamicEquations
-from vehiclemor.models.high_fidelity import closed_corner, parts
+from vehiclemor.models.high_fidelity import assembly, closed_corner, parts
 from vehiclemor.models.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
-from vehiclemor.models.high_fidelity.quantities import COORDINATES as ALL_COORDINATES
+from vehiclemor.models.high_fidelity.corners import front_corner, rear_corner
 from vehiclemor.models.high_fidelity.quantities import (
+    COORDINATES,
     INDEPENDENT_COORDINATES,
     INDEPENDENT_SPEEDS,
     INPUTS,
@@ -23,59 +23,90 @@ from vehiclemor.models.high_fidelity.quantities import (
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.joints import free_rate
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
-NUMBERS = parts.Numbers(len(PLACES), (6, 7), (8, 9), (10, 11, 12, 13))
+NUMBERS = parts.Numbers(len(PLACES), (6, 7, 8, 9), (10, 11, 12, 13))
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive accelerations, outputs and the state of all 26 coordinates; parameters are symbols."""
     tape = Tape()
     q, rates = body.symbols(INDEPENDENT_COORDINATES), body.symbols(INDEPENDENT_SPEEDS)
-    s, s_dot, s_ddot = body.symbols(INPUTS)
+    rack = body.symbols(INPUTS)
     p, flat = parts.parameters()
     vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
-    corners, motions = [], []
-    for k, number in enumerate(NUMBERS.lower_arms):
-        points = vehicle.points[k]
-        corner = closed_corner.closed(tape, q[number], s, points, parts.SIDES[k])
-        rack = (s_dot, s_ddot)
-        corners.append(corner)
-        motions.append(closed_corner.motions(tape, corner, number, rates[number], rack, points))
+    corners, motions = closed_corners(tape, q, rates, rack, vehicle.points)
     front = [
-        parts.front_corner(tape, vehicle, corners[k].linkage, motions[k].bodies, k)
-        for k in range(2)
+        front_corner(tape, vehicle, k, corners[k].linkage, motions[k].bodies) for k in range(2)
     ]
     free = [free_rate(k, rate) for k, rate in enumerate(rates)]
-    whole = [*front, *(parts.rear_corner(tape, vehicle, free, k) for k in (2, 3))]
-    mass, _ = parts.kane(tape, vehicle, whole)
-    solved = parts.solved(tape, vehicle, whole)
+    whole = [*front, *(rear_corner(tape, vehicle, k, free) for k in (2, 3))]
+    mass, _ = assembly.kane(tape, vehicle, whole)
+    solved = assembly.solved(tape, vehicle, whole)
     accelerations = [
-        *parts.chassis_accelerations(tape, attitude, solved, speeds),
+        *assembly.chassis_accelerations(tape, attitude, solved, speeds),
         *(solved[k] for k in range(6, NUMBERS.total)),
     ]
     carriers = [corner.linkage.carrier for corner in corners]
     zero = sp.Integer(0)
-    outputs = [*parts.outputs(tape, vehicle, whole, speeds, carriers), zero, zero]
+    outputs = [*assembly.outputs(tape, vehicle, whole, speeds, carriers), zero, zero]
     n = NUMBERS.total
-    program = assemble(
+    return assemble(
         tape,
-        {"x": [*q, *rates], "u": [s, s_dot, s_ddot]},
+        {"x": [*q, *rates], "u": rack},
         flat,
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (outputs, (len(OUTPUTS),)),
             "full_state": (
                 full_state(tape, q, rates, corners, motions),
-                (2 * len(ALL_COORDINATES),),
+                (2 * len(COORDINATES),),
             ),
             "mass": ([entry for row in mass for entry in row], (n, n)),
-            "quasi_speeds": (_quasi_speeds(tape, vehicle, speeds, carriers, motions), (n,)),
+            "quasi_speeds": (_quasi_speeds(tape, rates, speeds, corners, motions), (n,)),
             "suspension": (_suspension(tape, vehicle, corners[0]), (3, 4)),
         },
     )
-    return DynamicEquations(INDEPENDENT_COORDINATES, INDEPENDENT_SPEEDS, INPUTS, OUTPUTS, program)
+
+
+def closed_corners(
+    tape: Tape,
+    q: Sequence[sp.Symbol],
+    rates: Sequence[sp.Symbol],
+    rack: Sequence[sp.Symbol],
+    points: Sequence[Mapping[str, g.Vector]],
+) -> tuple[list[ClosedCorner], list[ClosedMotions]]:
+    """Both front corners and their motions, from angles and rates of the lower arms."""
+    corners, motions = [], []
+    for k, number in enumerate(NUMBERS.arms[:2]):
+        corner = closed_corner.closed(tape, q[number], rack[0], points[k], parts.SIDES[k])
+        moved = (rack[1], rack[2])
+        corners.append(corner)
+        motions.append(closed_corner.motions(tape, corner, number, rates[number], moved, points[k]))
+    return corners, motions
+
+
+def carrier_turns(
+    turning: g.Vector,
+    corners: Sequence[ClosedCorner],
+    motions: Sequence[ClosedMotions],
+    rates: Sequence[sp.Expr],
+) -> list[sp.Expr]:
+    """Angular velocities in space of wheel carriers and trailing arms about the wheels' axles.
+
+    Parameters
+    ----------
+    turning
+        Angular velocity of the chassis.
+    rates
+        Of the coordinates, by number.
+    """
+    turns = []
+    for corner, motion in zip(corners, motions, strict=True):
+        axle = g.column(corner.linkage.carrier, 1)
+        turns.append(axle @ (turning + motion.bodies.carrier.value))
+    return [*turns, *(turning[1] + rates[number] for number in NUMBERS.arms[2:])]
 
 
 def full_state(
@@ -87,7 +118,7 @@ def full_state(
 ) -> list[sp.Expr]:
     """All 26 coordinates and their rates, from the 14 independent ones and theirs."""
     lifted, lifted_rates = [*q[:6]], [*rates[:6]]
-    for corner, motion, number in zip(corners, motions, NUMBERS.lower_arms, strict=True):
+    for corner, motion, number in zip(corners, motions, NUMBERS.arms, strict=False):
         angles, turning = _joints(tape, corner, motion)
         # The lower arm's angle comes after that of the upper one.
         lifted += [*angles[:4], q[number], *angles[4:]]
@@ -101,7 +132,7 @@ def _joints(
     """zeta, eta, xi, theta_u, alpha, beta of a corner, and their rates."""
     let, linkage = tape.let, corner.linkage
     rows, (x, y, z) = linkage.carrier, linkage.rod_direction
-    first = (rows[0][0], rows[1][0], rows[2][0])
+    first = g.column(rows, 0)
     flat = let(first[0] ** 2 + first[1] ** 2)
     level = let(sp.sqrt(flat))
     turn = linkage.upper.angle
@@ -129,43 +160,36 @@ def _joints(
 
 def _quasi_speeds(
     tape: Tape,
-    vehicle: parts.Vehicle,
+    rates: Sequence[sp.Expr],
     speeds: Sequence[sp.Expr],
-    carriers: Sequence[g.Rotation],
+    corners: Sequence[ClosedCorner],
     motions: Sequence[ClosedMotions],
 ) -> list[sp.Expr]:
     """Chassis speeds, rates of the arms, and spins of the wheels in space."""
-    rates = vehicle.rates
-    turning = g.vector(speeds[3:6])
-    spins = []
-    for carrier, motion in zip(carriers, motions, strict=True):
-        axle = (carrier[0][1], carrier[1][1], carrier[2][1])
-        spins.append(g.dot(axle, g.add(turning, motion.bodies.carrier.value)))
-    spins += [turning[1] + rates[number] for number in NUMBERS.rear_arms]
-    own = [rates[number] for number in NUMBERS.spins]
-    total = [tape.let(spin + rate) for spin, rate in zip(spins, own, strict=True)]
-    return [*speeds, *rates[6:10], *total]
+    turns = carrier_turns(g.vector(speeds[3:6]), corners, motions, rates)
+    spins = zip(turns, NUMBERS.spins, strict=True)
+    return [*speeds, *rates[6:10], *(tape.let(turn + rates[number]) for turn, number in spins)]
 
 
 def _suspension(tape: Tape, vehicle: parts.Vehicle, corner: ClosedCorner) -> list[sp.Expr]:
     """Rows: left front and rear wheel centre with the length of the spring; front axle and zero."""
     linkage, front, rear = corner.linkage, vehicle.points[0], vehicle.points[2]
-    angle = vehicle.q[NUMBERS.rear_arms[0]]
+    angle = vehicle.q[NUMBERS.arms[2]]
 
     def behind(name: str) -> g.Vector:
-        lever = g.named(tape, g.subtract(rear[name], rear["rear_arm_pivot"]))
+        lever = g.named(tape, rear[name] - rear["rear_arm_pivot"])
         turned = g.rotate_about_axis(tape, lever, mechanics.UNIT[1], angle)
-        return g.named(tape, g.add(rear["rear_arm_pivot"], turned))
+        return g.named(tape, rear["rear_arm_pivot"] + turned)
 
     def spring(end: g.Vector, fixed: g.Vector) -> sp.Expr:
-        return g.length(tape, g.named(tape, g.subtract(end, fixed)))
+        return g.length(tape, g.named(tape, end - fixed))
 
     lever = linkage.lower.lever(tape, front["front_spring_arm_point"])
     return [
         *linkage.on_carrier(tape, front["wheel_centre"]),
-        spring(g.add(linkage.lower.rear, lever), front["front_spring_chassis_point"]),
+        spring(linkage.lower.rear + lever, front["front_spring_chassis_point"]),
         *behind("rear_wheel_centre"),
         spring(behind("rear_spring_arm_point"), rear["rear_spring_chassis_point"]),
-        *(row[1] for row in linkage.carrier),
+        *g.column(linkage.carrier, 1),
         sp.Integer(0),
     ]

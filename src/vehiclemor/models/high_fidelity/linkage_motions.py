@@ -51,13 +51,12 @@ def linkage_motions(
     zeta, alpha = q[0], q[5]
     turned_y = g.vector((-tape.let(sp.sin(zeta)), tape.let(sp.cos(zeta)), 0))
     turned_x = g.vector((tape.let(sp.cos(alpha)), tape.let(sp.sin(alpha)), 0))
-    first_column = (linkage.carrier[0][0], linkage.carrier[1][0], linkage.carrier[2][0])
     upper = along(rates[3], linkage.upper.axis(tape))
     lever = linkage.upper.lever(tape, linkage.design_ball_joint)
     return LinkageMotions(
         upper,
         along(rates[4], linkage.lower.axis(tape)),
-        successive(tape, rates[:3], (m.UNIT[2], turned_y, first_column)),
+        successive(tape, rates[:3], (m.UNIT[2], turned_y, g.column(linkage.carrier, 0))),
         successive(tape, rates[5:7], (m.UNIT[2], turned_x)),
         carried(tape, STILL, upper, lever),
         Motion(g.vector((0, rack[0], 0)), {}, g.vector((0, rack[1], 0))),
@@ -70,8 +69,8 @@ def closures(
     """Closures of a corner (6) and their motions: lower ball joint, then outer tie-rod joint."""
     ball, outer = points["lower_ball_joint"], points["tie_rod_outer"]
     gaps = [
-        *g.subtract(linkage.on_carrier(tape, ball), linkage.on_lower_arm(tape, ball)),
-        *g.subtract(linkage.on_carrier(tape, outer), g.named(tape, linkage.rod_end)),
+        *linkage.on_carrier(tape, ball) - linkage.on_lower_arm(tape, ball),
+        *linkage.on_carrier(tape, outer) - g.named(tape, linkage.rod_end),
     ]
 
     def on_carrier(place: Vector) -> Motion:
@@ -90,7 +89,7 @@ def relative(tape: Tape, a: Motion, b: Motion) -> Motion:
     """Motion of one point less that of another."""
     columns = dict(a.columns)
     for k, column in b.columns.items():
-        columns[k] = g.subtract(columns.get(k, m.ZERO), column)
+        columns[k] = columns.get(k, m.ZERO) - column
     named = {k: g.named(tape, column) for k, column in columns.items()}
-    value, bias = g.subtract(a.value, b.value), g.subtract(a.bias, b.bias)
+    value, bias = a.value - b.value, a.bias - b.bias
     return Motion(g.named(tape, value), named, g.named(tape, bias))

@@ -11,22 +11,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.models.independent_suspension import quantities
 from vehiclemor.models.independent_suspension.equilibrium import check, starts
-from vehiclemor.models.independent_suspension.quantities import (
-    COORDINATES,
-    INPUTS,
-    OUTPUTS,
-    PARAMETERS,
-    SPEEDS,
-)
 from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, TimingCase
+from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
-    from vehiclemor.models.equations import DynamicEquations
+    from vehiclemor.symbolic.program import Program
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     from vehiclemor.models.independent_suspension import equations
 
@@ -41,14 +35,12 @@ REPORT = ModelReport(
     printed_outputs=("pitch", "yaw", "lateral_position"),
     timing=(
         *DYNAMIC_BASELINES,
-        TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
-        TimingCase("pod_r3_1e-4", "pod r=3, 1e-4", "pod", settings={"rank": 3, "tolerance": 1e-4}),
-        TimingCase("pod_r1", "pod r=1", "pod", settings={"rank": 1}),
-        TimingCase(
-            "pod_state_r3", "pod state r=3", "pod", settings={"rank": 3, "formulation": "state"}
-        ),
-        TimingCase("pod_literal_r3", "pod literal r=3", "pod", "literal", {"rank": 3}),
-        TimingCase("fixed_basis_r3", "fixed basis r=3", "fixed_basis", settings={"rank": 3}),
+        reduced_case("pod", 3),
+        reduced_case("pod", 3, tolerance=1e-4),
+        reduced_case("pod", 1),
+        reduced_case("pod", 3, formulation="state"),
+        reduced_case("pod", 3, "literal"),
+        reduced_case("fixed_basis", 3),
     ),
     bounds={"pitch": "gv_rms_pitch", "yaw": "gv_rms_yaw"},
     paper_fixed={"rank": 3, "control_period": 0.5},
@@ -58,11 +50,11 @@ DEFINITION = ModelDefinition(
     kind="ode",
     summary="vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)",
     maneuver="lane_change",
-    coordinates=COORDINATES,
-    speeds=SPEEDS,
-    inputs=INPUTS,
-    outputs=OUTPUTS,
-    parameters=PARAMETERS,
+    coordinates=quantities.COORDINATES,
+    speeds=quantities.SPEEDS,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    parameters=quantities.PARAMETERS,
     derive=derive,
     check=check,
     starts=starts,

@@ -8,36 +8,29 @@ import sympy as sp
 from vehiclemor.models.components import body
 from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
 from vehiclemor.models.components.tires import TireForces, magic_formula, tire_outputs
-from vehiclemor.models.equations import DynamicEquations
+from vehiclemor.models.independent_suspension import quantities
 from vehiclemor.models.independent_suspension.equilibrium import Derived, derived
-from vehiclemor.models.independent_suspension.quantities import (
-    COORDINATES,
-    FRONT,
-    INPUTS,
-    LEFT,
-    OUTPUTS,
-    PARAMETERS,
-    SPEEDS,
-)
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import joints, mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
-from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 
-def derive() -> DynamicEquations:
+def derive() -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     tape = Tape()
-    q = body.symbols(COORDINATES)
-    nu = body.symbols(SPEEDS)
-    (delta,) = body.symbols(INPUTS)
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in PARAMETERS}
+    q = body.symbols(quantities.COORDINATES)
+    nu = body.symbols(quantities.SPEEDS)
+    (delta,) = body.symbols(quantities.INPUTS)
+    p = {name: sp.Symbol(f"p_{name}", real=True) for name in quantities.PARAMETERS}
     attitude = body.attitude(tape, q)
     vehicle = _vehicle(tape, q, nu, delta, p, attitude)
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number) for number in range(4)]
-    mass, force = mechanics.kane(tape, len(SPEEDS), [sprung, *(wheel.rigid for wheel in wheels)])
+    mass, force = mechanics.kane(
+        tape, len(quantities.SPEEDS), [sprung, *(wheel.rigid for wheel in wheels)]
+    )
     for number, wheel in enumerate(wheels):
         force[6 + number] = tape.let(force[6 + number] - wheel.spring)
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
@@ -54,19 +47,18 @@ def derive() -> DynamicEquations:
             [wheel.contact.slip_angle for wheel in wheels],
         ),
     ]
-    n = len(COORDINATES)
-    program = assemble(
+    n = len(quantities.COORDINATES)
+    return assemble(
         tape,
         {"x": [*q, *nu], "u": [delta]},
         list(p.values()),
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
-            "outputs": (outputs, (len(OUTPUTS),)),
+            "outputs": (outputs, (len(quantities.OUTPUTS),)),
             "second_order": (second_order, (n, n + 1)),
             "speeds": ([*body.speeds(tape, attitude, nu), *nu[6:]], (n,)),
         },
     )
-    return DynamicEquations(COORDINATES, SPEEDS, INPUTS, OUTPUTS, program)
 
 
 @dataclass(frozen=True)
@@ -119,7 +111,7 @@ def _vehicle(
     named = replace(
         d, sprung_distance=pair(d.sprung_distance), depth=pair(d.depth), preload=pair(d.preload)
     )
-    weight = g.scale(-p["gravity"], attitude.road_normal)
+    weight = attitude.road_normal * -p["gravity"]
     return _Vehicle(frame, attitude, weight, q, nu, delta, p, named)
 
 
@@ -133,19 +125,19 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     mass = v.p["sprung_mass"]
     origin = v.frame.origin(tape)
     rotation = v.frame.rotation(tape, inertia)
-    return mechanics.Body(mass, origin, g.scale(mass, v.weight), rotation, inertia)
+    return mechanics.Body(mass, origin, v.weight * mass, rotation, inertia)
 
 
 def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     """A wheel of number 0 to 3 with its load, tire and spring."""
-    p, d, frame, front = v.p, v.named, v.frame, FRONT[wheel]
+    p, d, frame, front = v.p, v.named, v.frame, quantities.FRONT[wheel]
     end, side = (0, "front") if front else (1, "rear")
     travel, rate, spin = v.q[6 + wheel], v.nu[6 + wheel], v.nu[10 + wheel]
     track = p[f"{side}_track"]
     place = g.vector(
         (
             d.sprung_distance[0] if front else -d.sprung_distance[1],
-            tape.let(track / 2 if LEFT[wheel] else -track / 2),
+            tape.let(track / 2 if quantities.LEFT[wheel] else -track / 2),
             tape.let(travel - d.depth[end]),
         )
     )
@@ -173,7 +165,7 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     )
     force, moment = _loads(tape, contact, v.attitude.road_normal, load, tire)
     mass = p["unsprung_mass"]
-    whole = g.named(tape, g.add(force, g.scale(mass, v.weight)))
+    whole = g.named(tape, force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
     return _Wheel(
         mechanics.Body(mass, centre, whole, rotation, about, moment),
@@ -190,8 +182,8 @@ def _loads(
     """Force on a wheel and its moment about the wheel centre; the vertical load has no arm."""
     shear = g.named(
         tape,
-        g.add(g.scale(tire.longitudinal, contact.heading), g.scale(tire.lateral, contact.leftward)),
+        contact.heading * tire.longitudinal + contact.leftward * tire.lateral,
     )
-    arm = g.named(tape, g.scale(-contact.height, up))
-    moment = g.add(g.cross(arm, shear), g.scale(tire.aligning, up))
-    return g.named(tape, g.add(shear, g.scale(load, up))), g.named(tape, moment)
+    arm = g.named(tape, up * -contact.height)
+    moment = arm.cross(shear) + up * tire.aligning
+    return g.named(tape, shear + up * load), g.named(tape, moment)

@@ -1,19 +1,19 @@
 """The high-fidelity vehicle with frozen inertia, from the exact kernels of a ready model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.models.high_fidelity import frozen_quantities as frozen
-from vehiclemor.models.high_fidelity.forms import FROZEN_INERTIA
 from vehiclemor.models.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
 from vehiclemor.simulation.build import compiled, hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
+
+if TYPE_CHECKING:
+    from vehiclemor.symbolic.program import Program
 
 N = frozen.N
 # Ranges over which polynomials are fitted: angle of an arm in rad, displacement of the rack in m.
@@ -58,17 +58,17 @@ class _Exact:
 
 
 def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels of the vehicle with frozen inertia, and their constants.
-
-    Parameters
-    ----------
-    model
-        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
-    """
-    made, _ = compiled(FROZEN_INERTIA.name, FROZEN_INERTIA)
+    """Kernels of the vehicle with frozen inertia, and their constants of a ready model."""
+    made, _ = compiled("high_fidelity_frozen_inertia", _derive)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
     return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
+
+
+def _derive() -> "Program":
+    from vehiclemor.models.high_fidelity import frozen_inertia
+
+    return frozen_inertia.derive()
 
 
 def frozen_encoder(model: DynamicModel) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:

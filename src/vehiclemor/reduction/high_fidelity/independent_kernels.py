@@ -1,27 +1,30 @@
 """Compiled kernels of the high-fidelity vehicle in other coordinates than its own."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.high_fidelity.forms import INDEPENDENT
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import compiled, hoisted_constants, solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
 
+if TYPE_CHECKING:
+    from vehiclemor.symbolic.program import Program
+
 
 def independent_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
-    """Kernels over the 14 independent coordinates, and their constants.
-
-    Parameters
-    ----------
-    model
-        A `high_fidelity_vehicle`; its parameters and the free lengths of its springs hold.
-    """
-    made, _ = compiled(INDEPENDENT.name, INDEPENDENT)
+    """Kernels over the 14 independent coordinates, and their constants of a ready model."""
+    made, _ = compiled("high_fidelity_independent", _derive)
     return made, hoisted_constants(made, model.parameters, free_lengths(model))
+
+
+def _derive() -> "Program":
+    # Imported here: equations that were derived before are read from disk, without SymPy.
+    from vehiclemor.models.high_fidelity import independent
+
+    return independent.derive()
 
 
 def free_lengths(model: DynamicModel) -> list[float]:

@@ -14,10 +14,7 @@ holds fast modes only as far as they follow the slow ones linearly, and the righ
 of the full model: no faster than the best full-order integrator.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
@@ -28,7 +25,7 @@ from vehiclemor.reduction.projection.balancing import balancing, gramian_factor
 from vehiclemor.reduction.projection.bases import check_snapshots
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import lacking, no_vehicle
 from vehiclemor.reduction.vehicle.mirror import with_mirrored
 from vehiclemor.reduction.vehicle.projected_vehicle import one_window, projected_vehicle
@@ -67,9 +64,7 @@ def check(model: DynamicModel, settings: BalancedPodSettings) -> None:
     check_snapshots(settings.snapshots)
 
 
-def fit(
-    model: DynamicModel, training: Sequence[TrainingRun], settings: BalancedPodSettings
-) -> ReducedSystem:
+def fit(model: DynamicModel, training: Training, settings: BalancedPodSettings) -> ReducedSystem:
     """Balance the gramians of the training runs and of the linearisation."""
     began = time.perf_counter()
     shape, count = VehicleShape(model), settings.snapshots

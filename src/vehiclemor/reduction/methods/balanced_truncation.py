@@ -10,10 +10,7 @@ first; stabilised constraints, never excited, stay out.  The speed is kept besid
 trained.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
@@ -22,7 +19,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.projection.balancing import Balanced, balancing, gramian_factor
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -40,15 +37,7 @@ class BalancedTruncationSettings(OnlineSettings):
 
 
 def balanced(a: np.ndarray, b: np.ndarray, c: np.ndarray, rank: int) -> Balanced:
-    """Balance a stable system x' = a x + b u, y = c x.
-
-    Parameters
-    ----------
-    a, b, c
-        Matrices (n, n), (n, inputs), (outputs, n).
-    rank
-        Number of states to keep.
-    """
+    """Balance a stable system x' = a x + b u, y = c x of n states, of which `rank` are kept."""
     from scipy.linalg import solve_continuous_lyapunov
 
     reached = gramian_factor(solve_continuous_lyapunov(a, -b @ b.T))
@@ -73,9 +62,7 @@ def check(model: DynamicModel, settings: BalancedTruncationSettings) -> None:
 
 
 def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: BalancedTruncationSettings,
+    model: DynamicModel, training: Training, settings: BalancedTruncationSettings
 ) -> ReducedVehicle:
     """Linearise and balance; no training run is looked at."""
     began = time.perf_counter()

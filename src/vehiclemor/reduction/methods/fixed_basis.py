@@ -3,10 +3,6 @@
 L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Math. 45 (1987).
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-
 import numpy as np
 
 from vehiclemor.reduction.interface import Method, ReducedModel
@@ -18,7 +14,7 @@ from vehiclemor.reduction.projection.pod_settings import (
     Snapshots,
 )
 from vehiclemor.reduction.projection.subspaces import check_subspaces, fit_subspaces
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
 
@@ -43,7 +39,7 @@ class ConstrainedSettings(ConstrainedPodSettings):
 
 def fit(
     model: Model,
-    training: Sequence[TrainingRun],
+    training: Training,
     settings: AlgebraicSettings | DynamicSettings | ConstrainedSettings,
 ) -> ReducedModel:
     """One POD subspace for the whole of the training runs."""

@@ -6,19 +6,15 @@ the chassis stay nonlinear.  It needs no training: what is left out is small for
 input.  See `models/high_fidelity/frozen_inertia.py`.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
-from vehiclemor.reduction.high_fidelity.acceptance import no_closed_forms
 from vehiclemor.reduction.interface import Method, Offline
-from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.reduced_system import ReducedSystem, transformed_system
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.transformed import transformed_vehicle
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System
 
@@ -26,11 +22,7 @@ from vehiclemor.simulation.system import System
 ERROR_SCALE = {"psi": 1.0, "r": 1.0}
 
 
-def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: OnlineSettings,
-) -> ReducedSystem:
+def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> ReducedSystem:
     """Constants from the exact kernels at the design position; no training run is looked at."""
     # Derived symbolically where they are not on disk.
     from vehiclemor.models.high_fidelity import frozen_quantities as frozen
@@ -51,7 +43,7 @@ def fit(
         np.zeros(0, dtype=np.int64),
     )
     cost = Offline(time.perf_counter() - began)
-    return transformed_vehicle(model, system, encode, cost, settings)
+    return transformed_system(model, system, encode, cost, settings)
 
 
 METHOD = Method(

@@ -1,8 +1,5 @@
 """The full-order model itself: the baseline of every comparison."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -12,7 +9,7 @@ from pydantic import Field
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
 from vehiclemor.reduction.settings import OnlineSettings, Settings, Tolerance, one_of
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.model import Model
@@ -37,7 +34,7 @@ class DynamicSettings(OnlineSettings):
 
     solver: Annotated[str, one_of(tuple(INTEGRATORS))] = Field(
         "dopri5",
-        description="explicit: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
+        description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
         "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; etdrk4: exponential "
         "method of order 4, with the same",
     )
@@ -72,9 +69,7 @@ class FullOrderModel:
 
 
 def fit(
-    model: Model,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: AlgebraicSettings | DynamicSettings,
+    model: Model, training: Training, settings: AlgebraicSettings | DynamicSettings
 ) -> FullOrderModel:
     """Nothing is fitted, and no training run is looked at."""
     return FullOrderModel(model, settings.solver, settings.tolerance)

@@ -10,10 +10,7 @@ coordinate says little of what it does to the path: wheels' spins are kept befor
 stiff as they were.  A dense projected mass matrix costs more than the full model's elimination.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 from pydantic import Field
@@ -21,10 +18,10 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_snapshots, pod_basis
-from vehiclemor.reduction.projection.dynamic import DynamicProjection
+from vehiclemor.reduction.projection.dynamic import DynamicProjection, projected_equations
 from vehiclemor.reduction.projection.inner_products import coordinate_weight
 from vehiclemor.reduction.settings import ProjectedSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.mirror import with_mirrored
 from vehiclemor.reduction.vehicle.shape import spin_angles
@@ -57,9 +54,7 @@ def check(model: DynamicModel, settings: GlobalPodSettings) -> None:
     check_snapshots(settings.snapshots, rank)
 
 
-def fit(
-    model: DynamicModel, training: Sequence[TrainingRun], settings: GlobalPodSettings
-) -> DynamicProjection:
+def fit(model: DynamicModel, training: Training, settings: GlobalPodSettings) -> DynamicProjection:
     """One POD subspace of all training runs, each over its own duration."""
     from scipy.linalg import null_space
 
@@ -88,15 +83,8 @@ def fit(
     edges = np.array([0.0, max(run.maneuver.duration for run in training)])
     ranks = np.array([2 * r], dtype=np.int64)
     spaces = ProjectionWindows("coordinates", edges, mean[None], trial_basis, test_basis, ranks)
-    return DynamicProjection(
-        model,
-        "coordinates",
-        (Basis(mean[:n], vectors.T, scaled.singular_values),),
-        spaces,
-        offline_cost(began, model, runs),
-        settings.solver,
-        settings.tolerance,
-    )
+    basis = Basis(mean[:n], vectors.T, scaled.singular_values)
+    return projected_equations(model, spaces, [basis], offline_cost(began, model, runs), settings)
 
 
 def kept_apart(model: DynamicModel) -> np.ndarray:

@@ -6,28 +6,20 @@ approximated, and nothing is trained; no constraint is left to be stabilised.  S
 `models/high_fidelity/independent.py`.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
-from vehiclemor.reduction.high_fidelity.acceptance import no_closed_forms
 from vehiclemor.reduction.interface import Method, Offline
-from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.reduced_system import ReducedSystem, transformed_system
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.vehicle.transformed import transformed_vehicle
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System
 
 
-def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: OnlineSettings,
-) -> ReducedSystem:
+def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> ReducedSystem:
     """The exact equations; no training run is looked at."""
     # Derived symbolically where they are not on disk.
     from vehiclemor.models.high_fidelity.quantities import PLACES
@@ -52,7 +44,7 @@ def fit(
         np.array([whole.index(i) for i in model.rotating], dtype=np.int64),
     )
     cost = Offline(time.perf_counter() - began)
-    return transformed_vehicle(model, system, encode, cost, settings)
+    return transformed_system(model, system, encode, cost, settings)
 
 
 METHOD = Method(

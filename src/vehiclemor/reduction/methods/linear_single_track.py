@@ -18,17 +18,14 @@ constant.  Velocity and acceleration of the rack are left out.  Heave and pitch 
 single-track car.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.linear_vehicle import (
@@ -91,11 +88,7 @@ def single_track(shape: VehicleShape) -> SingleTrack:
     return SingleTrack(a, b, a - turning, rows, whole[:, :2], whole[:, 2])
 
 
-def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: OnlineSettings,
-) -> ReducedVehicle:
+def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> ReducedVehicle:
     """Linearise and condense; no training run is looked at."""
     began = time.perf_counter()
     shape = VehicleShape(model)

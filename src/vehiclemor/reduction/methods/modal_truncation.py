@@ -10,10 +10,7 @@ linearisation.
 See `linear_vehicle` for inputs that contain derivatives of the steering.  Nothing is trained.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -22,7 +19,7 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -65,9 +62,7 @@ def check(model: DynamicModel, settings: ModalTruncationSettings) -> None:
 
 
 def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: ModalTruncationSettings,
+    model: DynamicModel, training: Training, settings: ModalTruncationSettings
 ) -> ReducedVehicle:
     """Linearise and truncate; no training run is looked at."""
     began = time.perf_counter()

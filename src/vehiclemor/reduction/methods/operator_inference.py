@@ -17,10 +17,7 @@ Nothing makes a fitted A stable: its spectral abscissa at straight running is re
 eigenvalues are reflected at the imaginary axis (`stabilise`).
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -30,15 +27,15 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR, polynomial_features
 from vehiclemor.reduction.vehicle.linear_vehicle import HEADING, MARGIN, PLACE
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
-from vehiclemor.reduction.vehicle.samples import shape_samples
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape, shape_samples
 from vehiclemor.simulation.dynamic import DynamicModel
 
 
@@ -49,8 +46,7 @@ class OperatorInferenceSettings(OnlineSettings):
     degree: int = Field(1, ge=1, description="of the operators: 1 linear, 2 quadratic")
     ridge: float = Field(1e-8, ge=0.0, description="weight of the coefficients' size in the fit")
     stabilise: Literal["check", "shift"] = Field(
-        "check",
-        description="growing linear part: check reports it, shift reflects its eigenvalues",
+        "check", description="growing linear part: check reports it, shift reflects its eigenvalues"
     )
 
 
@@ -77,7 +73,7 @@ def check(model: DynamicModel, settings: OperatorInferenceSettings) -> None:
 
 
 def fit(
-    model: DynamicModel, training: Sequence[TrainingRun], settings: OperatorInferenceSettings
+    model: DynamicModel, training: Training, settings: OperatorInferenceSettings
 ) -> ReducedVehicle:
     """Project the training runs on their POD basis and fit the operators."""
     if not training:
@@ -89,7 +85,7 @@ def fit(
     basis = mirror_basis(deviations, mirror(shape), settings.rank)
     k, inputs = len(basis.odd), u.shape[1]
     features = polynomial_features(k, inputs, settings.degree)
-    values = features.at(deviations @ basis.encoding.T, u, np.zeros(0))
+    values = feature_columns(features, deviations @ basis.encoding.T, u, np.zeros(0))
     # Straight running is an equilibrium: the only constant is that of U.
     goals = np.column_stack([rates @ basis.encoding.T, motion - [0.0, shape.speed, 0.0]])
     c, groups = _inferred(basis.odd, values, goals, inputs, settings)
@@ -123,12 +119,8 @@ def _inferred(
 ) -> tuple[np.ndarray, tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]]:
     """Coefficients (terms, k + 3) of the goals, and the blocks that parity allows.
 
-    Parameters
-    ----------
-    odd
-        Which coordinates change sign in the mirror (k,).
-    values, goals
-        Terms (samples, terms) and rates, psi', U, V (samples, k + 3).
+    `odd` (k,) are coordinates that change sign in the mirror, `values` the terms (samples, terms),
+    `goals` rates, psi', U and V (samples, k + 3).
     """
     k = len(odd)
     parity = term_parity(odd, inputs, settings.degree)

@@ -5,10 +5,7 @@ that least squares on Chebyshev polynomials converge geometrically with the degr
 Approximation Theory and Approximation Practice, 2013, chapter 8).  No equation is solved online.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -23,7 +20,7 @@ from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_loop
 from vehiclemor.reduction.polynomials.map_loops import BLOCK
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.model import Model
@@ -77,13 +74,7 @@ class PathMapModel:
         return 1
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Polynomials at the maneuver's output times.
-
-        Raises
-        ------
-        InputError
-            If the start or the maneuver's inputs are not the model's, or an input isn't finite.
-        """
+        """Polynomials at the maneuver's output times."""
         model, times = self.model, maneuver.times
         model.start(start)
         inputs = checked_inputs(model, maneuver)
@@ -113,15 +104,13 @@ class PathMapModel:
         del states
 
 
-def check(model: Model, settings: PathMapSettings) -> None:  # noqa: ARG001
+def check(model: Model, settings: PathMapSettings) -> None:
     """Raise `InputError` if the degree is too high for powers of the travel."""
     if settings.degree > HIGHEST_DEGREE:
         raise InputError(f"degree {settings.degree} is above {HIGHEST_DEGREE}")
 
 
-def fit(
-    model: AlgebraicModel, training: Sequence[TrainingRun], settings: PathMapSettings
-) -> PathMapModel:
+def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) -> PathMapModel:
     """Least squares over all output times of the training runs.
 
     Raises

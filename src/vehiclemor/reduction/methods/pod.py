@@ -4,9 +4,6 @@ R. Masoudi, T. Uchida, J. McPhee, Reduction of Multibody Dynamic Models in Autom
 the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (2015), section 3.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -21,7 +18,7 @@ from vehiclemor.reduction.projection.pod_settings import (
 )
 from vehiclemor.reduction.projection.subspaces import check_subspaces, fit_subspaces
 from vehiclemor.reduction.projection.windows import window_edges
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
 # Shortest control period in s by kind of model: no motion of a vehicle happens in less.
@@ -59,7 +56,7 @@ def check(model: Model, settings: PodSettings) -> None:
         raise InputError(f"control_period is below {shortest:g} s")
 
 
-def fit(model: Model, training: Sequence[TrainingRun], settings: PodSettings) -> ReducedModel:
+def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel:
     """One POD subspace for each control period of the training runs."""
     edges = window_edges(training[0].maneuver.duration, settings.control_period)
     return fit_subspaces(model, training, edges, settings)

@@ -6,11 +6,8 @@ linearly, their part is exact; the rest is fitted, so that no trigonometric func
 of the full model is evaluated online.
 """
 
-from __future__ import annotations
-
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -32,7 +29,7 @@ from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -108,13 +105,7 @@ class PolynomialResidualModel:
         return self.basis.rank
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Solve the polynomial equations at the maneuver's output times.
-
-        Raises
-        ------
-        InputError
-            If the start or the maneuver's inputs are not the model's, or an input isn't finite.
-        """
+        """Solve the polynomial equations at the maneuver's output times."""
         model, times = self.model, maneuver.times
         began_at = self.reduced(model.start(start)[None, :])[0]
         inputs = checked_inputs(model, maneuver)
@@ -181,7 +172,7 @@ def check(model: AlgebraicModel, settings: PolynomialResidualSettings) -> None:
 
 
 def fit(
-    model: AlgebraicModel, training: Sequence[TrainingRun], settings: PolynomialResidualSettings
+    model: AlgebraicModel, training: Training, settings: PolynomialResidualSettings
 ) -> PolynomialResidualModel:
     """POD of equidistant snapshots, and polynomials through residuals along and beside their path.
 

@@ -15,17 +15,14 @@ brake: what a steered wheel rolls less than the car moves is of second order, an
 already a force.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.projected_vehicle import one_window, projected_vehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape, spin_angles
@@ -38,11 +35,7 @@ def refusal(model: DynamicModel) -> str:
     return reason or ("" if len(spin_angles(model)) else f"{model.name} has no wheels that spin")
 
 
-def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: ProjectedSettings,
-) -> ReducedSystem:
+def fit(model: DynamicModel, training: Training, settings: ProjectedSettings) -> ReducedSystem:
     """Slave the spins by the linearisation; no training run is looked at."""
     began = time.perf_counter()
     shape, n = VehicleShape(model), len(model.coordinates)

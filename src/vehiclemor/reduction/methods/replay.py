@@ -4,10 +4,7 @@ The null hypothesis of every comparison: a reduced model that is no better than 
 that it was not trained on has learned nothing about the model.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +13,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import KINDS
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -81,11 +78,7 @@ def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.
     return np.array(columns).reshape(len(columns), len(times)).T
 
 
-def fit(
-    model: Model,
-    training: Sequence[TrainingRun],
-    settings: Settings,  # noqa: ARG001
-) -> ReplayModel:
+def fit(model: Model, training: Training, settings: Settings) -> ReplayModel:
     """Record the training runs at the output times."""
     began = time.perf_counter()
     recorded = tuple(run.recorded() for run in training)

@@ -15,8 +15,6 @@ twice: as a rate, then as its integral along reduced runs, since a heading that 
 position that is off.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,14 +25,14 @@ from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
-from vehiclemor.reduction.vehicle.samples import ShapeSamples, shape_samples
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable, feature_table
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import Target, finishes, improved, targets
@@ -77,9 +75,7 @@ class SlowManifoldSettings(OnlineSettings):
     tolerance: Tolerance = 2e-3
 
 
-def fit(
-    model: DynamicModel, training: Sequence[TrainingRun], settings: SlowManifoldSettings
-) -> ReducedVehicle:
+def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.perf_counter()
     runs = [run.recorded() for run in training]
@@ -111,7 +107,7 @@ def _fitted_on_rates(
     k, inputs = len(modes.rates), u.shape[1]
     odd, even = table.odd, table.even
     odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
-    columns = table.features.at(np.column_stack([z, speed]), u, table.parameters)
+    columns = feature_columns(table.features, np.column_stack([z, speed]), u, table.parameters)
     slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
     linear = z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
     c = np.zeros((len(table.features.terms), k + 1 + PLANAR))
@@ -163,7 +159,7 @@ def _fitted_on_runs(
 
 def _with_heading(
     reduced: ReducedVehicle,
-    training: Sequence[TrainingRun],
+    training: Training,
     runs: Sequence[Trajectory],
     odd: Sequence[int],
     column: int,
@@ -175,7 +171,9 @@ def _with_heading(
         path = reduced.path(run.maneuver, run.start)
         if path is None:
             continue
-        columns = reduced.features.at(path[:, :k], true.inputs, reduced.parameters)[:, odd]
+        columns = feature_columns(reduced.features, path[:, :k], true.inputs, reduced.parameters)[
+            :, odd
+        ]
         steps = np.diff(true.time)[:, None]
         sums = np.cumsum(0.5 * steps * (columns[1:] + columns[:-1]), axis=0)
         integrals.append(np.vstack([np.zeros(len(odd)), sums]))

@@ -8,24 +8,19 @@ To be expected: an explicit run gains up to the factor, with small errors, until
 constraints limit the steps; a W-method gains nothing, since stiffness is free for it.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 
-import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system import Run
 
 # Parameters that are proportional to the slip stiffness.  Magic Formula: K_x / F_z is
 # (PKX1 + PKX2 d) exp(PKX3 d), d the relative change of the load; the peak stays.
@@ -59,27 +54,14 @@ def softened(model: DynamicModel, factor: float) -> DynamicModel:
     return changed
 
 
-def fit(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],  # noqa: ARG001
-    settings: SoftenedSlipSettings,
-) -> ReducedSystem:
+def fit(model: DynamicModel, training: Training, settings: SoftenedSlipSettings) -> ReducedSystem:
     """States of the softened vehicle, outputs of the original; no training run is looked at."""
     began = time.perf_counter()
     soft = softened(model, settings.factor)
-
-    def encode(state: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return state
-
-    def lift(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
-        return run.path
-
     return ReducedSystem(
         model,
         soft.system,
         whole_space(2 * len(model.coordinates)),
-        encode,
-        lift,
         len(model.coordinates),
         Offline(time.perf_counter() - began),
         settings.solver,

@@ -59,10 +59,7 @@ def polynomial_kernels(rank: int, degree: int) -> dict[str, str]:
         "terms": "def terms(_x, _load, _coefficients, _result):",
         "slopes": "def slopes(_x, _derivatives, _result):",
     }
-    bodies = {
-        "terms": [*variables, *values, *stored],
-        "slopes": [*variables, *slopes, *entries],
-    }
+    bodies = {"terms": [*variables, *values, *stored], "slopes": [*variables, *slopes, *entries]}
     return {name: "\n    ".join([heads[name], *bodies[name]]) + "\n" for name in heads}
 
 

@@ -28,12 +28,10 @@ def map_path(
     ----------
     inputs
         Travel (m) and rack displacement (m) at the samples (samples, 2).
-    centre, scale
-        The polynomials' argument is (travel - centre) * scale; m and 1/m.
+    centre, scale, coefficients
+        As of `PathMapModel`.
     limits
         Lowest and highest travel, lowest and highest rack displacement (4,) in m.
-    coefficients
-        Those of the highest power first (DEGREE + 1, N).
     buffer
         Scratch space (BLOCK (N + 1),), zero at first.
     """

@@ -68,28 +68,13 @@ def reduced_path(
     """Solve the reduced equations sample by sample.
 
     The iteration starts at a quadratic extrapolation of the last three samples, the first ones at
-    the sample before.
-
-    Parameters
-    ----------
-    inputs
-        Inputs (samples, INPUTS), SI units.
-    x_start
-        Scaled reduced coordinates (N,) of the first iteration's start.
-    newton
-        Whether each iteration has a fresh Jacobian.
-    limit
-        Most iterations for a sample.
+    the sample before, of the very first at `x_start` (N,), scaled.  A sample has at most `limit`
+    iterations, with `newton` each with a fresh Jacobian.
     """
     means, basis, response, coefficients, derivatives, tolerances = polynomials
     path, counts = solution.path, solution.counts
-    x, first, second, third = (
-        vector(buffer, 0, N),
-        vector(buffer, N, N),
-        vector(buffer, 2 * N, N),
-        vector(buffer, 3 * N, N),
-    )
-    load, step = vector(buffer, 4 * N, N), vector(buffer, 5 * N, N)
+    x, load, step = vector(buffer, 0, N), vector(buffer, 4 * N, N), vector(buffer, 5 * N, N)
+    first, second, third = vector(buffer, N, N), vector(buffer, 2 * N, N), vector(buffer, 3 * N, N)
     matrix_of = matrix(buffer, 6 * N, N, N + 1)
     for k in range(N):
         x[k] = x_start[k]

@@ -1,9 +1,6 @@
 """Reduced algebraic equations on one affine subspace in each time window."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,9 +12,9 @@ from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
-from vehiclemor.reduction.projection.windows import first_samples
+from vehiclemor.reduction.projection.windows import by_window, first_samples
 from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Iteration
@@ -80,29 +77,13 @@ class AlgebraicProjection:
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""
-        times = np.linspace(self.edges[0], self.edges[-1], len(states))
-        first = first_samples(times, self.edges)
-        parts = [
-            project(states[first[k] : first[k + 1]], basis) for k, basis in enumerate(self.bases)
-        ]
-        return np.concatenate(parts)
+        return by_window(states, self.edges, lambda part, k: project(part, self.bases[k]))
 
 
 def fit_windows(
-    model: AlgebraicModel,
-    training: Sequence[TrainingRun],
-    edges: np.ndarray,
-    settings: AlgebraicPodSettings,
+    model: AlgebraicModel, training: Training, edges: np.ndarray, settings: AlgebraicPodSettings
 ) -> AlgebraicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) in each window.
-
-    Parameters
-    ----------
-    training
-        Runs whose snapshots are put side by side.
-    edges
-        Window edges (windows + 1,) in s.
-    """
+    """POD subspaces between edges (windows + 1,) in s, of snapshots as in `dynamic.fit_windows`."""
     began = time.perf_counter()
     count, rank = settings.snapshots, settings.rank
     moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]

@@ -5,8 +5,6 @@ as settings: which equations are projected (formulation), and in which inner pro
 compared.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,63 +14,39 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
-from vehiclemor.reduction.projection.windows import first_samples
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.projection.windows import by_window
+from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.settings import ProjectedSettings
+from vehiclemor.reduction.training import Training
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicProjection:
+class DynamicProjection(ReducedSystem):
     """Projected equations of motion on affine subspaces, one in each window.
 
     Attributes
     ----------
-    formulation
-        Which equations are projected, see `pod_settings`.
     bases
         Basis of each window, orthonormal in its inner product: of the states for `state`, else of
-        the coordinates.
-    spaces
-        The same for the compiled loops.
-    solver, tolerance
-        Integrator and its tolerance.
+        the coordinates; `spaces` are the same for the compiled loops.  Each window starts where the
+        one before has ended.
     """
 
-    model: DynamicModel
-    formulation: str
-    bases: tuple[Basis, ...]
-    spaces: ProjectionWindows
-    offline: Offline
-    solver: str
-    tolerance: float
-
-    @property
-    def effective_rank(self) -> int:
-        """Largest number of basis vectors in any window."""
-        return max(basis.rank for basis in self.bases)
-
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Integrate the reduced equations; each window starts where the one before has ended."""
-        return self.model.integrate(
-            maneuver, self.model.start(start), self.spaces, self.solver, self.tolerance
-        )
+    bases: tuple[Basis, ...] = ()
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
-        edges = self.spaces.edges
-        first = first_samples(np.linspace(edges[0], edges[-1], len(states)), edges)
-        parts = [self._project(states[first[k] : first[k + 1]], k) for k in range(len(self.bases))]
-        return np.concatenate(parts)
+        return by_window(states, self.spaces.edges, self._projected)
 
-    def _project(self, states: np.ndarray, window: int) -> np.ndarray:
+    def _projected(self, states: np.ndarray, window: int) -> np.ndarray:
         spaces, n = self.spaces, len(self.model.coordinates)
         mean, rank = spaces.means[window], spaces.ranks[window]
         trial, test = spaces.trial_basis[window], spaces.test_basis[window]
@@ -127,19 +101,11 @@ class DynamicProjection:
 
 
 def fit_windows(
-    model: DynamicModel,
-    training: Sequence[TrainingRun],
-    edges: np.ndarray,
-    settings: DynamicPodSettings,
+    model: DynamicModel, training: Training, edges: np.ndarray, settings: DynamicPodSettings
 ) -> DynamicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) in each window.
+    """POD subspaces of equidistant snapshots (both ends included) of all runs, side by side.
 
-    Parameters
-    ----------
-    training
-        Runs whose snapshots are put side by side.
-    edges
-        Window edges (windows + 1,) in s.
+    Windows lie between edges (windows + 1,) in s.
 
     Raises
     ------
@@ -171,15 +137,20 @@ def fit_windows(
         bases.append(Basis(means[-1][: len(weight)], vectors, scaled.singular_values))
     spaces = _spaces(model, formulation, edges, np.array(means), bases, weight)
     offline = offline_cost(began, model, histories)
-    return DynamicProjection(
-        model,
-        formulation,
-        tuple(bases),
-        spaces,
-        offline,
-        settings.solver,
-        settings.tolerance,
-    )
+    return projected_equations(model, spaces, bases, offline, settings)
+
+
+def projected_equations(
+    model: DynamicModel,
+    spaces: ProjectionWindows,
+    bases: Sequence[Basis],
+    offline: Offline,
+    settings: ProjectedSettings,
+) -> DynamicProjection:
+    """The equations of a model in subspaces, integrated as the settings say."""
+    rank = max(basis.rank for basis in bases)
+    how = settings.solver, settings.tolerance
+    return DynamicProjection(model, model.system, spaces, rank, offline, *how, bases=tuple(bases))
 
 
 def _weight(

@@ -1,7 +1,5 @@
 """Settings that all methods on POD subspaces share, by kind of model."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -43,8 +41,7 @@ class AlgebraicPodSettings(Settings):
         description="galerkin: seed of a random order and signs of the equations; 0: natural",
     )
     reversed_coordinates: str = Field(
-        "",
-        description="galerkin: coordinates counted the other way round, separated by commas",
+        "", description="galerkin: coordinates counted the other way round, separated by commas"
     )
     tolerance: float = Field(1e-12, gt=0.0, description="largest step of the last iteration")
     rounding_seed: int = Field(

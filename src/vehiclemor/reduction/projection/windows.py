@@ -1,5 +1,8 @@
 """Control periods: time windows that cover a run exactly once."""
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 
 
@@ -22,3 +25,12 @@ def first_samples(times: np.ndarray, edges: np.ndarray) -> np.ndarray:
     slack = 1e-9 * (edges[-1] - edges[0])
     inner = np.searchsorted(times, edges[1:-1] - slack)
     return np.concatenate([[0], inner, [len(times)]]).astype(np.int64)
+
+
+def by_window(
+    states: np.ndarray, edges: np.ndarray, project: Callable[[np.ndarray, int], np.ndarray]
+) -> np.ndarray:
+    """States (samples of equidistant times, n), those of each window by `project(states, k)`."""
+    first = first_samples(np.linspace(edges[0], edges[-1], len(states)), edges)
+    parts = [project(states[a:b], k) for k, (a, b) in enumerate(pairwise(first))]
+    return np.concatenate(parts)

@@ -10,20 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.simulation.integrators import ros34pw2, tableaus
 from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
 from vehiclemor.simulation.integrators.exponential_functions import TABLES
 
-if TYPE_CHECKING:
-    from vehiclemor.reduction.vehicle.features import Features
-
-# After the reduced coordinates z come heading and place.
-PLANAR = 3
 # The tables' functions at argument zero, for states that no block belongs to.
 AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
 JACOBIAN, HALF_FIRST, HALF_SECOND, FIRST, SECOND, MIDDLE, LAST = range(TABLES)

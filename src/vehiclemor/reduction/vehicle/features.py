@@ -13,21 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations_with_replacement
 
-import numpy as np
-
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.vehicle.feature_kernels import (
-    PLANAR,
-    columns_text,
-    diagonal_blocks,
-    kernel_text,
-)
-from vehiclemor.simulation.paths import along
-from vehiclemor.simulation.system import System
+# After the reduced coordinates z come heading and place.
+PLANAR = 3
 
 
 @dataclass(frozen=True)
@@ -62,53 +51,6 @@ class Features:
         """Blocks of C: numbers of features, columns."""
         everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
         return self.groups or (everything,)
-
-    def at(self, z: np.ndarray, u: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""
-        sizes = self.states, self.inputs, len(self.terms)
-        return along(self._columns, "columns", parameters, (z, u), sizes)
-
-    @cached_property
-    def _columns(self) -> Kernels:
-        return Kernels(kernel_sources(columns_text(self)))
-
-    def system(
-        self,
-        parameters: np.ndarray,
-        coefficients: np.ndarray,
-        error_scale: np.ndarray,
-        reference: np.ndarray,
-    ) -> System:
-        """The reduced vehicle as the compiled loops take it.
-
-        Parameters
-        ----------
-        parameters
-            Of the features.
-        coefficients
-            C (terms, states + 3): columns of z', then of psi', U and V.
-        error_scale
-            Magnitude of each state (states + 3,) below which errors count absolutely.
-        reference
-            Reduced coordinates (states,) at which the Jacobian is frozen.
-        """
-        blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in self.blocks]
-        for block, (terms, columns) in zip(blocks, self.blocks, strict=True):
-            block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
-        constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
-        dim = self.states + PLANAR
-        fused = {"ros34pw2": "ros34pw2_step"} | ({"etdrk4": "etdrk4_step"} if self.diagonal else {})
-        return System(
-            Kernels(kernel_sources(kernel_text(self, len(parameters)))),
-            constants,
-            self.inputs,
-            np.concatenate([reference, np.zeros(PLANAR)]),
-            error_scale,
-            np.arange(dim - 2),
-            np.zeros(0, dtype=np.int64),
-            fused,
-            diagonal=diagonal_blocks(self.diagonal),
-        )
 
 
 def monomials(names: Sequence[str], degree: int) -> tuple[str, ...]:

@@ -9,8 +9,6 @@ Speed, heading and place are kept as in every reduced vehicle: the speed stays t
 and the dynamics are those of the model's own speed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,15 +76,7 @@ def lateral_modes(shape: VehicleShape) -> Lateral:
 def linear_vehicle(
     shape: VehicleShape, lateral: Lateral, settings: OnlineSettings, began: float
 ) -> ReducedVehicle:
-    """A reduced vehicle of linear lateral dynamics at the speed of the start.
-
-    Parameters
-    ----------
-    shape, lateral
-        Shape and what moves it.
-    began
-        `time.perf_counter()` when the work began.
-    """
+    """A reduced vehicle of linear lateral dynamics at the speed of the start."""
     linear, modes = shape.linearised, slow_modes(shape, np.inf)
     k, inputs = len(lateral.a), linear.b.shape[1]
     features = polynomial_features(k + 1, inputs)

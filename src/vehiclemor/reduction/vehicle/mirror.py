@@ -1,14 +1,11 @@
 """The mirror image of a vehicle and of its training runs: a vehicle is its own mirror image."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
 
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
 from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -87,7 +84,7 @@ def term_parity(odd: np.ndarray, inputs: int, degree: int) -> np.ndarray:
     return np.array(parity)
 
 
-def with_mirrored(training: Sequence[TrainingRun]) -> list[TrainingRun]:
+def with_mirrored(training: Training) -> list[TrainingRun]:
     """Training runs, and the same with steering to the other side.
 
     The vehicle is its own mirror image.  Without these runs modes mix what is symmetric with what

@@ -1,16 +1,18 @@
-"""A vehicle's own equations on one affine subspace for all times and inputs."""
+"""A vehicle's own equations, speeds in the heading frame, on one affine subspace for all times."""
 
-from __future__ import annotations
+import ast
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
-from vehiclemor.reduction.vehicle.heading_frame import heading_frame
 from vehiclemor.reduction.vehicle.shape import VehicleShape, turned
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.system import Run
+from vehiclemor.simulation.system import Run, System
 
 
 def projected_vehicle(
@@ -20,13 +22,7 @@ def projected_vehicle(
     offline: Offline,
     settings: ProjectedSettings,
 ) -> ReducedSystem:
-    """The vehicle's equations with speeds in the heading frame, see `heading_frame`, projected.
-
-    Parameters
-    ----------
-    spaces
-        One window for all times, formulation `state`.
-    """
+    """The vehicle's equations with speeds in the heading frame in subspaces of `one_window`."""
     heading = shape.model.planar[2]
 
     def to_heading_frame(states: np.ndarray) -> np.ndarray:
@@ -51,12 +47,12 @@ def projected_vehicle(
         shape.model,
         heading_frame(shape),
         spaces,
-        encode,
-        lift,
         effective_rank,
         offline,
         settings.solver,
         settings.tolerance,
+        encode,
+        lift,
         project,
     )
 
@@ -68,3 +64,50 @@ def one_window(
     ranks = np.array([len(trial_basis)], dtype=np.int64)
     edges = np.array([0.0, np.inf])
     return ProjectionWindows("state", edges, mean[None], trial_basis[None], test_basis[None], ranks)
+
+
+def heading_frame(shape: VehicleShape) -> System:
+    """The vehicle's equations with all speeds as components in the heading frame, compiled.
+
+    A linear subspace can't turn with the heading.  So the text of the model's own kernel is taken
+    with the heading at zero, and what the turning frame adds stands at its end.  A model whose
+    speeds are components in the vehicle is left as it is.
+    """
+    model = shape.model
+    if not shape.pairs:
+        return model.system
+    own = model.kernels.sources["derivative"].text
+    text = heading_frame_text(own, model.planar, shape.pairs)
+    kernels = Kernels(kernel_sources(text))
+    return replace(model.system, kernels=kernels, rotating=np.zeros(0, dtype=np.int64))
+
+
+def heading_frame_text(text: str, planar: np.ndarray, pairs: Sequence[tuple[int, int]]) -> str:
+    """Text of the straight-line kernel `derivative` with pairs of speeds in the heading frame.
+
+    The speeds of a pair, by their numbers, were components in space; `planar` are the numbers of
+    the two positions and of the heading.
+    """
+    x, y, heading = (int(i) for i in planar)
+    (function,) = ast.parse(text).body
+    assert isinstance(function, ast.FunctionDef)
+    lines, results = [], {}
+    for statement in function.body:
+        assert isinstance(statement, ast.Assign | ast.Expr)
+        source = ast.unparse(statement)
+        target, _, value = source.partition(" = ")
+        if target.startswith("_result["):
+            results[int(target[8:-1])] = value
+        else:
+            lines.append(f"{target} = 0.0" if value == f"_x[{heading}]" else source)
+    turn = results[heading]
+    lines.append(f"sine_heading, cosine_heading = sincos_one(_x[{heading}])")
+    # At heading zero the rates of the place are the components in the heading frame.
+    forward, sideward = results[x], results[y]
+    results[x] = f"({forward}) * cosine_heading - ({sideward}) * sine_heading"
+    results[y] = f"({forward}) * sine_heading + ({sideward}) * cosine_heading"
+    for a, b in pairs:
+        results[a] = f"({results[a]}) + ({turn}) * _x[{b}]"
+        results[b] = f"({results[b]}) - ({turn}) * _x[{a}]"
+    lines += [f"_result[{i}] = {value}" for i, value in sorted(results.items())]
+    return f"{ast.unparse(function).splitlines()[0]}\n    " + "\n    ".join(lines) + "\n"

@@ -10,13 +10,12 @@ order derivatives for network pruning: optimal brain surgeon, NIPS 5 (1992), 164
 groups of coefficients, since a feature that one equation needs costs the others nothing).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable
@@ -35,16 +34,10 @@ def pruned(
     slow: np.ndarray,
     kept: int,
 ) -> tuple[ReducedVehicle, FeatureTable]:
-    """A reduced vehicle whose equations have fewer terms; the lifting keeps its own.
+    """A reduced vehicle of `kept` lateral terms beyond the linear ones; the lifting keeps its own.
 
-    Parameters
-    ----------
-    goals
-        Training runs in reduced states, near which the coefficients are best; all must finish.
-    slow
-        Slow coordinates and speed (samples, states) of the training runs.
-    kept
-        Number of lateral terms beyond the linear ones.
+    Its coefficients are best near the goals, all of which it must finish; `slow` are slow
+    coordinates and speed (samples, states) of the training runs.
     """
     k = reduced.features.states - 1
     normal = normal_matrix(reduced, goals, table.free)
@@ -58,7 +51,7 @@ def pruned(
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
     # The symmetric equations are fitted to rates; each counts by its nonlinear part.
     inputs = np.concatenate([goal.inputs for goal in goals])
-    values = reduced.features.at(slow, inputs, reduced.parameters)[:, even]
+    values = feature_columns(reduced.features, slow, inputs, reduced.parameters)[:, even]
     symmetric = c[np.ix_(even, [k, k + 2])]
     sizes = np.mean((values @ symmetric) ** 2, axis=0)
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)

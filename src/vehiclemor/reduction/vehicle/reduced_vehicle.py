@@ -1,7 +1,5 @@
 """Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +8,7 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -99,7 +98,10 @@ class ReducedVehicle:
         k = self.features.states
         steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
         no_input = np.zeros((2 * k, self.features.inputs))
-        rates = self.features.at(steps, no_input, self.parameters) @ self.coefficients[:, :k]
+        rates = (
+            feature_columns(self.features, steps, no_input, self.parameters)
+            @ self.coefficients[:, :k]
+        )
         jacobian = (rates[:k] - rates[k:]).T / (2.0 * DIFFERENCE)
         return float(np.linalg.eigvals(jacobian).real.max())
 
@@ -107,7 +109,9 @@ class ReducedVehicle:
     def system(self) -> System:
         """Compiled equations."""
         reference = np.zeros(self.features.states)
-        return self.features.system(self.parameters, self.coefficients, self.error_scale, reference)
+        return feature_system(
+            self.features, self.parameters, self.coefficients, self.error_scale, reference
+        )
 
     @cached_property
     def equations(self) -> ReducedSystem:
@@ -116,12 +120,12 @@ class ReducedVehicle:
             self.model,
             self.system,
             whole_space(self.effective_rank),
-            self.encoded,
-            self.lifted,
             self.effective_rank,
             self.offline,
             self.solver,
             self.tolerance,
+            self.encoded,
+            self.lifted,
         )
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -135,7 +139,7 @@ class ReducedVehicle:
         """Full states (samples, 2 n) of a run from a full state (2 n,)."""
         k = self.features.states
         features = self.lifted_features or self.features
-        columns = features.at(run.path[:, :k], inputs, self.parameters)
+        columns = feature_columns(features, run.path[:, :k], inputs, self.parameters)
         shapes = self.shape.reference + columns @ self.lifting
         if len(self.transient.rates):
             deviation = self.shape.of(start[None])[0] - self.shape.reference

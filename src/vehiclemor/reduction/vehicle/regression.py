@@ -4,19 +4,10 @@ import numpy as np
 
 
 def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
-    """Coefficients (terms,) or (terms, targets) of the fit of values on columns.
+    """Coefficients (terms, ...) of the fit of values (samples, ...) on columns (samples, terms).
 
-    Minimises the mean square error plus `weight` times the squares of the coefficients.
-
-    Parameters
-    ----------
-    columns
-        Features (samples, terms).
-    values
-        Targets (samples,) or (samples, targets).
-    weight
-        Of the coefficients' size (ridge regression: A. E. Hoerl, R. W. Kennard, Technometrics 12
-        (1970), 55-67).
+    Minimises the mean square error plus `weight` times the squares of the coefficients (ridge
+    regression: A. E. Hoerl, R. W. Kennard, Technometrics 12 (1970), 55-67).
     """
     normal = columns.T @ columns + weight * len(columns) * np.eye(columns.shape[1])
     return np.linalg.solve(normal, columns.T @ values)

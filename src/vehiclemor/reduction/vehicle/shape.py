@@ -9,14 +9,15 @@ heading and the place follow by quadratures:
 with r, U, V functions of shape and u.  Angles of the wheels' spin are left out for the same reason.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.trajectory import Trajectory
 
 STEP = 6e-6
 INPUT_STEP = 1e-5
@@ -149,3 +150,27 @@ def spin_angles(model: DynamicModel) -> np.ndarray:
     """Numbers of the coordinates that are spin angles: cyclic, and not of the place."""
     free = np.setdiff1d(np.arange(len(model.coordinates)), model.active)
     return np.setdiff1d(free, model.planar)
+
+
+class ShapeSamples(NamedTuple):
+    """Samples of all runs, one after the other.
+
+    Attributes
+    ----------
+    inputs, deviations
+        Inputs (samples, inputs), deviations of the shape from straight running (samples, n).
+    rates, motion
+        Rates of the shape (samples, n), and psi', U, V (samples, 3), by the full equations.
+    """
+
+    inputs: np.ndarray
+    deviations: np.ndarray
+    rates: np.ndarray
+    motion: np.ndarray
+
+
+def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSamples:
+    """Samples of training runs; one evaluation of the full equations for each."""
+    inputs = np.concatenate([run.inputs for run in runs])
+    shapes = np.concatenate([shape.of(run.states) for run in runs])
+    return ShapeSamples(inputs, shapes - shape.reference, *shape.motion(shapes, inputs))

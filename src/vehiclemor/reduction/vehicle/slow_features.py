@@ -5,8 +5,6 @@ roll angle, its rate and the steering; a vehicle that is its own mirror image ha
 lateral equations and even ones in the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -15,8 +13,7 @@ import numpy as np
 
 from vehiclemor.reduction.vehicle.features import Features, monomials
 from vehiclemor.reduction.vehicle.regression import largest
-from vehiclemor.reduction.vehicle.samples import ShapeSamples
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
@@ -53,7 +50,7 @@ class FeatureTable:
         lateral = [(self.odd_nonlinear, column) for column in range(k)]
         return [*lateral, (self.odd, k + 1), (self.odd, k + 3)]
 
-    def with_only(self, kept: Sequence[int]) -> FeatureTable:
+    def with_only(self, kept: Sequence[int]) -> "FeatureTable":
         """Some of the features, by their numbers in order."""
         odd = [i for i in kept if i in self.odd]
         even = [i for i in kept if i in self.even]
@@ -62,21 +59,12 @@ class FeatureTable:
         (_, lateral), (_, symmetric) = self.features.groups
         groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
         features = replace(self.features, terms=terms, groups=groups)
-        return FeatureTable(
-            features,
-            self.parameters,
-            list(numbers[: len(odd)]),
-            list(numbers[len(odd) :]),
-            self.linear_count,
-        )
+        first, rest = list(numbers[: len(odd)]), list(numbers[len(odd) :])
+        return FeatureTable(features, self.parameters, first, rest, self.linear_count)
 
 
 def feature_table(
-    shape: VehicleShape,
-    modes: SlowModes,
-    samples: ShapeSamples,
-    hull: float,
-    nonlinearity: str,
+    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, hull: float, nonlinearity: str
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     u = samples.inputs

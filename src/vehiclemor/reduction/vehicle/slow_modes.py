@@ -5,8 +5,6 @@ that hop of the wheels, spins and stabilised constraints leave no trace in z.  T
 of eigenvalue zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,14 +8,13 @@ Ordinary Differential Equations I (2nd ed., Springer 1993), section I.14); steps
 Levenberg and Marquardt.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
@@ -29,6 +28,8 @@ STRIDE = 5
 DIFFERENCE = 1e-6
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
+# (numbers of features, column) of the coefficients that may change.
+Free = Sequence[tuple[Sequence[int], int]]
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,8 @@ class Target:
 
     Attributes
     ----------
-    run
-        Maneuver and start.
-    times
-        Output times (samples,) in s.
-    inputs
-        Inputs (samples, inputs).
+    times, inputs
+        Output times (samples,) in s, and inputs (samples, inputs) then.
     states
         Reduced states (samples, states + 3): coordinates, heading, place.
     """
@@ -54,7 +51,7 @@ class Target:
 
 
 def targets(
-    reduced: ReducedVehicle, training: Sequence[TrainingRun], runs: Sequence[Trajectory]
+    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
 ) -> list[Target]:
     """Training runs in reduced states."""
     x, y, heading = reduced.model.planar
@@ -68,22 +65,9 @@ def targets(
 
 
 def improved(
-    reduced: ReducedVehicle,
-    goals: Sequence[Target],
-    free: Sequence[tuple[Sequence[int], int]],
-    sweeps: int,
+    reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int
 ) -> ReducedVehicle:
-    """The reduced vehicle after a number of damped Gauss-Newton steps.
-
-    Parameters
-    ----------
-    goals
-        Training runs in reduced states.
-    free
-        (numbers of features, column) of the coefficients that may change.
-    sweeps
-        Number of steps.
-    """
+    """The reduced vehicle after so many sweeps, damped Gauss-Newton steps."""
     paths, error = _compared(reduced, goals)
     damping = DAMPING
     for _ in range(sweeps):
@@ -108,17 +92,13 @@ def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
     return bool(np.isfinite(_compared(reduced, goals)[1]))
 
 
-def normal_matrix(
-    reduced: ReducedVehicle, goals: Sequence[Target], free: Sequence[tuple[Sequence[int], int]]
-) -> np.ndarray:
+def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
     """Normal matrix of the free coefficients, column by column; all runs must finish."""
     paths, _ = _compared(reduced, goals)
     return _normal_equations(reduced, goals, paths, free)[0]
 
 
-def _changed(
-    reduced: ReducedVehicle, free: Sequence[tuple[Sequence[int], int]], step: np.ndarray
-) -> ReducedVehicle:
+def _changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
     coefficients, first = reduced.coefficients.copy(), 0
     for terms, column in free:
         coefficients[list(terms), column] += step[first : first + len(terms)]
@@ -147,10 +127,7 @@ def _scale(goals: Sequence[Target]) -> np.ndarray:
 
 
 def _normal_equations(
-    reduced: ReducedVehicle,
-    goals: Sequence[Target],
-    paths: Sequence[np.ndarray],
-    free: Sequence[tuple[Sequence[int], int]],
+    reduced: ReducedVehicle, goals: Sequence[Target], paths: Sequence[np.ndarray], free: Free
 ) -> tuple[np.ndarray, np.ndarray]:
     scale = _scale(goals)
     kept = np.flatnonzero(scale)
@@ -166,15 +143,12 @@ def _normal_equations(
 
 
 def _sensitivities(
-    reduced: ReducedVehicle,
-    goal: Target,
-    path: np.ndarray,
-    free: Sequence[tuple[Sequence[int], int]],
+    reduced: ReducedVehicle, goal: Target, path: np.ndarray, free: Free
 ) -> np.ndarray:
     """Derivatives (samples / STRIDE, states + 3, free coefficients) of a reduced run."""
     k, c = reduced.features.states, reduced.coefficients
     z, heading = path[:, :k], path[:, k]
-    columns = reduced.features.at(z, goal.inputs, reduced.parameters)
+    columns = feature_columns(reduced.features, z, goal.inputs, reduced.parameters)
     values = columns @ c
     dim, samples = k + PLANAR, len(path)
     cosine, sine = np.cos(heading), np.sin(heading)
@@ -188,7 +162,9 @@ def _sensitivities(
         width = DIFFERENCE * max(1.0, float(np.abs(z[:, j]).max()))
         shifted = z.copy()
         shifted[:, j] += width
-        change = reduced.features.at(shifted, goal.inputs, reduced.parameters) @ c - values
+        change = (
+            feature_columns(reduced.features, shifted, goal.inputs, reduced.parameters) @ c - values
+        )
         jacobian[:, :, j] = np.einsum("nij,nj->ni", spread, change / width)
     forward, sideward = values[:, k + 1], values[:, k + 2]
     jacobian[:, k + 1, k] = -forward * sine - sideward * cosine

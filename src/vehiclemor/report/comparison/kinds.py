@@ -42,11 +42,9 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
 def comparison_text(what: str, rows: pd.DataFrame, folder: Path) -> str:
     """A comparison as text, with the costs of its models."""
     if what == "paper":
-        from vehiclemor.report.comparison.text import paper_text
-        from vehiclemor.report.costs import costs_text
+        from vehiclemor.report.comparison.paper import paper_text
 
-        costs = [costs_text(str(model), folder) for model in dict.fromkeys(rows["model"])]
-        return "\n\n".join([paper_text(rows), *costs])
+        return paper_text(rows, folder)
     if what == "predictive":
         from vehiclemor.report.predictive.text import predictive_text
 

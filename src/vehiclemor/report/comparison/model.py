@@ -1,9 +1,8 @@
 """One model, whatever it declares: errors of every method, costs, unseen inputs, paper's terms."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from vehiclemor.models.report import printed_outputs
 from vehiclemor.registry import component
@@ -15,9 +14,6 @@ from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rows import predictive_comparison
 from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.report.printing import Row, power, table_text, wrapped
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LEGEND = (
     "RMS errors in the nominal run, on which the methods are trained (replay is exact there), and "
@@ -36,8 +32,6 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
         `errors.study_tables`.  `cost`: as in `cost_table`.  The others are those of
         `predictive_comparison`.
     """
-    import pandas as pd
-
     studies = {"nominal": nominal(name, folder), "perturbed": perturbed(name, folder)}
     parts = [study_tables(name, [s], folder, jobs).assign(kind=k) for k, s in studies.items()]
     parts.append(cost_table(name, folder).assign(kind="cost"))

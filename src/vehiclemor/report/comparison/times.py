@@ -1,17 +1,12 @@
 """Published savings of time beside those of the timing cases."""
 
-from __future__ import annotations
-
-import math
-from typing import TYPE_CHECKING
+import pandas as pd
 
 from vehiclemor.models.report import TimingCase, timing_cases
 from vehiclemor.registry import component
-from vehiclemor.report.comparison.row import PRESETS, Row, verdict
+from vehiclemor.report.comparison.rows import PRESETS, Row, claim_row, number_row
+from vehiclemor.report.criteria.finding import Finding
 from vehiclemor.report.published import Claim, Number
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
@@ -25,19 +20,9 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
             saved = 1.0 - 1.0 / float(table.loc[case.id, "speed_up"])
             met = table.loc[case.id, "status"] == "ok" and saved >= number.value
             origin = f", {start}" if len(starts) > 1 else ""
-            rows.append(
-                Row(
-                    model=number.model,
-                    item=f"{number.item}, {PRESETS[case.preset]}{origin}",
-                    published=number.value,
-                    reproduced=saved,
-                    unit=number.unit,
-                    floor=math.nan,
-                    replay=1.0,
-                    verdict=verdict(met),
-                    reason=(_of_iteration if algebraic else _of_integration)(table, case.id),
-                )
-            )
+            words = f"{PRESETS[case.preset]}{origin}"
+            reason = (_of_iteration if algebraic else _of_integration)(table, case.id)
+            rows.append(number_row(number, words, saved, met, reason, replay=1.0))
     return rows
 
 
@@ -92,18 +77,10 @@ def slower_row(claim: Claim, costs: pd.DataFrame, few: int, many: int) -> Row:
     }
     row, full = table.loc[literal[many]], table.loc["baseline"]
     slower = float(row["us_per_run"]) / float(table.loc[literal[few], "us_per_run"])
-    return Row(
-        model=claim.model,
-        item=f"figure {claim.figure}: {claim.statement}, literal",
-        published=1.0,
-        reproduced=slower,
-        unit="1",
-        floor=math.nan,
-        replay=math.nan,
-        verdict=verdict(slower > 1.0 and float(row["speed_up"]) > 1.0),
-        reason=(
-            f"time with six states as a multiple of that with three; six states take "
-            f"{1.0 / float(row['speed_up']):.2f} times the time of Newton with fresh Jacobians "
-            f"({row['iterations']:.0f} iterations against {full['iterations']:.0f})"
-        ),
+    text = (
+        f"time with six states as a multiple of that with three; six states take "
+        f"{1.0 / float(row['speed_up']):.2f} times the time of Newton with fresh Jacobians "
+        f"({row['iterations']:.0f} iterations against {full['iterations']:.0f})"
     )
+    met = slower > 1.0 and float(row["speed_up"]) > 1.0
+    return claim_row(claim, "literal", Finding(slower, 1.0, met, text))

@@ -2,17 +2,12 @@
 
 from collections.abc import Callable
 
-from vehiclemor.report.criteria import (
-    double_wishbone,
-    high_fidelity_vehicle,
-    independent_suspension_vehicle,
-)
+from vehiclemor.report.criteria import double_wishbone, vehicles
 from vehiclemor.report.criteria.finding import Finding, Results
 
 CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
     **double_wishbone.CRITERIA,
-    **independent_suspension_vehicle.CRITERIA,
-    **high_fidelity_vehicle.CRITERIA,
+    **vehicles.CRITERIA,
 }
 # Claims about subspaces or the cost of integrating: replay has neither.
-WITHOUT_REPLAY = double_wishbone.WITHOUT_REPLAY | independent_suspension_vehicle.WITHOUT_REPLAY
+WITHOUT_REPLAY = double_wishbone.WITHOUT_REPLAY | vehicles.WITHOUT_REPLAY

@@ -1,7 +1,5 @@
 """The paper's claims on the suspension, figures 6 and 11 to 14, as criteria that can fail."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
@@ -47,10 +45,8 @@ def _agree(study: str, outputs: tuple[str, ...], bound: float) -> Criterion:
 def angle_diverges_at_end(results: Results, label: str) -> Finding:
     """Figure 11: the largest error of the angle is visible and lies at the end of the run."""
     deviation = abs(deviation_history(at_point(results["figure-11"], label, rank=3), ANGLE))
-    largest, moment = (
-        float(deviation.max()),
-        float(deviation["time"][int(np.argmax(deviation.values))]),
-    )
+    largest = float(deviation.max())
+    moment = float(deviation["time"][int(np.argmax(deviation.values))])
     end = END * float(deviation["time"][-1])
     before = float(deviation.sel(time=slice(0.0, end)).max())
     text = (
@@ -105,13 +101,13 @@ def basis_insensitive_to_amplitude(results: Results, label: str) -> Finding:
     return Finding(largest, SIMILAR_SUBSPACES, largest < SIMILAR_SUBSPACES, text)
 
 
-def _not_monotone(study: str, factor: str, results: Results, label: str) -> Finding:
+def _not_monotone(quantity: str, results: Results, label: str) -> Finding:
     """Figure 13: a larger perturbation of the input need not give a larger error."""
-    factors = results[study][factor].values
+    study = results[f"figure-13-{quantity}"]
+    factors = study[f"{quantity}_factor"].values
     falls: dict[str, float] = {}
-    for output in (DISPLACEMENT, ANGLE):
-        chosen = results[study].sel({"method": label, "output": output}).squeeze(drop=True)
-        errors = chosen["rms_error"].values
+    for output in BOTH:
+        errors = at_point(study, label, output=output)["rms_error"].values
         steps = [errors[factors >= 1.0], errors[factors <= 1.0][::-1]]
         falls[output] = max(
             float(np.max(1.0 - e[1:] / e[:-1])) for e in (_from_first(s) for s in steps)
@@ -172,14 +168,10 @@ def more_robust_to_amplitude(results: Results, label: str) -> Finding:
     smaller = []
     by_amplitude = results["figure-13-amplitude"]
     by_frequency = results["figure-13-frequency"]
-    for output in (DISPLACEMENT, ANGLE):
-        frequency = dict(
-            zip(
-                by_frequency["frequency_factor"].values,
-                relative_rms(by_frequency, label, output),
-                strict=True,
-            )
-        )
+    frequencies = by_frequency["frequency_factor"].values
+    for output in BOTH:
+        errors = relative_rms(by_frequency, label, output)
+        frequency = dict(zip(frequencies, errors, strict=True))
         amplitude = relative_rms(by_amplitude, label, output)
         for factor, error in zip(by_amplitude["amplitude_factor"].values, amplitude, strict=True):
             if factor != 1.0 and factor in frequency:
@@ -196,12 +188,8 @@ CRITERIA: dict[str, Criterion] = {
     "dw_fig11_shorter_period_reduces_deviation": shorter_period_reduces_deviation,
     "dw_fig12_no_divergence": _agree("figure-12", BOTH, VISIBLE),
     "dw_fig12_basis_insensitive_to_amplitude": basis_insensitive_to_amplitude,
-    "dw_fig13_not_monotone_frequency": partial(
-        _not_monotone, "figure-13-frequency", "frequency_factor"
-    ),
-    "dw_fig13_not_monotone_amplitude": partial(
-        _not_monotone, "figure-13-amplitude", "amplitude_factor"
-    ),
+    "dw_fig13_not_monotone_frequency": partial(_not_monotone, "frequency"),
+    "dw_fig13_not_monotone_amplitude": partial(_not_monotone, "amplitude"),
     "dw_fig13_angle_more_sensitive": angle_more_sensitive,
     "dw_fig14_three_states_fail": three_states_fail,
     "dw_fig14_six_states_follow": six_states_follow,

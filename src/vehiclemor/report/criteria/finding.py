@@ -5,15 +5,11 @@ signal's range.  Each criterion is evaluated for the default settings and for th
 ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
-    import xarray as xr
+import numpy as np
+import xarray as xr
 
 # Share of a signal's range from which on a deviation counts as visible in a figure: 2 mm on a curve
 # that is 40 mm high.
@@ -22,6 +18,8 @@ VISIBLE = 0.05
 INDISTINGUISHABLE = 0.01
 # A change of an error by less than this share is no change.
 SMALLEST_CHANGE = 0.01
+# Of a vehicle: of both the worse one counts.
+STARTS = ("equilibrium", "dropped")
 Results = Mapping[str, "xr.Dataset"]
 
 
@@ -67,7 +65,7 @@ def largest_deviation(point: xr.Dataset, output: str) -> float:
 
 def relative_rms(dataset: xr.Dataset, label: str, output: str) -> np.ndarray:
     """RMS errors of a method over a grid as shares of the full-order signal's range."""
-    chosen = dataset.sel({"method": label, "output": output}).squeeze(drop=True)
+    chosen = at_point(dataset, label, output=output)
     return (chosen["rms_error"] / chosen["signal_range"]).values
 
 
@@ -76,3 +74,32 @@ def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISI
     worst = max(largest_deviation(point, output) for output in outputs)
     text = "largest deviation, as a share of the signal's range"
     return Finding(worst, bound, worst < bound, text)
+
+
+def worst_of(values: dict[str, float]) -> tuple[float, str]:
+    """Largest value and where it is; missing if any is missing."""
+    missing = [name for name, value in values.items() if value != value]
+    if missing:
+        return float("nan"), missing[0]
+    name = max(values, key=lambda key: values[key])
+    return values[name], name
+
+
+def _failures(dataset: xr.Dataset) -> str:
+    states = {s: str(dataset["status"].sel(start=s).item()) for s in STARTS}
+    return ", ".join(f"{start}: {status}" for start, status in states.items() if status != "ok")
+
+
+def closely_followed(point: xr.Dataset, outputs: tuple[str, ...]) -> Finding:
+    """Whether the outputs can hardly be told from the full model's, from both starts."""
+    deviations = {
+        f"{output} from {start}": largest_deviation(point.sel(start=start), output)
+        for start in STARTS
+        for output in outputs
+    }
+    worst, where = worst_of(deviations)
+    failed = _failures(point)
+    text = f"largest deviation of {where}, as a share of the signal's range"
+    return Finding(
+        worst, VISIBLE, worst < VISIBLE and not failed, f"{text}; {failed}" if failed else text
+    )

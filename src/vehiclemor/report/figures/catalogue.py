@@ -1,11 +1,9 @@
 """Which figures there are: those of `data/figures`, and a set for every registered model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from matplotlib.figure import Figure
 from pydantic import Field
 
 from vehiclemor.models.report import printed_outputs
@@ -21,13 +19,9 @@ from vehiclemor.report.figures import (
     suspension_schematic,
     vehicle_schematic,
 )
+from vehiclemor.report.figures.lines import Results
 from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import FileSchema, read_toml
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from vehiclemor.report.figures.lines import Results
 
 # What `draw` of an entry names.
 DRAWINGS: dict[str, Callable[..., Figure]] = {
@@ -103,14 +97,9 @@ OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
 
 
 def find(name: str, results: Path) -> Entry:
-    """The figure of that name: from the file, or one that every model has.
+    """The figure of a name such as `6`, or `histories-<model>`, which every model has.
 
-    Parameters
-    ----------
-    name
-        Such as `6`, or `histories-<model>`.
-    results
-        Results folder; the studies of a model that declares none are written there.
+    Studies of a model that declares none are written to the results folder.
 
     Raises
     ------

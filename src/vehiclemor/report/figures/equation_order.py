@@ -1,18 +1,12 @@
 """Dependence of Galerkin projection of algebraic equations on how the equations are written."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.lines import Results, legend_above, letter
 from vehiclemor.report.labels import error_label
 from vehiclemor.report.published import rms_numbers
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 VARIANTS = {
     "pod_literal": ("Galerkin", "#D55E00", "o", -0.15),

@@ -1,12 +1,11 @@
 """Figure 8: the high-fidelity vehicle drawn from its own geometry, and its topological graph."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -14,7 +13,7 @@ from vehiclemor.models.high_fidelity import quantities as vehicle
 from vehiclemor.models.high_fidelity.definition import DEFINITION
 from vehiclemor.models.high_fidelity.equilibrium import wheel_places
 from vehiclemor.parameters import load_parameters
-from vehiclemor.report.figures import suspension_schematic
+from vehiclemor.report.figures.graph import SCHEMATICS, draw_graph
 from vehiclemor.report.figures.space import (
     SIZES,
     draw_box,
@@ -23,49 +22,16 @@ from vehiclemor.report.figures.space import (
     draw_spring_damper,
     draw_tire,
     frame_space,
+    space_and_graph,
     symbol,
 )
+from vehiclemor.report.figures.suspension_schematic import linkage
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-COLORS = {
-    **suspension_schematic.COLORS,
-    "road": "#777777",
-    "trailing arm": "#E69F00",
-    "front wheel": "#999999",
-    "rear wheel": "#999999",
-}
+SCHEMATIC = SCHEMATICS.high_fidelity
+COLORS = SCHEMATICS.suspension.colors | SCHEMATIC.colors
 SPRING_DAMPER, AXES = "#56B4E9", "#000000"
 # Only for the drawing: outline of the chassis and half the length of a rear pivot, in m.
 HALF_WIDTH, BOTTOM, TOP, OVERHANG, PIVOT = 0.38, 0.16, 0.68, 0.30, 0.07
-LEGEND = (
-    "upper arm",
-    "lower arm",
-    "wheel carrier",
-    "tie rod",
-    "rack",
-    "trailing arm",
-    "spring and damper",
-    "wheel",
-    "fixed to the chassis",
-    "CG of the chassis",
-)
-NODES = {
-    "rear wheel": (0.0, 1.0),
-    "trailing arm": (1.1, 1.0),
-    "chassis": (2.38, 1.0),
-    "road": (2.38, 2.15),
-    "upper arm": (4.95, 2.15),
-    "rack": (3.72, 1.0),
-    "tie rod": (5.0, 1.0),
-    "lower arm": (4.95, -0.15),
-    "wheel carrier": (7.02, 1.0),
-    "front wheel": (8.2, 1.0),
-}
-# Corners that the vehicle has twice: lower left end, width and height in the graph.
-CORNERS = {"front": (4.06, -0.6, 4.6, 3.2), "rear": (-0.5, 0.3, 2.05, 1.3)}
 # Beginnings of the names of the front suspension's points.
 _FRONT = ("upper_", "lower_", "tie_rod_", "wheel_", "front_spring_")
 Point = np.ndarray
@@ -75,20 +41,17 @@ def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, and the graph of its bodies and joints."""
     parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: parameters[name] for name in vehicle.PARAMETERS}
-    # Placed by hand: the style's automatic layout can't deal with axes in space.
-    figure = plt.figure(figsize=(6.7, 6.7))
-    figure.set_layout_engine("none")
     # As large as the figure: it is square, and cuts off what stands out of it.
-    space = figure.add_axes((0.0, 0.23, 1.0, 1.0), projection="3d")
+    figure, space, graph = space_and_graph(6.7, (0.0, 0.23, 1.0, 1.0), (0.01, 0.01, 0.98, 0.35))
     space.patch.set_visible(False)
-    graph = figure.add_axes((0.01, 0.01, 0.98, 0.35))
     height = rest_height(p)
     _draw_vehicle(space, p, height)
     _draw_sizes(space, p, height)
     frame_space(space, (-1.9, -0.9, 0.0), (1.9, 0.9, 0.7), view=(22.0, -40.0), zoom=0.87)
     handles, labels = space.get_legend_handles_labels()
-    drawn = [handles[labels.index(name)] for name in LEGEND]
-    figure.legend(drawn, LEGEND, loc="center", bbox_to_anchor=(0.5, 0.45), ncols=5, fontsize=7.5)
+    legend = SCHEMATIC.legend
+    drawn = [handles[labels.index(name)] for name in legend]
+    figure.legend(drawn, legend, loc="center", bbox_to_anchor=(0.5, 0.45), ncols=5, fontsize=7.5)
     _draw_graph(graph)
     figure.text(0.02, 0.97, "(a)")
     figure.text(0.02, 0.385, f"(b) {_count()}")
@@ -137,7 +100,7 @@ def _draw_vehicle(axis: Any, p: Mapping[str, Any], height: float) -> None:
 
 def _front_corner(axis: Any, at: Mapping[str, Point], named: bool) -> None:
     upper, lower, outer = (at[n] for n in ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer"))
-    for name, points in suspension_schematic.linkage(at).items():
+    for name, points in linkage(at).items():
         label = name if named else None
         axis.plot(*np.array(points).T, color=COLORS[name], linewidth=2.0, label=label)
         if len(points) > 2:
@@ -201,26 +164,13 @@ def _count() -> str:
 
 def _draw_graph(axis: Axes) -> None:
     """One front and one rear corner, as the others are the same."""
-    free = ", ".join(symbol(q.name) for q in vehicle.COORDINATES[:6])
-    names = [q.name.removesuffix("_FL") for q in vehicle.COORDINATES if q.name.endswith("_FL")]
-    zeta, eta, xi, upper, lower, alpha, beta, spin = (symbol(name) for name in names)
-    equations = len(vehicle.CONSTRAINTS) // 4
-    cut = f"S  closure\n{equations} equations"
-    edges = [
-        ("road", "chassis", f"free, 6 DOF\n{free}"),
-        ("chassis", "upper arm", f"R  {upper}"),
-        ("chassis", "lower arm", f"R  {lower}"),
-        ("chassis", "rack", "P  $s(t)$"),
-        ("rack", "tie rod", f"U\n{alpha}, {beta}"),
-        ("upper arm", "wheel carrier", f"S  {zeta}, {eta}, {xi}"),
-        ("lower arm", "wheel carrier", cut),
-        ("tie rod", "wheel carrier", cut),
-        ("wheel carrier", "front wheel", f"R  {spin}"),
-        ("chassis", "trailing arm", "R  $a$"),
-        ("trailing arm", "rear wheel", f"R  {spin}"),
-    ]
-    suspension_schematic.draw_graph(axis, NODES, edges, COLORS)
-    for end, (x, y, width, height) in CORNERS.items():
+    names = [quantity.name.removesuffix("_FL") for quantity in vehicle.COORDINATES]
+    symbols: dict[str, object] = {name: symbol(name) for name in names}
+    symbols["free"] = ", ".join(map(symbol, names[:6]))
+    symbols["equations"] = len(vehicle.CONSTRAINTS) // 4
+    edges = [(start, end, text.format(**symbols)) for start, end, text in SCHEMATIC.edges]
+    draw_graph(axis, SCHEMATIC.nodes, edges, COLORS)
+    for end, (x, y, width, height) in SCHEMATIC.corners.items():
         outline = {"edgecolor": SIZES, "facecolor": "none", "linestyle": ":", "linewidth": 0.9}
         axis.add_patch(Rectangle((x, y), width, height, **outline))
         place, text = (x + width - 0.08, y + 0.08), rf"{end} corner, $\times$ 2"

@@ -1,13 +1,16 @@
 """Time histories and paths of any model: full order beside reduced models, and their errors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures.lines import (
     CROSS,
     FULL,
@@ -15,16 +18,10 @@ from vehiclemor.report.figures.lines import (
     Style,
     legend_above,
     letter,
-    point,
     styles,
 )
 from vehiclemor.report.labels import axis_label, error_label
 from vehiclemor.report.published import rms_numbers
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PUBLISHED = "published RMS error"
 STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
@@ -46,79 +43,79 @@ class Panel(NamedTuple):
     lines: Sequence[Line]
 
 
-def figure_histories(
-    results: Results,
-    *,
-    outputs: Sequence[str],
-    methods: Mapping[str, str],
-    rows: Sequence[str] = ("history",),
-    place: Mapping[str, object] | None = None,
-    shown: float | None = None,
-    marks: Sequence[float] = (),
-    whole: bool = False,
-    limits: Sequence[float] | None = None,
-    height: float = 4.4,
-    columns: int = 4,
-) -> Figure:
-    """Rows of panels for each output, one column for each start.
+class Look(NamedTuple):
+    """How histories are drawn.
 
-    Parameters
+    Attributes
     ----------
-    methods
-        Label of a reduced model in the study -> text of the legend.
     rows
         What each output has a row of: `history`, `error` (over the time, beside the RMS error of
         the best approximation) or `largest error` (in each control period, beside the published).
     place
         Place in the study's grid.
-    shown
-        Time up to which the runs are shown, in s.
-    marks
-        Times of vertical lines, in s.
+    shown, marks
+        Time up to which the runs are shown, and times of vertical lines, in s.
     whole
         Draw lines in full, instead of up to where they leave the full-order signal's range.
     limits
         Of the axes of the largest errors.
-    height
-        Of the figure, in inches.
-    columns
-        Of the legend.
+    height, columns
+        Of the figure, in inches, and of the legend.
     """
+
+    rows: Sequence[str] = ("history",)
+    place: Mapping[str, object] = MappingProxyType({})
+    shown: float | None = None
+    marks: Sequence[float] = ()
+    whole: bool = False
+    limits: Sequence[float] | None = None
+    height: float = 4.4
+    columns: int = 4
+
+
+def figure_histories(
+    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str], **options: Any
+) -> Figure:
+    """Rows of panels for each output, one column for each start; `options` are those of `Look`.
+
+    `methods` are labels of reduced models in the study with their texts in the legend.
+    """
+    look = Look(**options)
     (dataset,) = results.values()
-    dataset = dataset.sel(dict(place or {}))
+    dataset = dataset.sel(dict(look.place))
     lines = _lines(dataset, methods)
     starts = [str(start) for start in dataset["start"].values]
-    shape = len(outputs) * len(rows), len(starts)
-    figure, axes = plt.subplots(*shape, sharex=True, squeeze=False, figsize=(6.7, height))
+    shape = len(outputs) * len(look.rows), len(starts)
+    figure, axes = plt.subplots(*shape, sharex=True, squeeze=False, figsize=(6.7, look.height))
     ended: dict[str, str] = {}
     contents = [
-        (output, content, start) for output in outputs for content in rows for start in starts
+        (output, content, start) for output in outputs for content in look.rows for start in starts
     ]
     for number, (axis, (output, content, start)) in enumerate(
         zip(axes.flat, contents, strict=True)
     ):
         panel = Panel(dataset.sel(start=start), output, lines)
         if content == "history":
-            ended |= _draw_history(axis, panel, whole)
+            ended |= _draw_history(axis, panel, look.whole)
         elif content == "error":
             _draw_errors(axis, panel)
         else:
-            ended |= _draw_largest_errors(axis, panel, limits)
-        for moment in marks:
+            ended |= _draw_largest_errors(axis, panel, look.limits)
+        for moment in look.marks:
             axis.axvline(moment, color="#999999", linewidth=0.8, linestyle=(0, (1, 3)))
         several = f" {STARTS.get(start, start)}" if len(starts) > 1 else ""
         axis.set_title(letter(number) + several)
     last = float(dataset["time"][-1])
     for axis in axes[-1]:
-        part = f", first {shown:g} s of {last:g} s" if shown else ""
+        part = f", first {look.shown:g} s of {last:g} s" if look.shown else ""
         axis.set_xlabel(f"time (s){part}")
-        axis.set_xlim(0.0, shown or last)
+        axis.set_xlim(0.0, look.shown or last)
     for text, color in ended.items():
         axes[0, 0].plot([], [], color=color, label=text, **CROSS)
-    if "history" in rows and "largest error" in rows:
+    if "history" in look.rows and "largest error" in look.rows:
         # The legend is that of the first panel.
         axes[0, 0].plot([], [], color="black", linestyle=":", label=PUBLISHED)
-    legend_above(figure, axes[0, 0], columns)
+    legend_above(figure, axes[0, 0], look.columns)
     return figure
 
 
@@ -130,7 +127,7 @@ def _lines(dataset: xr.Dataset, methods: Mapping[str, str]) -> list[Line]:
 def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
     """One output of the full and the reduced models; what the crosses mean -> their colour."""
     dataset, output, lines = panel
-    full = point(dataset, "full_order")["outputs"].sel(output=output)
+    full = at_point(dataset, "full_order")["outputs"].sel(output=output)
     axis.plot(full.time, full, label="full order", **FULL)
     axis.set_ylabel(axis_label(dataset, output))
     low, high = float(full.min()), float(full.max())
@@ -139,7 +136,7 @@ def _draw_history(axis: Axes, panel: Panel, whole: bool) -> dict[str, str]:
         axis.set_ylim(low - margin, high + margin)
     left: dict[str, str] = {}
     for method, text, style in lines:
-        history = point(dataset, method)["outputs"].sel(output=output)
+        history = at_point(dataset, method)["outputs"].sel(output=output)
         if whole:
             axis.plot(full.time, history, label=text, **style)
         elif _plot_until_it_leaves(axis, history, text, style):
@@ -170,10 +167,12 @@ def _draw_errors(axis: Axes, panel: Panel) -> None:
     """Errors over the time, and the RMS error of the best approximation by the first method."""
     dataset, output, lines = panel
     for method, text, style in lines:
-        run = point(dataset, method)
+        run = at_point(dataset, method)
         error = (run["outputs"] - run["reference_outputs"]).sel(output=output)
         axis.plot(run.time, error, label=text, **style)
-    floors = (point(dataset, line.method)["floor_rms_error"].sel(output=output) for line in lines)
+    floors = (
+        at_point(dataset, line.method)["floor_rms_error"].sel(output=output) for line in lines
+    )
     floor = next((float(value) for value in floors if np.isfinite(value)), None)
     if floor is not None:
         shade = {"color": "#BBBBBB", "alpha": 0.5, "label": "RMS of the best approximation"}
@@ -191,7 +190,7 @@ def _draw_largest_errors(
     period = published.control_period if published else None
     ended: dict[str, str] = {}
     for method, text, style in lines:
-        run = point(dataset, method)
+        run = at_point(dataset, method)
         error = abs(run["outputs"] - run["reference_outputs"]).sel(output=output)
         edges, largest = _largest(error, period or last / 50.0)
         axis.semilogy(edges, largest, label=text, drawstyle="steps-post", **style)
@@ -222,7 +221,7 @@ def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequenc
     figure, axes = plt.subplots(len(shown), 1)
     for number, (axis, furthest) in enumerate(zip(axes, shown, strict=True)):
         for method, text, style in _lines(dataset, {"full_order": "full order", **methods}):
-            path = point(dataset, method, start="equilibrium")["outputs"]
+            path = at_point(dataset, method, start="equilibrium")["outputs"]
             x, y = (path.sel(output=f"{way}_position") for way in ("longitudinal", "lateral"))
             axis.plot(x, y, label=text, **style)
         axis.set_xlim(0.0, furthest)
@@ -234,27 +233,21 @@ def figure_paths(results: Results, *, methods: Mapping[str, str], shown: Sequenc
 
 
 def figure_replayed_paths(
-    results: Results,
-    *,
-    methods: Mapping[str, str],
-    beside_replay: bool = False,
-    columns: int = 4,
+    results: Results, *, methods: Mapping[str, str], beside_replay: bool = False, columns: int = 4
 ) -> Figure:
     """Lateral position over the time without steering, bases from a lane change.
 
-    Parameters
-    ----------
-    beside_replay
-        Whether a second panel shows what sets the reduced models apart from replay.
+    With `beside_replay` a second panel shows what sets the reduced models apart from replay.
     """
     (dataset,) = results.values()
     panels, output = 2 if beside_replay else 1, "lateral_position"
     size = (6.7, 4.8 if beside_replay else 3.2)
     figure, axes = plt.subplots(panels, 1, sharex=True, squeeze=False, figsize=size)
     upper, lower = axes[0, 0], axes[-1, 0]
-    replay = point(dataset, "replay", start="equilibrium")["outputs"].sel(output=output)
+    runs = dataset["outputs"].sel(start="equilibrium", output=output).squeeze(drop=True)
+    replay = runs.sel({"method": "replay"})
     for method, text, style in _lines(dataset, methods):
-        run = point(dataset, method, start="equilibrium")["outputs"].sel(output=output)
+        run = runs.sel({"method": method})
         upper.plot(run.time, run, label=text, **style)
         if beside_replay and method not in ("full_order", "replay"):
             lower.plot(run.time, 1e3 * (run - replay), label=text, **style)

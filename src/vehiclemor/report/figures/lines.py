@@ -1,15 +1,12 @@
 """Lines, legends and selections that figures share: one style for each method."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 Results = Mapping[str, "xr.Dataset"]
 Style = dict[str, Any]
@@ -40,12 +37,6 @@ def styles(methods: Iterable[str]) -> dict[str, Style]:
     taken = {STYLES[method]["color"] for method in methods if method in STYLES}
     free = cycle([color for color in COLORS if color not in taken] or list(COLORS))
     return {m: STYLES.get(m) or {"color": next(free), "linestyle": "--"} for m in methods}
-
-
-def point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
-    """One method at one place of the grid."""
-    # A dictionary: `method` is also the name of an argument of `sel`.
-    return dataset.sel({"method": label, **place}).squeeze(drop=True)
 
 
 def letter(number: int) -> str:

@@ -1,22 +1,17 @@
 """Worst error on unseen inputs against online time: full order, baselines, reduced models."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.lines import COLORS, Results, Style
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.study.plans.protocol import FULL_ORDER
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "*", "X")
 GREYS = (("#000000", "-"), ("#777777", "-"), ("#AAAAAA", "-"), ("#444444", "--"))

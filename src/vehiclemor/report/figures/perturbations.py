@@ -1,23 +1,18 @@
 """Errors of any model over perturbations of its input: curves and maps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from vehiclemor.report.figures.lines import Results, Style, legend_above, letter, styles
 from vehiclemor.report.labels import error_label
 from vehiclemor.report.published import rms_numbers
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
@@ -56,11 +51,7 @@ def figure_error_curves(
 
 
 def figure_error_map(
-    results: Results,
-    *,
-    outputs: Sequence[str],
-    methods: Mapping[str, str],
-    values: bool = False,
+    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str], values: bool = False
 ) -> Figure:
     """RMS errors over frequency and amplitude perturbations, one column for each method.
 

@@ -1,16 +1,16 @@
 """Vehicles in space: what the drawings of both vehicles share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike
 
-from vehiclemor.report.figures.suspension_schematic import rim
-
+Rectangle = tuple[float, float, float, float]
 SIZES = "#555555"
 GREEK = ("alpha", "beta", "gamma", "zeta", "eta", "theta", "xi", "phi", "psi")
 CAPTIONS = {"fontsize": 7.5, "ha": "center", "va": "center"}
@@ -22,6 +22,14 @@ def symbol(name: str) -> str:
     head, _, tail = name.partition("_")
     head = f"\\{head}" if head in GREEK else head
     return f"${head}_{{{tail}}}$" if tail else f"${head}$"
+
+
+def space_and_graph(height: float, space: Rectangle, graph: Rectangle) -> tuple[Figure, Any, Axes]:
+    """Figure of a height in inches with axes in space and in the plane."""
+    # Placed by hand: the style's automatic layout can't deal with axes in space.
+    figure = plt.figure(figsize=(6.7, height))
+    figure.set_layout_engine("none")
+    return figure, figure.add_axes(space, projection="3d"), figure.add_axes(graph)
 
 
 def frame_space(
@@ -47,6 +55,15 @@ def draw_box(
     body.set_alpha(0.10)
     body.set_linewidth(edge)
     axis.add_collection3d(body)
+
+
+def rim(centre: np.ndarray, spin: np.ndarray, radius: float) -> np.ndarray:
+    """Points (n, 3) of a wheel's circle about its spin axis (3,), a unit vector."""
+    up = np.cross([1.0, 0.0, 0.0], spin)
+    up /= np.linalg.norm(up)
+    forward = np.cross(spin, up)
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]
+    return centre + radius * (np.cos(angle) * forward + np.sin(angle) * up)
 
 
 def draw_tire(axis: Any, centre: np.ndarray, spin: np.ndarray, radius: float, **style: Any) -> None:

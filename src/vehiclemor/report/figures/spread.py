@@ -1,27 +1,13 @@
 """Figure 14: twice the frequency, and what rounding makes of directions beyond the rank."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import matplotlib.pyplot as plt
 import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
 
-from vehiclemor.report.figures.lines import (
-    COLORS,
-    FULL,
-    LITERAL,
-    Results,
-    Style,
-    letter,
-    point,
-    styles,
-)
+from vehiclemor.report.criteria.finding import at_point
+from vehiclemor.report.figures.lines import COLORS, FULL, LITERAL, Results, Style, letter, styles
 from vehiclemor.report.labels import axis_label
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 OUTPUT = "second_euler_angle"
 CONTROL_PERIOD = 5.0
@@ -70,4 +56,4 @@ def figure_spread(results: Results) -> Figure:
 
 
 def _history(dataset: xr.Dataset, method: str, rank: int) -> xr.DataArray:
-    return point(dataset, method, rank=rank)["outputs"].sel(output=OUTPUT)
+    return at_point(dataset, method, rank=rank)["outputs"].sel(output=OUTPUT)

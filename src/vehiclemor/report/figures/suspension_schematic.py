@@ -1,63 +1,31 @@
 """Figure 5: the suspension drawn from the model in space, beside its topological graph."""
 
-from __future__ import annotations
+from collections.abc import Mapping
+from typing import Any
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
-
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from vehiclemor.report.figures.graph import SCHEMATICS, draw_graph
+from vehiclemor.report.figures.space import rim, space_and_graph
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-COLORS = {
-    "upper arm": "#0072B2",
-    "lower arm": "#D55E00",
-    "wheel carrier": "#000000",
-    "tie rod": "#009E73",
-    "rack": "#CC79A7",
-    "chassis": "#777777",
-}
+SCHEMATIC = SCHEMATICS.suspension
+COLORS = SCHEMATIC.colors
 WHEEL_RADIUS = 0.30  # m, for the outline only: the kinematic model has no wheel.
-# Node -> place; edge -> (nodes, joint, coordinates).
-NODES = {
-    "chassis": (0.0, 1.0),
-    "upper arm": (1.6, 2.0),
-    "lower arm": (1.6, 0.0),
-    "rack": (1.0, 1.0),
-    "tie rod": (1.95, 1.0),
-    "wheel carrier": (3.2, 1.0),
-}
-EDGES = (
-    ("chassis", "upper arm", r"R  $\theta_u$"),
-    ("chassis", "lower arm", r"R  $\theta_l$"),
-    ("chassis", "rack", r"P  $s$"),
-    ("rack", "tie rod", "U\n" + r"$\alpha,\beta$"),
-    ("upper arm", "wheel carrier", r"S  $\zeta,\eta,\xi$"),
-    ("lower arm", "wheel carrier", "S  closure"),
-    ("tie rod", "wheel carrier", "S\nclosure"),
-)
 
 
 def figure_suspension() -> Figure:
     """Mechanism at design, with its positions at +-0.1 m of travel, and the graph."""
     model = build("double_wishbone")
     assert isinstance(model, AlgebraicModel)
-    # Placed by hand: the style's automatic layout can't deal with axes in space.
-    figure = plt.figure(figsize=(6.7, 4.1))
-    figure.set_layout_engine("none")
-    space = figure.add_axes((0.0, 0.17, 0.5, 0.76), projection="3d")
-    graph = figure.add_axes((0.52, 0.14, 0.48, 0.76))
+    figure, space, graph = space_and_graph(4.1, (0.0, 0.17, 0.5, 0.76), (0.52, 0.14, 0.48, 0.76))
     for travel, alpha in ((-0.1, 0.25), (0.1, 0.25), (0.0, 1.0)):
         _draw(space, model, model.solve([travel, 0.0]), alpha)
     _axes_in_space(space)
-    draw_graph(graph, NODES, EDGES, COLORS)
+    draw_graph(graph, SCHEMATIC.nodes, SCHEMATIC.edges, COLORS)
     graph.set_xlim(-0.45, 3.65)
     graph.set_ylim(-0.35, 2.35)
     handles, labels = space.get_legend_handles_labels()
@@ -120,15 +88,6 @@ def _wheel(axis: Any, centre: np.ndarray, spin: np.ndarray, alpha: float) -> Non
     axis.plot(*rim(centre, spin, WHEEL_RADIUS).T, color="#999999", linewidth=1.0, alpha=alpha)
 
 
-def rim(centre: np.ndarray, spin: np.ndarray, radius: float) -> np.ndarray:
-    """Points (n, 3) of a wheel's circle about its spin axis (3,), a unit vector."""
-    up = np.cross([1.0, 0.0, 0.0], spin)
-    up /= np.linalg.norm(up)
-    forward = np.cross(spin, up)
-    angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]
-    return centre + radius * (np.cos(angle) * forward + np.sin(angle) * up)
-
-
 def _axes_in_space(axis: Any) -> None:
     axis.set_xlabel("x (m)", labelpad=0)
     axis.set_ylabel("y (m)", labelpad=0)
@@ -142,25 +101,3 @@ def _axes_in_space(axis: Any) -> None:
     axis.view_init(elev=14, azim=28)
     axis.tick_params(pad=0, labelsize=7)
     axis.locator_params(nbins=4)
-
-
-def draw_graph(
-    axis: Axes,
-    nodes: Mapping[str, tuple[float, float]],
-    edges: Sequence[tuple[str, str, str]],
-    colors: Mapping[str, str],
-) -> None:
-    """Topological graph: bodies in boxes, joints on the lines between them, closures dashed."""
-    axis.set_axis_off()
-    for start, end, text in edges:
-        (xa, ya), (xb, yb) = nodes[start], nodes[end]
-        closure = "closure" in text
-        style = "--" if closure else "-"
-        axis.plot([xa, xb], [ya, yb], style, color="#555555", linewidth=1.2, zorder=1)
-        place = {"ha": "center", "va": "center", "fontsize": 7.5, "zorder": 2}
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-        axis.text((xa + xb) / 2, (ya + yb) / 2, text, bbox=box, **place)
-    for name, (x, y) in nodes.items():
-        box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": colors[name]}
-        text = name.replace(" ", "\n")
-        axis.text(x, y, text, ha="center", va="center", fontsize=7.5, bbox=box, zorder=3)

@@ -1,17 +1,17 @@
 """Figure 1: the 14-DOF vehicle drawn from its own geometry, beside its topological graph."""
 
-from __future__ import annotations
+from typing import Any
 
-from typing import TYPE_CHECKING, Any
-
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from vehiclemor.models.independent_suspension import quantities as vehicle
 from vehiclemor.models.independent_suspension.definition import DEFINITION
 from vehiclemor.models.independent_suspension.equilibrium import derived
 from vehiclemor.models.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
+from vehiclemor.report.figures.graph import draw_graph
 from vehiclemor.report.figures.space import (
     CAPTIONS,
     SIZES,
@@ -21,13 +21,9 @@ from vehiclemor.report.figures.space import (
     draw_spring_damper,
     draw_tire,
     frame_space,
+    space_and_graph,
     symbol,
 )
-from vehiclemor.report.figures.suspension_schematic import draw_graph
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 COLORS = {"road": "#777777", "chassis": "#000000", "mass": "#D55E00", "wheel": "#0072B2"}
 SPRING, DAMPER, AXES = "#009E73", "#CC79A7", "#E69F00"
@@ -40,11 +36,8 @@ def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, in the chassis frame moved to the road, and the graph."""
     parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: float(parameters[name]) for name in vehicle.PARAMETERS}
-    # Placed by hand: the style's automatic layout can't deal with axes in space.
-    figure = plt.figure(figsize=(6.7, 4.1))
-    figure.set_layout_engine("none")
-    space = figure.add_axes((-0.02, 0.05, 0.68, 0.95), projection="3d")
-    graph = figure.add_axes((0.65, 0.10, 0.35, 0.83))
+    places = (-0.02, 0.05, 0.68, 0.95), (0.65, 0.10, 0.35, 0.83)
+    figure, space, graph = space_and_graph(4.1, *places)
     _draw_vehicle(space, p)
     _draw_sizes(space, p)
     frame_space(space, (-2.2, -1.3, 0.0), (2.4, 1.0, 1.2), view=(24.0, -50.0), zoom=1.2)

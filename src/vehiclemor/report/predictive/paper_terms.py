@@ -5,8 +5,6 @@ recording, not of a prediction.  Of all formulations, inner products, integrator
 fastest counts whose errors stay within the published ones from every start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,12 +1,11 @@
 """Predictive comparison: reduced models on inputs that they have not seen, beside full order."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
@@ -14,10 +13,6 @@ from vehiclemor.study.plans.choice import scores
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.run import run_studies
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 STUDY = "predictive"
 
@@ -34,8 +29,6 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
         or `missed`) and `reason`.  `paper`: POD at the paper's rank and control period, see
         `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
     """
-    import pandas as pd
-
     rows: list[Row] = []
     models: list[str] = []
     for dataset in run_studies(study, folder, jobs).values():

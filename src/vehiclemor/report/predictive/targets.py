@@ -1,14 +1,12 @@
 """What the winner of the predictive comparison must reach, and what it has reached."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import xarray as xr
+
+from vehiclemor.report.labels import unit_of
 from vehiclemor.study.plans.protocol_file import ProtocolFile, SpeedTarget, Straight
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Row = dict[str, Any]
 
@@ -42,14 +40,14 @@ def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row])
     return [name | row for row in rows]
 
 
-def _at_most(item: str, bound: float, measured: float, unit: str, reason: str) -> Row:
-    row = {"item": item, "bound": bound, "measured": measured, "unit": unit, "reason": reason}
-    return row | {"verdict": "met" if measured <= bound else "missed"}
-
-
 def _at_least(item: str, bound: float, measured: float, reason: str) -> Row:
     row = {"item": item, "bound": bound, "measured": measured, "unit": "1", "reason": reason}
     return row | {"verdict": "met" if measured >= bound else "missed"}
+
+
+def _at_most(item: str, bound: float, measured: float, unit: str, reason: str) -> Row:
+    row = _at_least(item, bound, measured, reason)
+    return row | {"unit": unit, "verdict": "met" if measured <= bound else "missed"}
 
 
 def _bound_row(dataset: xr.Dataset, protocol: ProtocolFile, winner: Row, output: str) -> Row:
@@ -59,7 +57,7 @@ def _bound_row(dataset: xr.Dataset, protocol: ProtocolFile, winner: Row, output:
         f"worst {word} error of {output}",
         bound.bound,
         winner[f"worst_{bound.measure}_{output}"],
-        _unit(dataset, output),
+        unit_of(dataset, output),
         f"test set; settings chosen on validation: {winner['settings']}",
     )
 
@@ -73,13 +71,9 @@ def _straight_row(dataset: xr.Dataset, straight: Straight, winner: Row) -> Row:
         f"largest {straight.output} without steering",
         straight.bound,
         measured,
-        _unit(dataset, straight.output),
+        unit_of(dataset, straight.output),
         f"first 10 s of {straight.maneuver}, {sum(here)} runs",
     )
-
-
-def _unit(dataset: xr.Dataset, output: str) -> str:
-    return str(dataset["output_unit"].sel(output=output).item())
 
 
 def _ratio_row(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:

@@ -1,9 +1,8 @@
 """The predictive comparison as text."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.paper_terms import paper_terms_text
@@ -11,9 +10,6 @@ from vehiclemor.report.predictive.targets import Row
 from vehiclemor.report.printing import Row as Printed
 from vehiclemor.report.printing import fixed, short, table_text
 from vehiclemor.study.plans.protocol import FULL_ORDER
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LEGEND = (
     "Score: largest error of a bounded output in any test scenario, as a multiple of its bound.",

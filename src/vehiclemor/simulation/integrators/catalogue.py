@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -47,6 +47,8 @@ class Integrator:
     ----------
     summary
         One line.
+    order
+        Power of the step size with which the error at the end of a run falls.
     control
         Its step-size control.
     modules
@@ -57,12 +59,15 @@ class Integrator:
         Makes what is stored of a frozen Jacobian (dim, dim) and the active states for every step
         size: (step sizes, rows, dim); none for a method with fresh Jacobians or without any.
     fused_modules
-        The same for systems with a kernel that takes whole steps.
+        Modules for systems with a kernel that takes whole steps.
     rows, squares, fused_squares
         Scratch space: vectors and matrices of the system's dimension.
+    block_operators
+        Makes operators of diagonal blocks alone, where a kernel that takes whole steps wants those.
     """
 
     summary: str
+    order: int
     control: StepControl
     modules: tuple[str, ...]
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
@@ -71,6 +76,7 @@ class Integrator:
     rows: int = 24
     squares: int = 0
     fused_squares: int = 0
+    block_operators: Callable[[np.ndarray, Sequence[Sequence[int]]], np.ndarray] | None = None
 
 
 def inverses(jacobian: np.ndarray, active: np.ndarray) -> np.ndarray:
@@ -89,14 +95,21 @@ def matrix_functions(jacobian: np.ndarray, active: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(tables.reshape(len(STEP_GRID), -1, tables.shape[-1]))
 
 
+def block_matrix_functions(jacobian: np.ndarray, blocks: Sequence[Sequence[int]]) -> np.ndarray:
+    """The same of diagonal blocks alone, numbers of the states by block."""
+    return exponential_functions.block_functions(jacobian, blocks, STEP_GRID)
+
+
 INTEGRATORS = {
     "dopri5": Integrator(
         "Dormand-Prince 5(4), explicit",
+        5,
         StepControl(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=False),
         ("dopri5",),
     ),
     "rodas4": Integrator(
         "Rosenbrock method of order 4, fresh Jacobians",
+        4,
         StepControl(1.0 / 4.0, 1.0 / 4.0),
         ("cubic", "dense_solves", "rodas4"),
         tableaus.rodas4(),
@@ -104,6 +117,7 @@ INTEGRATORS = {
     ),
     "ros34pw2": Integrator(
         "W-method of order 3, one Jacobian for all runs",
+        3,
         StepControl(1.0 / 3.0, 1.0 / 3.0),
         ("step_grid", "cubic", "ros34pw2"),
         tableaus.ros34pw2(),
@@ -113,6 +127,7 @@ INTEGRATORS = {
     ),
     "etdrk4": Integrator(
         "exponential method of order 4, with the same",
+        4,
         StepControl(
             0.175,
             0.25,
@@ -124,6 +139,7 @@ INTEGRATORS = {
         ),
         ("step_grid", "cubic", "etdrk4"),
         operators=matrix_functions,
+        block_operators=block_matrix_functions,
         fused_modules=("step_grid", "cubic", "etdrk4", "fused_etdrk4"),
         rows=32,
         fused_squares=7,

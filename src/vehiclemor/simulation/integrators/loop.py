@@ -38,7 +38,6 @@ from vehiclemor.simulation.integrators.structures import (
 )
 
 
-
 def integrate(
     start: Vector,
     equations: Equations,

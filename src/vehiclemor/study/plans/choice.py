@@ -55,13 +55,7 @@ class Row:
 
 
 def validation_of(dataset: xr.Dataset, bounds: Mapping[str, Bound], count: str) -> Validation:
-    """Validation result of a candidate from its stored file.
-
-    Parameters
-    ----------
-    count
-        Name of the count of evaluations, `Model.evaluations`.
-    """
+    """Validation result of a candidate from its stored file; `count` is `Model.evaluations`."""
     return Validation(
         float(np.mean(dataset["status"].values == "ok")),
         float(scores(dataset, bounds).max()),

@@ -1,7 +1,5 @@
 """Grids: every combination of a study file's values, each an experiment with one test scenario."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass

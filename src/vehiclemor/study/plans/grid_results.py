@@ -12,20 +12,10 @@ import numpy as np
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.provenance import attributes, versions
 from vehiclemor.study.store import cell_path, read_arrays, read_dataset
+from vehiclemor.study.variables import meaning_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-LONG_NAMES = {
-    "frequency_factor": "factor on the frequency of the input",
-    "amplitude_factor": "factor on the amplitude of the input",
-    "method": "label of the method in the study",
-    "rank": "requested number of reduced coordinates",
-    "start": "initial condition",
-    "control_period": "length of a control period",
-    "equation_seed": "seed of the order and signs of the equations; 0 is the natural order",
-    "rounding_seed": "seed of rounding noise on the snapshots; 0 is none",
-}
 
 # Dimensions of a cell's errors; each has the units of its labels beside it.
 QUANTITIES = ("output", "coordinate", "speed")
@@ -66,7 +56,7 @@ def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
     assert template is not None
     names = tuple(grid.dimensions)
     coordinates: dict[str, Any] = {
-        name: (name, values, {"long_name": LONG_NAMES.get(name, name.replace("_", " "))})
+        name: (name, values, {"long_name": meaning_of(name)})
         for name, values in grid.dimensions.items()
     }
     coordinates |= {str(name): variable for name, variable in template.coords.items()}

@@ -1,21 +1,18 @@
 """Protocols: training, validation and test scenarios of a model, and who competes on them."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
-from pathlib import Path
 
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
-from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.method_settings import Settings, complete_settings
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
+from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml
 
@@ -83,12 +80,7 @@ def load_protocol(protocol: str) -> Protocol:
     VehiclemorError
         If the file or anything that it names is wrong.
     """
-    if protocol.endswith(".toml"):
-        path = Path(protocol)
-    elif protocol in data_names("protocols"):
-        path = data_folder() / "protocols" / f"{protocol}.toml"
-    else:
-        raise unknown("protocol", protocol, data_names("protocols"))
+    path = named_file("protocol", "protocols", protocol)
     definition = read_toml(path, ProtocolFile)
     try:
         return _resolved(path.stem, definition)

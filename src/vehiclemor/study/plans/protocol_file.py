@@ -1,7 +1,5 @@
 """Schema of protocol files, `data/protocols/*.toml`, validated on loading."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field, model_validator
@@ -31,7 +29,7 @@ class Group(FileSchema):
     speed: list[float] = Field(default_factory=list)
 
     @model_validator(mode="after")
-    def _either(self) -> Group:
+    def _either(self) -> "Group":
         if self.points and (self.frequency or self.amplitude or self.speed):
             raise ValueError("give points or lists of factors, not both")
         if any(len(point) not in (2, 3) for point in self.points):

@@ -12,16 +12,14 @@ import numpy as np
 from vehiclemor.study.plans.choice import Row, Validation
 from vehiclemor.study.plans.protocol import Protocol
 from vehiclemor.study.provenance import attributes
+from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def protocol_dataset(
-    protocol: Protocol,
-    rows: Sequence[Row],
-    found: dict[str, list[xr.Dataset]],
-    timed: xr.Dataset,
+    protocol: Protocol, rows: Sequence[Row], found: dict[str, list[xr.Dataset]], timed: xr.Dataset
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `row`, `scenario` and `output`.
 
@@ -46,22 +44,15 @@ def protocol_dataset(
     dataset = dataset.assign_coords(row=labels)
     online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
     online[:, : timed.sizes["scenario"]] = timed["seconds"].values
-    per_row: dict[str, tuple[list[Any], dict[str, str]]] = {
-        "role": ([row.contestant.role for row in rows], {"long_name": "role in the protocol"}),
-        "method": ([row.contestant.method for row in rows], {"long_name": "method"}),
-        "settings": ([_settings(row) for row in rows], {"long_name": "chosen settings, JSON"}),
-        "validation": ([_validation(row) for row in rows], {"long_name": "all candidates, JSON"}),
-        "validation_score": (
-            [row.validation[row.candidate].score for row in rows],
-            {"units": "1", "long_name": "largest error in validation as a multiple of its bound"},
-        ),
-        "offline_seconds": (
-            [float(value) for value in timed["offline_seconds"]],
-            dict(timed["offline_seconds"].attrs),
-        ),
+    per_row: dict[str, list[Any]] = {
+        "role": [row.contestant.role for row in rows],
+        "method": [row.contestant.method for row in rows],
+        "settings": [_settings(row) for row in rows],
+        "validation": [_validation(row) for row in rows],
+        "validation_score": [row.validation[row.candidate].score for row in rows],
+        "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
-    for name, (values, described) in per_row.items():
-        dataset[name] = ("row", values, described)
+    dataset = dataset.assign(variables(per_row, "row"))
     dataset["seconds"] = (("row", "scenario"), online, dict(timed["seconds"].attrs))
     return dataset.assign_attrs(
         attributes(

@@ -79,10 +79,7 @@ def validate(
 
 
 def test(
-    model: Model,
-    rows: Sequence[Row],
-    sets: dict[str, tuple[Scenario, ...]],
-    workers: Workers,
+    model: Model, rows: Sequence[Row], sets: dict[str, tuple[Scenario, ...]], workers: Workers
 ) -> dict[str, list[xr.Dataset]]:
     """Results of the chosen candidates: set -> one dataset for each row."""
     experiments = [
@@ -101,10 +98,7 @@ def timed_rows(
 ) -> xr.Dataset:
     """Stored timing of the rows on the test set, measured first if missing or out of date.
 
-    Parameters
-    ----------
-    tested
-        Results of the rows by set; a run that has failed in the test set is not timed.
+    A run whose result in the test set is a failure is not timed.
     """
     experiments = {
         row.label: row.contestant.experiment(protocol.model, row.candidate, protocol.sets["test"])

@@ -107,19 +107,24 @@ def values(entry: list[int | float | str] | Span) -> list[int | float | str]:
     return list(entry)
 
 
-def study_path(study: str) -> Path:
-    """Path of a study: a name from the package's data, or a TOML file.
+def named_file(kind: str, folder: str, name: str) -> Path:
+    """Path of a TOML file, given by itself or by the name of one in a folder of the data.
 
     Raises
     ------
     InputError
         If it is neither.
     """
-    if study.endswith(".toml"):
-        return Path(study)
-    if study not in data_names("studies"):
-        raise unknown("study", study, data_names("studies"))
-    return data_folder() / "studies" / f"{study}.toml"
+    if name.endswith(".toml"):
+        return Path(name)
+    if name not in data_names(folder):
+        raise unknown(kind, name, data_names(folder))
+    return data_folder() / folder / f"{name}.toml"
+
+
+def study_path(study: str) -> Path:
+    """Path of a study: a name from the package's data, or a TOML file."""
+    return named_file("study", "studies", study)
 
 
 def load_studies(study: str) -> dict[str, StudyFile]:

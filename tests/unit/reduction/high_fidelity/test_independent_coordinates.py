@@ -6,24 +6,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vehiclemor.maneuvers import rack_lane_change
 from vehiclemor.models.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
 from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.steering_maneuvers import rack_lane_change
 
 INDEPENDENT = np.concatenate([np.array(PLACES), 26 + np.array(PLACES)])
 DERIVATIVE, FULL = 28, 52
 STRAIGHT = np.zeros(3)
 
 
-def caller(kernels, constants) -> Callable[[str, np.ndarray, np.ndarray, int], np.ndarray]:
-    work = np.zeros(kernels.WORK)
-
+def caller(made, constants) -> Callable[[str, np.ndarray, np.ndarray, int], np.ndarray]:
     def call(function, x, u, size):
         result = np.empty(size)
-        getattr(kernels, function)(np.array(x), np.array(u), constants, work, result)
+        made.kernels.call(function, np.array(x), np.array(u), constants, result)
         return result
 
     return call

@@ -8,17 +8,17 @@ import pytest
 import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import (
-    lane_change,
-    rack_lane_change,
-    rack_straight_ahead,
-    straight_ahead,
-)
 from vehiclemor.reduction.methods.balanced_truncation import balanced, lateral_system
 from vehiclemor.reduction.methods.linear_single_track import single_track
 from vehiclemor.reduction.methods.modal_truncation import truncated
 from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.steering_maneuvers import (
+    lane_change,
+    rack_lane_change,
+    rack_straight_ahead,
+    straight_ahead,
+)
 
 VEHICLES = {
     "independent_suspension_vehicle": (lane_change, straight_ahead),
@@ -26,7 +26,7 @@ VEHICLES = {
 }
 EVERY_MODE = {"modal_truncation": {"fastest": 1e4}, "balanced_truncation": {"rank": 10}}
 FOUR = {"modal_truncation": {"fastest": 45.0}, "balanced_truncation": {"rank": 4}}
-EXACT = {"solver": "explicit", "tolerance": 1e-9}
+EXACT = {"solver": "dopri5", "tolerance": 1e-9}
 
 
 @pytest.fixture(scope="module", params=VEHICLES)

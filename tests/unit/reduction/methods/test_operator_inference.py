@@ -7,11 +7,12 @@ from scipy.integrate import solve_ivp
 import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import lane_change, straight_ahead
 from vehiclemor.reduction.methods.operator_inference import operators, reflected
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.mirror import mirror, mirror_basis, term_parity
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.steering_maneuvers import lane_change, straight_ahead
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
@@ -34,7 +35,7 @@ def test_operators_of_a_known_quadratic_system_are_recovered():
         return np.sin(3.0 * np.atleast_1d(t))[:, None]
 
     def rate(t, z):
-        return (features.at(z[None], steering(t), none) @ true)[0]
+        return (feature_columns(features, z[None], steering(t), none) @ true)[0]
 
     z = np.vstack(
         [
@@ -43,7 +44,7 @@ def test_operators_of_a_known_quadratic_system_are_recovered():
         ]
     )
     u = np.tile(steering(times), (4, 1))
-    columns = features.at(z, u, none)
+    columns = feature_columns(features, z, u, none)
     found = operators(columns, columns @ true, 0.0)
     np.testing.assert_allclose(found, true, atol=1e-8)
     # Ridge regression shrinks.
@@ -82,8 +83,8 @@ def test_parity_of_terms_is_that_of_their_values():
     random, odd = np.random.default_rng(4), np.array([True, False, True])
     features = polynomial_features(3, 2, 2)
     z, u = random.standard_normal((1, 3)), random.standard_normal((1, 2))
-    values = features.at(z, u, np.zeros(0))
-    mirrored = features.at(np.where(odd, -z, z), -u, np.zeros(0))
+    values = feature_columns(features, z, u, np.zeros(0))
+    mirrored = feature_columns(features, np.where(odd, -z, z), -u, np.zeros(0))
     parity = term_parity(odd, 2, 2)
     np.testing.assert_allclose(mirrored, np.where(parity, -values, values))
 

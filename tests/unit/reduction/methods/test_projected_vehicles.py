@@ -8,11 +8,6 @@ from scipy.linalg import solve_continuous_lyapunov
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import (
-    lane_change,
-    rack_lane_change,
-    straight_ahead,
-)
 from vehiclemor.reduction.methods import (
     balanced_pod,
     fixed_basis,
@@ -25,7 +20,14 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.linearisation import reduced_jacobian
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.steering_maneuvers import rack_step_steer, step_steer
+from vehiclemor.simulation.system import Solver
+from vehiclemor.steering_maneuvers import (
+    lane_change,
+    rack_lane_change,
+    rack_step_steer,
+    step_steer,
+    straight_ahead,
+)
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 TIGHT = 1e-8
@@ -72,7 +74,7 @@ def test_softened_by_one_is_the_full_model(name):
     model = vm.model(name, {"initial_speed": 17.0, "tire_damping": 900.0})
     maneuver = step_steer if name == VEHICLES[0] else rack_step_steer
     run = fitted(softened_slip, model, factor=1.0).simulate(maneuver, "dropped")
-    full = model.simulate(maneuver, "dropped", solver="explicit", tolerance=1e-4)
+    full = model.simulate(maneuver, "dropped", solver="dopri5", tolerance=1e-4)
     np.testing.assert_array_equal(run.states, full.states)
     np.testing.assert_array_equal(run.outputs, full.outputs)
 
@@ -156,7 +158,7 @@ def test_equations_in_the_heading_frame_are_the_vehicle_s(detailed):
     reduced = fitted(quasi_steady_wheels, detailed)
     full = detailed.simulate(maneuver, times=times, tolerance=TIGHT)
     assert full.states[-1, 3] > 1.0
-    run = reduced.system.run(maneuver, detailed.start(), space, "explicit", TIGHT, times)
+    run = reduced.system.run(maneuver, detailed.start(), space, Solver("dopri5", TIGHT, times))
     turned = np.array([shape.of(row[None])[0] for row in full.states])
     np.testing.assert_allclose(run.path[:, shape.kept], turned, rtol=0, atol=1e-6)
     np.testing.assert_allclose(run.path[:, :4], full.states[:, :4], rtol=0, atol=1e-7)

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import lane_change, rack_lane_change, straight_ahead
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import polynomial_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -18,6 +18,8 @@ from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver
+from vehiclemor.steering_maneuvers import lane_change, rack_lane_change, straight_ahead
 
 LANE_CHANGES = {
     "independent_suspension_vehicle": lane_change,
@@ -103,10 +105,10 @@ def test_kernels_are_the_features_that_are_fitted(reduced: ReducedVehicle) -> No
     rng, k = np.random.default_rng(1), reduced.features.states
     y = rng.normal(size=(20, k + 3)) * reduced.error_scale / 3.0
     u = rng.normal(size=(20, 1)) * 0.03
-    system = reduced.system
-    found = np.empty_like(y)
-    system.loops.derivative_path(y, u, system.machine, found)
-    values = reduced.features.at(y[:, :k], u, reduced.parameters) @ reduced.coefficients
+    found = reduced.system.along("derivative", y, u, k + 3)
+    values = (
+        feature_columns(reduced.features, y[:, :k], u, reduced.parameters) @ reduced.coefficients
+    )
     cosine, sine = np.cos(y[:, k]), np.sin(y[:, k])
     forward, sideward = values[:, k + 1], values[:, k + 2]
     expected = values.copy()
@@ -119,8 +121,8 @@ def test_whole_steps_in_a_kernel_are_the_steps_of_the_loop(reduced: ReducedVehic
     system, start = reduced.system, reduced.model.start()
     y = reduced.encoded(start, np.zeros(1))
     runs = [
-        s.run(lane_change, y, whole_space(len(y)), "ros34pw2", 1e-2)
-        for s in (system, replace(system, stepped=False))
+        s.run(lane_change, y, whole_space(len(y)), Solver("ros34pw2", 1e-2))
+        for s in (system, replace(system, fused={}))
     ]
     assert runs[0].counts[1] == runs[1].counts[1] > 20
     np.testing.assert_allclose(runs[0].path, runs[1].path, rtol=1e-9, atol=1e-10)
@@ -136,9 +138,9 @@ def test_a_linear_system_is_solved_exactly_in_the_limit() -> None:
     features = polynomial_features(1, 1)
     c = np.zeros((3, 4))
     c[1, 0], c[2, 0], c[1, 1], c[0, 2] = -3.0, 2.0, 1.0, 10.0
-    system = features.system(np.zeros(0), c, np.ones(4), np.zeros(1))
+    system = feature_system(features, np.zeros(0), c, np.ones(4), np.zeros(1))
     held = replace(straight_ahead, signal=_held, duration=5.0, samples=51)
-    run = system.run(held, np.zeros(4), whole_space(4), "ros34pw2", 1e-8)
+    run = system.run(held, np.zeros(4), whole_space(4), Solver("ros34pw2", 1e-8))
     expected = 0.2 * (1.0 - np.exp(-3.0 * run.times))
     np.testing.assert_allclose(run.path[:, 0], expected, atol=1e-6)
     heading = 0.2 * run.times - 0.2 / 3.0 * (1.0 - np.exp(-3.0 * run.times))
@@ -187,7 +189,7 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(
     z = np.random.default_rng(2).normal(size=(50, k + 1)) * 1e3
     z[:, k] = 5.0
     assert reduced.lifted_features is not None
-    columns = reduced.lifted_features.at(z, np.zeros((50, 1)), reduced.parameters)
+    columns = feature_columns(reduced.lifted_features, z, np.zeros((50, 1)), reduced.parameters)
     # Cubic, quintic and even terms of arguments in [-1, 1].
     cubic = columns[:, 3 * (k + 1) : 3 * (k + 1) + 35]
     assert np.abs(cubic).max() <= 1.0 + 1e-9
@@ -195,7 +197,7 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(
 
 
 def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
-    reduced = replace(fitted(vehicle, refits=0, sweeps=0), solver="explicit", tolerance=1e-9)
+    reduced = replace(fitted(vehicle, refits=0, sweeps=0), solver="dopri5", tolerance=1e-9)
     run = TrainingRun(vehicle, lane_change, "equilibrium")
     goal = targets(reduced, [run], [run.at(lane_change.times)])[0]
     term, k = 16, reduced.features.states
@@ -215,7 +217,7 @@ def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
 
 
 def test_sweeps_bring_reduced_runs_nearer_to_the_training_runs(vehicle: Any) -> None:
-    rough = replace(fitted(vehicle, refits=0, sweeps=0), solver="explicit", tolerance=1e-7)
+    rough = replace(fitted(vehicle, refits=0, sweeps=0), solver="dopri5", tolerance=1e-7)
     runs = [TrainingRun(vehicle, lane_change.perturbed(1.0, a), "equilibrium") for a in (0.8, 1.2)]
     goals = targets(rough, runs, [run.at(run.maneuver.times) for run in runs])
     k = rough.features.states

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from vehiclemor.simulation.system_loops import COORDINATES, STATE
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import lane_change
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.training import training_runs
@@ -16,8 +14,10 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.steering_maneuvers import lane_change
 
 N = 14
+STATE, COORDINATES = "state", "coordinates"
 TIMES = np.linspace(0.0, 4.0, 41)
 # No dampers, no shear forces of the tires: nothing takes energy away.
 CONSERVATIVE = {"front_damping": 0.0, "rear_damping": 0.0, "PKX1": 0.0, "PKX2": 0.0, "PKY1": 0.0}
@@ -28,7 +28,7 @@ def model():
     return build("independent_suspension_vehicle")
 
 
-def whole_space(form, edges, mean=0.0, mixing=None):
+def in_windows(form, edges, mean=0.0, mixing=None):
     """The identity, or any regular matrix, as basis in every window."""
     size = N if form == COORDINATES else 2 * N
     basis = np.eye(size) if mixing is None else mixing
@@ -53,10 +53,10 @@ def test_the_whole_space_gives_the_full_model(model, form, start):
     generator = np.random.default_rng(3)
     size = N if form == COORDINATES else 2 * N
     mixing = np.eye(size) + 0.1 * generator.normal(size=(size, size))
-    spaces = whole_space(form, [0.0, 0.7, 2.0, 25.0], mean=0.3, mixing=mixing)
+    spaces = in_windows(form, [0.0, 0.7, 2.0, 25.0], mean=0.3, mixing=mixing)
     state = model.start(start)
-    full = model.integrate(lane_change, state, whole_space(N), "explicit", 1e-10, TIMES)
-    reduced = model.integrate(lane_change, state, spaces, "explicit", 1e-10, TIMES)
+    full = model.integrate(lane_change, state, whole_space(2 * N), "dopri5", 1e-10, TIMES)
+    reduced = model.integrate(lane_change, state, spaces, "dopri5", 1e-10, TIMES)
     assert reduced.status == "ok"
     np.testing.assert_allclose(reduced.states, full.states, rtol=1e-7, atol=1e-6)
 
@@ -71,9 +71,7 @@ def test_only_the_subspace_counts_not_its_basis(model):
         drops[k, :rank] = np.linalg.inv(mixing).T @ drops[k, :rank]
     mixed = ProjectionWindows(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
     state = model.start("dropped")
-    runs = [
-        model.integrate(lane_change, state, s, "explicit", 1e-10, TIMES) for s in (spaces, mixed)
-    ]
+    runs = [model.integrate(lane_change, state, s, "dopri5", 1e-10, TIMES) for s in (spaces, mixed)]
     np.testing.assert_allclose(runs[0].states, runs[1].states, rtol=0, atol=1e-7)
 
 
@@ -149,7 +147,7 @@ def test_weighted_basis_spans_what_pymor_finds(model):
 
 def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
-    whole = whole_space(STATE, [0.0, 25.0])
+    whole = in_windows(STATE, [0.0, 25.0])
     jacobian = linearisation.reduced_jacobian(model, whole, 0, model.start())
     expected = np.linalg.eigvals(linearisation.jacobian(model, model.start(), [0.0]))
     found = np.linalg.eigvals(jacobian)

@@ -1,0 +1,52 @@
+"""Labelled dataset of a trajectory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import STATUSES, Trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def trajectory_dataset(
+    model: Model, trajectory: Trajectory, further: dict[str, tuple] | None = None
+) -> xr.Dataset:
+    """Labelled dataset of a trajectory: histories, counts, seconds and status, with units.
+
+    Parameters
+    ----------
+    further
+        Name -> (dimensions, values, attributes) of variables to add.
+    """
+    import xarray as xr
+
+    variables: dict[str, tuple] = {}
+    coordinates: dict[str, tuple] = {
+        "time": ("time", trajectory.time, {"units": "s", "long_name": "time"})
+    }
+    for name in ("coordinates", "outputs", "inputs", "speeds"):
+        quantities, label = getattr(model.definition, name), name.removesuffix("s")
+        if not quantities:
+            continue
+        attributes = {"long_name": name, "units": f"see {label}_unit"}
+        variables[name] = (("time", label), getattr(trajectory, name), attributes)
+        for key, values, text in (
+            (label, [q.name for q in quantities], "name"),
+            (f"{label}_unit", [q.unit for q in quantities], "SI unit"),
+        ):
+            coordinates[key] = label, values, {"long_name": f"{text} of the {label}"}
+    for name, long_name in model.counts.items():
+        attributes = {"units": "1", "long_name": long_name}
+        variables[name] = ((), trajectory.counts.get(name, 0), attributes)
+    seconds = {"units": "s", "long_name": "time spent in the compiled loop"}
+    variables["seconds"] = ((), trajectory.seconds, seconds)
+    for name, long_name in (
+        ("status", f"one of {', '.join(STATUSES)}"),
+        ("message", "why the status is not ok"),
+        ("remark", "what else there is to know"),
+    ):
+        variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
+    return xr.Dataset(variables | (further or {}), coordinates)

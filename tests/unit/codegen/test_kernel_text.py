@@ -1,0 +1,221 @@
+"""Generated sources compute what the expressions say, in exactly the counted operations."""
+
+import math
+from typing import ClassVar
+
+import mpmath as mp
+import numpy as np
+import pytest
+import sympy as sp
+
+from tests.oracles.kinematics import precise_jacobian, precise_residual
+from tests.unit.programs import precise, run
+from vehiclemor.codegen.kernel_text import (
+    OPERATIONS,
+    kernel_source,
+    operation_counts,
+    reference_source,
+    work_size,
+)
+from vehiclemor.models.double_wishbone.definition import DEFINITION
+from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.symbolic.program import Program, assemble
+from vehiclemor.symbolic.tape import Tape
+
+x, y, p = sp.symbols("x y p", real=True)
+AT = {x: 1.7, y: 2.3, p: 0.6}
+
+
+@pytest.fixture(scope="module")
+def program() -> Program:
+    """The double wishbone's."""
+    return DEFINITION.derive().program
+
+
+def program_of(expression: sp.Expr) -> Program:
+    # The second result gives the program a constant.
+    return assemble(Tape(), {"q": [x, y]}, [p], {"f": ([expression, p], (2,))})
+
+
+@pytest.mark.parametrize(
+    "expression",
+    [
+        y / x,
+        -y / (x + y),
+        y / sp.sqrt(x),
+        1 / x**2,
+        (x * y) ** -2,
+        -(x**2) + y,
+        x**3 - x**4 * y,
+        x**7,
+        x ** sp.Rational(3, 2),
+        sp.Rational(1, 3) * x - sp.Rational(1, 2) * y,
+        sp.Float(0.12345678901234567) * x,
+        sp.pi * x - 3 * y,
+        sp.atan2(-x, y) + sp.asin(x / 7),
+        sp.exp(-x) * y,
+        y / x**2,
+        -3 * x / (x + y) ** 2,
+        x**2 / y**3,
+    ],
+    ids=str,
+)
+def test_printed_expression_keeps_its_value(expression: sp.Expr) -> None:
+    found = run(program_of(expression), "f", AT)[0]
+    assert found == pytest.approx(precise([expression], AT)[0], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (x * y + x, {"add": 1, "multiply": 1}),
+        (x - y, {"add": 1}),
+        (-x * y, {"negate": 1, "multiply": 1}),
+        (x**2, {"multiply": 1}),
+        (x**4, {"multiply": 3}),
+        (x**5, {"power": 1}),
+        (x / y, {"divide": 1}),
+        (1 / x**2, {"multiply": 1, "divide": 1}),
+        (1 / sp.sqrt(x), {"sqrt": 1, "divide": 1}),
+        (sp.sqrt(x * y), {"sqrt": 1, "multiply": 1}),
+        (sp.sin(x) * sp.cos(x) + sp.atan2(x, y), {"trigonometric": 3, "multiply": 1, "add": 1}),
+        (sp.Float(2.5) * x - 1, {"multiply": 1, "add": 1}),
+    ],
+    ids=str,
+)
+def test_operation_counts_of_expressions_counted_by_hand(
+    expression: sp.Expr, expected: dict[str, int]
+) -> None:
+    counts = operation_counts(reference_source(program_of(expression)))["f"]
+    assert counts == dict.fromkeys(OPERATIONS, 0) | expected | {"total": sum(expected.values())}
+
+
+class Counted:
+    """A number that counts the operations done with it."""
+
+    tally: ClassVar[dict[str, int]] = {}
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+    @classmethod
+    def count(cls, kind: str, value: float) -> "Counted":
+        cls.tally[kind] = cls.tally.get(kind, 0) + 1
+        return cls(value)
+
+    def __add__(self, other: object) -> "Counted":
+        return self.count("add", self.value + getattr(other, "value", other))
+
+    def __sub__(self, other: object) -> "Counted":
+        return self.count("add", self.value - getattr(other, "value", other))
+
+    def __rsub__(self, other: float) -> "Counted":
+        return self.count("add", other - self.value)
+
+    def __mul__(self, other: object) -> "Counted":
+        return self.count("multiply", self.value * getattr(other, "value", other))
+
+    def __truediv__(self, other: "Counted") -> "Counted":
+        return self.count("divide", self.value / other.value)
+
+    def __rtruediv__(self, other: float) -> "Counted":
+        return self.count("divide", other / self.value)
+
+    def __neg__(self) -> "Counted":
+        return self.count("negate", -self.value)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+class CountingMath:
+    """Stands for the module `math`."""
+
+    def __getattr__(self, name: str):
+        kind = "sqrt" if name == "sqrt" else "trigonometric"
+        return lambda *a: Counted.count(kind, getattr(math, name)(*(v.value for v in a)))
+
+
+@pytest.mark.parametrize(
+    "name", ["constants", "residual", "residual_jacobian", "newton_step", "outputs"]
+)
+def test_operation_counts_of_the_model_are_those_of_a_run(
+    model: AlgebraicModel, program: Program, name: str
+) -> None:
+    namespace: dict = {}
+    exec(reference_source(program), namespace)  # noqa: S102 - our own source
+    namespace["math"] = CountingMath()
+    constants, parameters = (
+        [Counted(v) for v in values] for values in (model.constants, model.parameters.flat())
+    )
+    q, u = [Counted(v) for v in model.design + 0.1], [Counted(0.05), Counted(0.01)]
+    arguments = (parameters,) if name == "constants" else (q, u, constants)
+    Counted.tally = {}
+    namespace[name](*arguments, None, {})
+    counts = model.operation_counts[name]
+    assert {kind: n for kind, n in counts.items() if n and kind != "total"} == Counted.tally
+    assert counts["total"] == sum(Counted.tally.values())
+
+
+def test_each_angle_of_the_model_is_evaluated_once(model: AlgebraicModel) -> None:
+    for name in ("residual", "residual_jacobian", "newton_step"):
+        assert model.operation_counts[name]["trigonometric"] == 2 * 7
+    # The eighth pivot is the rack's, which is 1.
+    assert model.operation_counts["newton_step"]["divide"] == 7
+    assert model.operation_counts["residual_jacobian"]["divide"] == 0
+
+
+def test_kernels_equal_the_specified_residual(
+    model: AlgebraicModel, program: Program, points: dict, rng: np.random.Generator
+) -> None:
+    names = program.arguments
+    parameters = dict(zip(program.parameters, model.parameters.flat(), strict=True))
+    for trial in range(20):
+        q, u = rng.uniform(-1.5, 1.5, 8), rng.uniform(-0.3, 0.3, 2)
+        with mp.workdps(30):
+            exact = precise_residual(points, [mp.mpf(v) for v in q], [mp.mpf(v) for v in u])
+            exact = np.array([float(v) for v in exact])
+        np.testing.assert_allclose(model.residual(q, u), exact, rtol=0, atol=2e-15)
+        if trial < 2:
+            values = dict(zip([*names["q"], *names["u"]], [*q, *u], strict=True)) | parameters
+            reference = run(program, "residual", values)
+            np.testing.assert_allclose(reference, exact, rtol=0, atol=2e-15)
+
+
+def test_kernels_equal_the_derivatives_of_the_specified_residual(
+    model: AlgebraicModel, points: dict, rng: np.random.Generator
+) -> None:
+    for _ in range(4):
+        q, u = rng.uniform(-1.5, 1.5, 8), rng.uniform(-0.3, 0.3, 2)
+        exact = np.array([[float(v) for v in row] for row in precise_jacobian(points, q, u)])
+        np.testing.assert_allclose(model.jacobian(q, u), exact, rtol=0, atol=2e-15)
+
+
+def test_tangent_kernels_are_the_products_of_the_jacobian(
+    model: AlgebraicModel, rng: np.random.Generator
+) -> None:
+    q, u = rng.uniform(-1.0, 1.0, 8), rng.uniform(-0.1, 0.1, 2)
+    kernels = model.equations.kernels
+    parts = np.full(kernels.sources["tangent_parts"].sizes[-1], np.nan)
+    kernels.call("tangent_parts", q, u, model.constants, parts)
+    np.testing.assert_allclose(parts[-8:], model.residual(q, u), atol=1e-15)
+    for column in rng.standard_normal((5, 8)):
+        result = np.full(8, np.nan)
+        kernels.call("tangent", parts, column, result)
+        np.testing.assert_allclose(result, model.jacobian(q, u) @ column, atol=1e-14)
+    # What is always the same is not evaluated: fewer entries than the matrix has.
+    assert len(parts) < 8 + np.count_nonzero(model.jacobian(q, u))
+
+
+def test_angle_without_a_name_is_refused() -> None:
+    with pytest.raises(ValueError, match="name the argument on the tape first"):
+        kernel_source(program_of(sp.sin(x + y)))
+
+
+@pytest.mark.parametrize(("angles", "size"), [(0, 24), (1, 24), (8, 24), (9, 48), (17, 72)])
+def test_scratch_space_holds_every_batch_of_angles(angles: int, size: int) -> None:
+    symbols = sp.symbols(f"a0:{max(angles, 1)}", real=True)
+    total = sp.Add(*[sp.sin(s) for s in symbols[:angles]]) + symbols[0] + p
+    program = assemble(Tape(), {"q": list(symbols)}, [p], {"f": ([total], (1,))})
+    assert work_size(program) == size
+    used = [int(part.split("]")[0]) for part in kernel_source(program).split("work[")[1:]]
+    assert max(used, default=0) < size

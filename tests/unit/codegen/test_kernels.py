@@ -1,0 +1,114 @@
+"""Kernels are compiled one by one when they are first used, and never taken for another's."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from vehiclemor.codegen import kernels as module
+from vehiclemor.codegen import object_cache
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
+
+TEXT = """
+def double(_x, _work, _result):
+    _result[0] = 2.0 * _x[0]
+
+
+def product(_x, _u, _constants, _work, _result):
+    _result[0, 0] = _x[0] * _u[1]
+    _result[0, 1] = _constants[3]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "kernels"
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name.rpartition("-")[0] for path in folder.glob("*"))
+
+
+def loaded(source) -> int:
+    """As in a process of its own."""
+    return module._machine.__wrapped__(source)[0]
+
+
+def test_a_kernel_knows_what_it_wants_of_its_arrays():
+    source = kernel_sources(TEXT)["product"]
+    assert source.arguments == ("_x", "_u", "_constants", "_result")
+    assert source.sizes == (1, 2, 4, 2)
+    assert source.dimensions == 2
+
+
+def test_a_kernel_that_is_not_used_is_not_compiled(folder):
+    kernels = Kernels(kernel_sources(TEXT.replace("2.0", "7.0")))
+    assert "product" in kernels
+    assert names(folder) == []
+    result = np.empty(1)
+    kernels.call("double", np.array([1.5]), result)
+    assert result == [10.5]
+    assert names(folder) == ["double"]
+
+
+def test_what_is_missing_has_no_address():
+    kernels = Kernels(kernel_sources(TEXT))
+    assert "triple" not in kernels
+    assert kernels.address("triple") == 0
+
+
+def test_another_text_compiler_or_processor_is_another_file(folder, monkeypatch):
+    source = kernel_sources(TEXT)["double"]
+    other = kernel_sources(TEXT.replace("2.0", "3.0"))["double"]
+    loaded(source)
+    loaded(source)
+    assert len(names(folder)) == 1
+    loaded(other)
+    assert len(names(folder)) == 2
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "source_digest", lambda *_: "another generator")
+        loaded(source)
+    assert len(names(folder)) == 3
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "compiler_identity", lambda: "another compiler")
+        loaded(source)
+    assert names(folder) == ["double"] * 4
+    loaded(source)
+    assert len(names(folder)) == 4
+
+
+def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
+    identity = object_cache.compiler_identity.__wrapped__
+    before = identity()
+    for package in object_cache.COMPILER_PACKAGES:
+        with monkeypatch.context() as patch:
+            real = object_cache.version
+            patch.setattr(
+                object_cache, "version", lambda n, p=package, r=real: "0.0.1" if n == p else r(n)
+            )
+            assert identity() != before
+    import llvmlite.binding as llvm
+
+    features = SimpleNamespace(flatten=lambda: "-avx2")
+    for function, value in (("get_host_cpu_name", "z80"), ("get_host_cpu_features", features)):
+        with monkeypatch.context() as patch:
+            patch.setattr(llvm, function, lambda value=value: value)
+            assert identity() != before
+    assert identity() == before
+
+
+def test_the_hash_of_a_model_follows_text_and_compiler(monkeypatch):
+    digest = object_cache.kernel_hash("x = 1\n")
+    assert digest == object_cache.kernel_hash("x = 1\n")
+    assert digest != object_cache.kernel_hash("x = 2\n")
+    monkeypatch.setattr(object_cache, "compiler_identity", lambda: "another")
+    assert digest != object_cache.kernel_hash("x = 1\n")
+
+
+def test_machine_code_has_only_the_functions_that_were_written():
+    _, _, code = module._machine.__wrapped__(kernel_sources(TEXT)["double"])
+    assert code.address("double")
+    with pytest.raises(ImportError, match="no function triple"):
+        code.address("triple")

@@ -1,0 +1,222 @@
+"""Loops: ordinary functions with declared arguments, compiled together and called by address."""
+
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba.core.errors import NumbaError
+
+from vehiclemor.codegen import loop_types
+from vehiclemor.codegen import loops as module
+from vehiclemor.codegen.compiler import compiled_loops
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.loop_intrinsics import inlined_kernel
+from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
+from vehiclemor.codegen.loops import Loop, ready
+from vehiclemor.codegen.machine_code import MachineCode
+
+
+class Pair(NamedTuple):
+    """A bundle inside of a bundle."""
+
+    weights: Vector
+    share: Float
+
+
+class Bundle(NamedTuple):
+    """Arguments of a loop."""
+
+    rows: Matrix
+    pair: Pair
+    places: IntVector
+
+
+ENTRY = """
+def entry(bundle: Bundle, factor: Float, shift: Int, result: Vector) -> Int:
+    for i in range(len(result)):
+        result[i] = shift
+        for j in range(bundle.rows.shape[1]):
+            result[i] += bundle.pair.share * bundle.rows[i, j] * bundle.pair.weights[j]
+        result[i] = changed(result[i], factor)
+    return bundle.places[1]
+
+
+def changed(value, factor):
+    return value * factor
+"""
+
+
+def module_of(text: str, name: str = "made_up_loops") -> ModuleType:
+    made = ModuleType(name)
+    types = (Float, Int, IntVector, Matrix, Vector, Bundle)
+    names = ("Float", "Int", "IntVector", "Matrix", "Vector", "Bundle")
+    vars(made).update(zip(names, types, strict=True))
+    for helper in ("vector", "matrix", "call_kernel"):
+        setattr(made, helper, getattr(loop_types, helper))
+    exec(text, vars(made))  # noqa: S102 - the text of a test
+    return made
+
+
+def compiled(*texts: str, name: str = "entry", **given) -> Loop:
+    modules = [module_of(text, f"made_up_{k}") for k, text in enumerate(texts)]
+    code = MachineCode(compiled_loops(modules, [name], given))
+    function = next(vars(m)[name] for m in modules if name in vars(m))
+    return Loop(name, declared_arguments(function), code)
+
+
+@pytest.fixture(scope="module")
+def loop() -> Loop:
+    return compiled(ENTRY)
+
+
+@pytest.fixture
+def bundle(rng) -> Bundle:
+    return Bundle(rng.normal(size=(3, 4)), Pair(rng.normal(size=4), 0.3), np.array([5, -7]))
+
+
+def test_a_loop_computes_what_its_text_says(loop, bundle):
+    plain = module_of(ENTRY).entry
+    for given in (bundle, ready(bundle)):
+        found, expected = np.empty(3), np.empty(3)
+        assert loop(given, 2.5, -3, found) == plain(bundle, 2.5, -3, expected) == -7
+        np.testing.assert_allclose(found, expected, rtol=1e-14)
+
+
+def test_prepared_arguments_serve_many_runs(loop, bundle):
+    result = np.empty(3)
+    run = loop.prepared(bundle, 1.0, 0, result)
+    run()
+    first = result.copy()
+    bundle.rows[:] *= 2.0
+    run()
+    np.testing.assert_allclose(result, 2.0 * first, rtol=1e-14)
+
+
+def test_a_later_module_takes_the_place_of_an_earlier_one(bundle):
+    other = compiled(ENTRY, "def changed(value, factor):\n    return factor + 0.0 * value\n")
+    result = np.empty(3)
+    other(bundle, 2.5, 0, result)
+    np.testing.assert_array_equal(result, 2.5)
+
+
+def test_arrays_of_another_kind_are_refused(loop, bundle):
+    fine = np.zeros(3)
+    for wrong in (np.zeros(6)[::2], np.zeros(3, dtype=int), np.zeros((3, 1)), [0.0] * 3):
+        with pytest.raises(TypeError, match=r"entry: result must be a C-contiguous array d\[1\]"):
+            loop(bundle, 1.0, 0, wrong)
+    transposed = bundle._replace(rows=np.asfortranarray(bundle.rows))
+    with pytest.raises(TypeError, match=r"entry: bundle\.rows must be"):
+        loop(transposed, 1.0, 0, fine)
+    inner = bundle._replace(pair=bundle.pair._replace(weights=np.zeros(4, np.float32)))
+    with pytest.raises(TypeError, match=r"entry: bundle\.pair\.weights must be"):
+        loop(inner, 1.0, 0, fine)
+    with pytest.raises(TypeError, match=r"Bundle: \.places must be"):
+        ready(bundle._replace(places=np.zeros(2)))
+    with pytest.raises(ValueError, match="zip"):
+        loop(bundle, 1.0, 0)
+
+
+MAKING = """
+import numpy as np
+
+def entry(result: Vector) -> Int:
+    made = {}
+    made[0] = 7.0
+    result[1] = made[0]
+    return 0
+"""
+
+
+@pytest.mark.parametrize("made", ["np.zeros(3)", "np.empty(3)", "result.copy()", "[0.0, 1.0]"])
+def test_a_loop_that_makes_arrays_is_refused(made):
+    """Nothing counts references: who makes an array would never free it."""
+    with pytest.raises((NumbaError, RuntimeError)):
+        compiled(MAKING.format(made))
+    result = np.zeros(2)
+    compiled(MAKING.format("result"))(result)
+    np.testing.assert_array_equal(result, 7.0)
+
+
+VIEWS = """
+def entry(buffer: Vector, result: Vector) -> Int:
+    part, block = vector(buffer, 2, 3), matrix(buffer, 5, 2, 3)
+    for i in range(len(part)):
+        result[i] = part[i] + 10.0 * block[0, i] + 100.0 * block[1, i]
+    block[1, 2] = -1.0
+    return block.shape[0]
+"""
+
+
+def test_parts_of_a_buffer_are_the_buffer_itself():
+    buffer, result = np.arange(12.0), np.empty(3)
+    assert compiled(VIEWS)(buffer, result) == 2
+    np.testing.assert_array_equal(result, [852.0, 963.0, 1074.0])
+    assert buffer[10] == -1.0
+    # In plain Python the same.
+    again, other = np.arange(12.0), np.empty(3)
+    assert module_of(VIEWS).entry(again, other) == 2
+    np.testing.assert_array_equal(again, buffer)
+    np.testing.assert_array_equal(other, result)
+
+
+KERNEL = "def double(_x, _u, _constants, _work, _result):\n    _result[0] = 2.0 * _x[0] + _u[0]\n"
+
+
+def test_kernels_are_called_by_their_addresses():
+    loop = compiled("""
+def entry(kernels: IntVector, x: Vector, result: Vector) -> Int:
+    call_kernel(kernels, 1, x, x, x, result)
+    return 0
+""")
+    kernels, result = Kernels(kernel_sources(KERNEL)), np.empty(1)
+    loop(np.array([0, kernels.address("double")]), np.array([1.5]), result)
+    assert result == [4.5]
+
+
+def test_kernels_are_written_where_they_are_called():
+    call = "def entry(x: Vector, result: Vector) -> Int:\n    double({})\n    return 0\n"
+    given = {"double": inlined_kernel(KERNEL)}
+    result = np.empty(1)
+    compiled(call.format("x, x, x, result"), **given)(np.array([1.5]), result)
+    assert result == [4.5]
+    for wrong, reason in (
+        ("x[::2], x, x, result", "a kernel needs C-contiguous arrays of floats"),
+        ("x, 1.0, x, result", "a kernel needs C-contiguous arrays of floats"),
+        ("x, x, result", "double takes _x, _u, _constants, _result"),
+    ):
+        with pytest.raises(NumbaError, match=reason):
+            compiled(call.format(wrong), **given)
+
+
+def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
+    names = []
+
+    class EnoughError(Exception):
+        pass
+
+    def fetched(name, make):
+        del make
+        names.append(name)
+        raise EnoughError
+
+    monkeypatch.setattr(module, "fetched", fetched)
+
+    def ask(*, modules=("simulation.path_loops",), kernels=(), sizes=()):
+        with pytest.raises(EnoughError):
+            module._loops.__wrapped__(modules, ("kernel_path",), kernels, sizes)
+
+    ask()
+    ask()
+    assert len(set(names)) == 1
+    assert names[0].startswith("loops/path_loops-")
+    ask(kernels=(("double", KERNEL),))
+    ask(kernels=(("double", KERNEL.replace("2.0", "3.0")),))
+    ask(sizes=(("N", 1),))
+    ask(sizes=(("N", 2),))
+    ask(modules=("simulation.integrators.structures", "simulation.path_loops"))
+    for name in ("source_digest", "compiler_identity"):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, lambda *_: "another")
+            ask()
+    assert len(set(names)) == len(names) - 1 == 8

@@ -1,0 +1,294 @@
+"""Files of the cache are checked by content, name and owner; nothing unchecked is executed."""
+
+import ast
+import logging
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.unit import standard_problems
+from vehiclemor.codegen import (
+    compiler,
+    derivation,
+    kernels,
+    llvm_kernels,
+    loops,
+    object_cache,
+)
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.object_cache import cache_folder, fetched
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.paths import PATH_LOOPS
+
+PACKAGE = Path(object_cache.__file__).parents[1]
+FLIPS = 200
+NAME = "kernels/some-0123.o"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty cache."""
+    chosen = tmp_path / "cache"
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(chosen))
+    return chosen
+
+
+@pytest.fixture
+def made() -> list[bytes]:
+    """What was made, one entry for each time."""
+    return []
+
+
+@pytest.fixture
+def fetch(made: list[bytes]) -> Callable[..., bytes]:
+    def fetch(name: str = NAME, content: bytes = b"some content") -> bytes:
+        def make() -> bytes:
+            made.append(content)
+            return content
+
+        return fetched(name, make)
+
+    return fetch
+
+
+def flipped(content: bytes, bit: int) -> bytes:
+    changed = bytearray(content)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
+def test_what_is_whole_is_made_once(folder, fetch, made, caplog):
+    assert fetch() == fetch() == b"some content"
+    assert len(made) == 1
+    assert not caplog.records
+    # Nobody else can read or write it, and nothing unfinished is left.
+    (path,) = (path for path in folder.rglob("*") if path.is_file())
+    assert path == folder / NAME
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_every_single_flipped_bit_is_named_and_repaired(folder, fetch, made, caplog):
+    fetch()
+    path = folder / NAME
+    whole = path.read_bytes()
+    for bit in range(8 * len(whole)):
+        path.write_bytes(flipped(whole, bit))
+        assert fetch() == b"some content"
+        assert path.read_bytes() == whole
+        (record,) = caplog.records
+        assert record.getMessage() == f"{path} is made again: the file is damaged"
+        assert record.levelno == logging.WARNING
+        caplog.clear()
+    assert len(made) == 1 + 8 * len(whole)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda _: b"",
+        lambda whole: whole[: len(whole) // 2],
+        lambda whole: whole[:64],
+        lambda whole: whole[:-1],
+        lambda whole: whole + b" ",
+        lambda whole: whole.split(b"\n", 1)[1],
+    ],
+    ids=["empty", "half", "hash alone", "last byte gone", "one byte more", "no hash"],
+)
+def test_a_file_of_another_length_is_made_again(folder, fetch, made, caplog, damage):
+    fetch()
+    path = folder / NAME
+    whole = path.read_bytes()
+    path.write_bytes(damage(whole))
+    assert fetch() == b"some content"
+    assert (len(made), path.read_bytes()) == (2, whole)
+    assert len(caplog.records) == 1
+
+
+def test_a_whole_file_under_another_name_is_refused(folder, fetch, made):
+    fetch()
+    (folder / NAME).rename(folder / "kernels" / "other-4567.o")
+    assert fetch("kernels/other-4567.o", b"other content") == b"other content"
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("mode", [0o666, 0o620, 0o602])
+def test_a_file_that_others_can_write_is_refused(folder, fetch, made, caplog, mode):
+    fetch()
+    path = folder / NAME
+    path.chmod(mode)
+    assert fetch() == b"some content"
+    assert len(made) == 2
+    assert caplog.messages == [f"{path} is made again: other users can write it"]
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    fetch()
+    assert len(made) == 2
+
+
+needs_root = pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away"
+)
+
+
+@needs_root
+def test_a_file_of_another_user_is_refused(folder, fetch, made, caplog):
+    fetch()
+    os.chown(folder / NAME, 12345, -1)
+    assert fetch() == b"some content"
+    assert len(made) == 2
+    assert caplog.messages == [f"{folder / NAME} is made again: it belongs to another user"]
+    assert (folder / NAME).stat().st_uid == os.geteuid()
+
+
+@needs_root
+def test_a_folder_of_another_user_is_refused(folder, caplog):
+    folder.mkdir()
+    os.chown(folder, 12345, -1)
+    assert cache_folder() != folder
+    assert "(it belongs to another user): every process compiles for itself" in caplog.text
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
+def test_a_folder_that_others_can_write_is_refused(folder, fetch, caplog, mode):
+    folder.mkdir()
+    folder.chmod(mode)
+    assert fetch() == b"some content"
+    assert caplog.messages == [
+        f"cache {folder} is not used (other users can write it): every process compiles for itself"
+    ]
+    assert not list(folder.iterdir())
+    # What stands in for it is this user's alone, the same for all of the process.
+    instead = cache_folder()
+    assert stat.S_IMODE(instead.stat().st_mode) == 0o700
+    assert (instead / NAME).exists()
+    assert cache_folder() == instead
+    assert len(caplog.messages) == 1
+
+
+def test_a_folder_made_by_a_generous_user_is_trusted(folder, fetch, made):
+    # Where users have groups of their own, files that are made can be written by the group.
+    before = os.umask(0o002)
+    try:
+        fetch()
+        fetch()
+    finally:
+        os.umask(before)
+    assert cache_folder() == folder
+    assert len(made) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_replaced(tmp_path, monkeypatch, fetch, caplog):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "file" / "below"))
+    assert fetch() == b"some content"
+    assert len(caplog.messages) == 1
+    assert "every process compiles for itself" in caplog.text
+
+
+def test_a_file_that_cannot_be_written_is_made_by_every_process(folder, fetch, made, caplog):
+    folder.mkdir()
+    (folder / "kernels").write_text("not a folder")
+    assert fetch() == fetch() == b"some content"
+    assert len(made) == 2
+    assert all("the cache is incomplete" in m for m in caplog.messages if "made again" not in m)
+
+
+def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
+    import platformdirs
+
+    monkeypatch.delenv("VEHICLEMOR_CACHE")
+    monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
+    object_cache._folder.cache_clear()
+    assert cache_folder() == tmp_path / "own" / "vehiclemor"
+    object_cache._folder.cache_clear()
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "chosen"))
+    assert cache_folder() == tmp_path / "chosen"
+
+
+# Machine code and derivations
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> DynamicModel:
+    return build("independent_suspension_vehicle")
+
+
+def test_flipped_bits_in_cached_code_give_no_wrong_number(
+    vehicle, folder, monkeypatch, rng, caplog
+):
+    """Random bits of kernels of a vehicle, of a compiled loop and of a derivation."""
+    sources, x, u = vehicle.equations.sources, vehicle.start("dropped"), np.array([0.03])
+    sizes = {"derivative": len(x), "outputs": len(vehicle.outputs)}
+
+    def numbers() -> list:
+        """What is computed by files that are loaded anew, as in another process."""
+        results, address = [], 0
+        for name, size in sizes.items():
+            address, function, owner = kernels._machine.__wrapped__(sources[name])
+            results.append(np.full(size, np.nan))
+            function(*(array.ctypes.data for array in (x, u, vehicle.constants, results[-1])))
+        path = np.full((2, size), np.nan)
+        (loop,) = loops._loops.__wrapped__(PATH_LOOPS, ("kernel_path",), (), ()).values()
+        states, inputs = np.tile(x, (2, 1)), np.tile(u, (2, 1))
+        loop(states, inputs, np.array([address]), vehicle.constants, path)
+        del owner
+        return [*results, path, derivation.derivation("standard_problems", standard_problems)]
+
+    expected = numbers()
+    contents = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert sorted({path.parent.name for path in contents}) == ["derivations", "kernels", "loops"]
+    # What is made again takes no time here: it is what the compiler has made before.
+    made = {p.name.partition("-")[0]: whole.split(b"\n", 1)[1] for p, whole in contents.items()}
+    monkeypatch.setattr(llvm_kernels, "kernel_module", lambda kernels: kernels[0].name)
+    monkeypatch.setattr(compiler, "compiled_module", lambda name: made[name])
+    monkeypatch.setattr(compiler, "compiled_loops", lambda *_: made["path_loops"])
+    places = list(contents)
+    caplog.clear()
+    for _ in range(FLIPS):
+        path = places[int(rng.integers(len(places)))]
+        path.write_bytes(flipped(contents[path], int(rng.integers(8 * len(contents[path])))))
+        *found, derived = numbers()
+        for result, wanted in zip(found, expected[:-1], strict=True):
+            np.testing.assert_array_equal(result, wanted)
+        assert derived == expected[-1]
+        assert caplog.messages == [f"{path} is made again: the file is damaged"]
+        assert path.read_bytes() == contents[path]
+        caplog.clear()
+
+
+def test_planted_files_are_refused(folder, caplog):
+    """A derivation or machine code that says something else, with any hash but its own."""
+    source = kernels.kernel_sources("def planted(_x, _result):\n    _result[0] = 2.0 * _x[0]\n")
+    other = kernels.kernel_sources("def planted(_x, _result):\n    _result[0] = 9.0 * _x[0]\n")
+    files = []
+    for sources in (source, other):
+        kernels._machine.__wrapped__(sources["planted"])
+        files.append(next(p for p in folder.rglob("*.o") if p not in files))
+    files[0].write_bytes(files[1].read_bytes())
+    result = np.empty(1)
+    Kernels(source).call("planted", np.array([1.5]), result)
+    assert result == [3.0]
+    standard = derivation.derivation("standard_problems", standard_problems)
+    (path,) = (folder / "derivations").iterdir()
+    digest, content = path.read_bytes().split(b"\n", 1)
+    path.write_bytes(digest + b"\n" + content.replace(b"_result[0]", b"_result[1]"))
+    assert derivation.derivation("standard_problems", standard_problems) == standard
+    assert [message.rpartition(": ")[2] for message in caplog.messages] == [
+        "the file is damaged"
+    ] * 2
+
+
+def test_nothing_is_read_that_could_run_code():
+    """No module of the package reads pickles, nor executes text."""
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                names = [alias.name for alias in node.names]
+                names.append(getattr(node, "module", None) or "")
+                assert not {"pickle", "marshal", "shelve", "dill", "cloudpickle"} & set(names), path
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id not in {"eval", "exec", "compile", "__import__"}, path

@@ -1,0 +1,159 @@
+"""Inputs as piecewise polynomials equal the maneuvers that they are made from."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.unit.python_system import python_system
+from tests.unit.standard_problems import driven, maneuver
+from vehiclemor.errors import InputError
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.registry import component
+from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
+from vehiclemor.simulation.integrators.structures import Signal
+from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver
+
+LANE_CHANGE = component("maneuver", "lane_change")
+
+
+def signal_of(maneuver: Maneuver) -> Signal:
+    return ready_signal_of(maneuver).bundle
+
+
+def value(signal: Signal, t: float, segment: int | None = None) -> np.ndarray:
+    """Inputs at one time; at a break point those after it, unless a segment is given."""
+    if segment is None:
+        segment = int(np.searchsorted(signal.edges, t, side="right")) - 1
+        segment = min(segment, len(signal.edges) - 2)
+    a, b = signal.edges[segment], signal.edges[segment + 1]
+    pieces = signal.coefficients[signal.first[segment] : signal.first[segment + 1]]
+    place = (t - a) / (b - a) * len(pieces)
+    piece = min(int(place), len(pieces) - 1)
+    return np.array([np.polyval(powers[::-1], place - piece) for powers in pieces[piece]])
+
+
+def steered(signal, corners=(), duration=10.0) -> Maneuver:
+    """A steering maneuver from a function of the times alone."""
+
+    def inputs(times, frequency, amplitude):
+        del frequency, amplitude
+        return signal(times)[:, None]
+
+    return Maneuver("mine", "", inputs, ("delta",), duration, 11, lambda _: corners)
+
+
+@settings(max_examples=30)
+@given(
+    frequency=st.floats(0.2, 5.0),
+    amplitude=st.floats(-4.0, 4.0),
+    parts=st.lists(st.floats(0.0, 1.0), min_size=40, max_size=40),
+)
+def test_polynomials_equal_the_lane_change_at_any_time(frequency, amplitude, parts):
+    perturbed = LANE_CHANGE.perturbed(frequency, amplitude)
+    signal = signal_of(perturbed)
+    end = perturbed.break_points[1] + 0.1
+    times = np.array(parts) * min(end, 25.0)
+    found = np.array([value(signal, t) for t in times])
+    # 0.03 rad: relative to that, ten digits.
+    within = 3e-12 * max(abs(amplitude), 1e-6)
+    np.testing.assert_allclose(found, perturbed.at(times), rtol=0, atol=within)
+
+
+@given(frequency=st.floats(0.2, 5.0))
+@settings(max_examples=20)
+def test_segments_end_at_the_break_points_and_at_the_ends(frequency):
+    perturbed = LANE_CHANGE.perturbed(frequency)
+    signal = signal_of(perturbed)
+    end = 1.0 + 2.5 / frequency
+    np.testing.assert_allclose(signal.edges, [0.0, 1.0, end, 25.0], rtol=1e-15)
+    # Before and after the pulse the input is one constant.
+    pieces = np.diff(signal.first)
+    assert pieces[0] == pieces[2] == 1
+    assert not signal.coefficients[[0, -1]].any()
+
+
+def test_break_points_outside_the_run_are_no_edges():
+    late = steered(np.cos, corners=(-1.0, 0.0, 4.0, 10.0, 30.0))
+    np.testing.assert_array_equal(signal_of(late).edges, [0.0, 4.0, 10.0])
+
+
+@pytest.mark.parametrize("solver", ["dopri5", "etdrk4"])
+def test_compiled_loops_read_the_polynomials(solver):
+    man, seen = maneuver(driven, 8.0, (2.5,)), []
+
+    def time_itself(x, u):
+        seen.append((x[0], *u))
+        return [1.0]
+
+    run = python_system(time_itself, [0.0], 3).run(
+        man, np.zeros(1), whole_space(1), Solver(solver, 1e-6, longest_step=0.3)
+    )
+    np.testing.assert_allclose(run.path[:, 0], run.times, rtol=1e-12)
+    times, inputs = np.array(seen)[3:, 0], np.array(seen)[3:, 1:]
+    assert len(times) > 60
+    np.testing.assert_allclose(inputs, man.at(times), rtol=0, atol=1e-10)
+
+
+def test_a_jump_has_both_its_values_at_its_time():
+    step = steered(lambda t: np.where(t < 4.0, 0.0, 0.02 + 0.01 * t), corners=(4.0,))
+    signal = signal_of(step)
+    assert value(signal, 4.0, segment=0) == pytest.approx([0.0], abs=1e-15)
+    assert value(signal, 4.0, segment=1) == pytest.approx([0.06], abs=1e-11)
+    assert value(signal, np.nextafter(4.0, 0.0)) == pytest.approx([0.0], abs=1e-15)
+
+
+@pytest.mark.parametrize("at_jump", [0.0, 0.5, 1.0])
+def test_the_value_at_the_very_time_of_a_jump_means_nothing(at_jump):
+    step = steered(lambda t: np.where(t == 4.0, at_jump, np.where(t < 4.0, 0.0, 1.0)), (4.0,))
+    signal = signal_of(step)
+    assert value(signal, 4.0, segment=0) == pytest.approx([0.0], abs=1e-12)
+    assert value(signal, 4.0, segment=1) == pytest.approx([1.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "corner",
+    [
+        pytest.param(lambda t: np.where(t < 4.1, 0.0, 0.02), id="jump"),
+        pytest.param(lambda t: 0.02 * np.abs(t - 4.1), id="corner"),
+    ],
+)
+def test_a_corner_that_has_no_name_is_refused(corner):
+    with pytest.raises(InputError, match=r"'mine' is not smooth between t = 0 and 10 s; .*break"):
+        signal_of(steered(corner))
+    assert len(signal_of(steered(corner, corners=(4.1,))).edges) == 3
+
+
+@pytest.mark.parametrize("at", [4.1, 4.1001, 4.2, 5.0])
+def test_a_corner_of_the_curvature_is_refused_or_followed(at):
+    bent = steered(lambda t: np.clip(t - at, 0.0, None) ** 2)
+    try:
+        signal = signal_of(bent)
+    except InputError:
+        return
+    times = at + np.linspace(-2e-3, 2e-3, 4001)
+    found = np.array([value(signal, t) for t in times])
+    # As exact as a smooth input: 1e-11 of its largest value.
+    np.testing.assert_allclose(found, bent.at(times), rtol=0, atol=2e-11 * (10.0 - at) ** 2)
+
+
+def test_a_short_pulse_between_named_corners_is_accepted():
+    def pulse(times):
+        return 0.02 * np.sin(np.pi * np.clip((times - 3.001) / 0.002, 0.0, 1.0)) ** 2
+
+    signal = signal_of(steered(pulse, corners=(3.001, 3.003)))
+    assert value(signal, 3.0022) == pytest.approx(pulse(np.array([3.0022])), abs=1e-12)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_no_number_is_refused_with_its_time(bad):
+    with pytest.raises(InputError) as error:
+        signal_of(steered(lambda t: np.where(t >= 7.0, bad, 0.0)))
+    assert str(error.value) == "input delta is not finite at t = 7 s"
+
+
+def test_a_single_value_that_is_no_number_is_found_between_the_probes():
+    # Not at one of the thousand equidistant times, but where the polynomials are made.
+    with pytest.raises(InputError, match="not finite"):
+        signal_of(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), np.nan, np.cos(t))))

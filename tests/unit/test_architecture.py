@@ -1,0 +1,114 @@
+"""The rooms of the package: no circle of files, no long file, nothing heavy before it is needed."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.codegen.object_cache import cache_folder
+
+PACKAGE = Path(vm.__file__).parent
+MOST_LINES = 400
+# What takes longer to import than a model to run.
+HEAVY = ("numba", "sympy", "scipy", "pandas", "xarray", "matplotlib")
+
+
+def module_of(path: Path) -> str:
+    parts = (PACKAGE.name, *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts).removesuffix(".__init__")
+
+
+FILES = {module_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imported(path: Path, known: dict[str, Path]) -> set[str]:
+    """Modules that a file imports, inside of functions too."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names} | {str(node.module)}
+    return found & set(known)
+
+
+def circle(files: dict[str, Path]) -> list[str]:
+    """Modules that import one another; empty if there are none."""
+    waiting = {name: imported(path, files) - {name} for name, path in files.items()}
+    while free := [name for name, needed in waiting.items() if not needed & set(waiting)]:
+        for name in free:
+            del waiting[name]
+    return sorted(waiting)
+
+
+def test_no_files_import_one_another_in_a_circle():
+    assert circle(FILES) == []
+
+
+def test_a_circle_is_found(tmp_path):
+    texts = {
+        "a": "def late():\n    from b import thing\n",
+        "b": "import c\nimport json\n",
+        "c": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from a import late\n",
+        "d": "import a\n",
+        "e": "",
+    }
+    for name, text in texts.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    files = {name: tmp_path / f"{name}.py" for name in texts}
+    # Who only imports a circle can't be had without it.
+    assert circle(files) == ["a", "b", "c", "d"]
+    (tmp_path / "c.py").write_text("import e\n")
+    assert circle(files) == []
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_no_file_is_long(name):
+    assert len(FILES[name].read_text().splitlines()) <= MOST_LINES
+
+
+SIMULATION = """
+import json, sys
+import vehiclemor as vm
+from vehiclemor.maneuvers import {maneuver}
+model = vm.model("{name}")
+run = model.simulate({maneuver})
+print(json.dumps([sorted(sys.modules), run.states[-1].tolist()]))
+"""
+RUNS = {
+    "double_wishbone": "sine_travel",
+    "independent_suspension_vehicle": "lane_change",
+    "high_fidelity_vehicle": "rack_lane_change",
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_a_second_process_compiles_and_imports_nothing_heavy(name):
+    maneuver = RUNS[name]
+    script = SIMULATION.format(name=name, maneuver=maneuver)
+
+    def process() -> tuple[list[str], list[float]]:
+        command = [sys.executable, "-c", script]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+        assert not done.stderr
+        return tuple(json.loads(done.stdout))
+
+    _, first = process()
+    before = {path: path.stat().st_mtime_ns for path in cache_folder().rglob("*.o")}
+    modules, again = process()
+    assert {p: p.stat().st_mtime_ns for p in cache_folder().rglob("*.o") if p in before} == before
+    assert again == first
+    assert {"llvmlite", "numpy"} <= set(modules)
+    assert not {module.partition(".")[0] for module in modules} & set(HEAVY)
+
+
+def test_importing_the_package_imports_next_to_nothing():
+    script = "import json, sys, vehiclemor; print(json.dumps(sorted(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True)
+    heavy = {name.partition(".")[0] for name in json.loads(found.stdout)}
+    assert not heavy & {*HEAVY, "numpy", "llvmlite", "pydantic"}
