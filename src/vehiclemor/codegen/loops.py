@@ -24,6 +24,7 @@ _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
 Kind = tuple[str, str, int]
+DTYPES = {"d": np.dtype(np.float64), "l": np.dtype(np.int64)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,7 @@ def _words(loop: str, kinds: Sequence[Kind], value: Any) -> list[int]:
             continue
         if not (
             isinstance(part, np.ndarray)
-            and part.dtype.char == code
+            and part.dtype == DTYPES[code]
             and part.ndim == dimensions
             and part.flags.c_contiguous
         ):
