@@ -4,6 +4,8 @@ import ast
 import logging
 import os
 import stat
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -225,7 +227,7 @@ def test_the_cache_of_one_process_is_removed_at_its_end(tmp_path):
     code = "from vehiclemor.codegen.object_cache import cache_folder; print(cache_folder())"
     chosen = {"VEHICLEMOR_CACHE": str(tmp_path / "file"), "TMPDIR": str(tmp_path)}
     command = [sys.executable, "-c", code]
-    ran = subprocess.run(  # noqa: S603 - a command of the test
+    ran = subprocess.run(
         command, env=os.environ | chosen, capture_output=True, text=True, check=True
     )
     assert Path(ran.stdout.strip()).parent == tmp_path
