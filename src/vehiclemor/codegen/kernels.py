@@ -7,13 +7,13 @@ import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.codegen.machine_code import MachineCode
 from vehiclemor.codegen.object_cache import compiler_identity, fetched
+from vehiclemor.codegen.once import once
 from vehiclemor.codegen.sources import source_digest
 
 
@@ -98,7 +98,7 @@ def _checked(source: KernelSource, place: int, array: Any) -> int:
     return array.ctypes.data
 
 
-@cache
+@once
 def _machine(source: KernelSource) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
     parts = [source.text, source_digest(("codegen",), (), ()), compiler_identity()]

@@ -8,7 +8,6 @@ import inspect
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from types import ModuleType
 from typing import Any, get_args
@@ -18,12 +17,14 @@ import numpy as np
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.machine_code import MachineCode
 from vehiclemor.codegen.object_cache import compiler_identity, fetched
+from vehiclemor.codegen.once import once
 from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
 Kind = tuple[str, str, int]
+DTYPES = {"d": np.dtype(np.float64), "l": np.dtype(np.int64)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,7 @@ def _words(loop: str, kinds: Sequence[Kind], value: Any) -> list[int]:
             continue
         if not (
             isinstance(part, np.ndarray)
-            and part.dtype.char == code
+            and part.dtype == DTYPES[code]
             and part.ndim == dimensions
             and part.flags.c_contiguous
         ):
@@ -144,7 +145,7 @@ def loops(
     )
 
 
-@cache
+@once
 def _loops(
     modules: tuple[str, ...],
     entries: tuple[str, ...],

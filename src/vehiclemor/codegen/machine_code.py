@@ -1,7 +1,8 @@
 """Object code in memory: loaded with LLVM's own loader, without what has compiled it."""
 
-from functools import cache
 from typing import Any
+
+from vehiclemor.codegen.once import once
 
 
 class MachineCode:
@@ -30,7 +31,7 @@ class MachineCode:
         return found
 
 
-@cache
+@once
 def _target() -> Any:
     import llvmlite.binding as llvm
 

@@ -4,10 +4,12 @@ Object code is executed, so a file counts only if it is this user's own and nobo
 it, and if it is as it was written; else it is named once, and made again.
 """
 
+import atexit
 import hashlib
 import logging
 import os
 import platform
+import shutil
 import stat
 import tempfile
 from collections.abc import Callable
@@ -52,6 +54,8 @@ def _folder(chosen: str | None) -> Path:
     import platformdirs
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
+    # A process that changes its folder keeps its cache.
+    folder = folder.absolute()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -62,7 +66,9 @@ def _folder(chosen: str | None) -> Path:
     if not reason:
         return folder
     _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
-    return Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+    temporary = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+    return temporary
 
 
 def _distrust(status: os.stat_result) -> str:

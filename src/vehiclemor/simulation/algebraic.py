@@ -12,7 +12,7 @@ from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
-from vehiclemor.simulation.checks import check_inputs
+from vehiclemor.simulation.checks import check_inputs, check_positive, output_times
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
@@ -121,7 +121,7 @@ class AlgebraicModel(Model):
         """
         check_inputs(maneuver, self.name, self.inputs)
         self.start(start)
-        times = maneuver.times if times is None else np.asarray(times, dtype=float)
+        times = output_times(times, maneuver)
         return self.solve_path(
             times,
             maneuver.at(times),
@@ -137,7 +137,13 @@ class AlgebraicModel(Model):
         tolerance: float = NEWTON_TOLERANCE,
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
+        check_positive("tolerance", tolerance)
         inputs = np.ascontiguousarray(inputs, dtype=float)
+        if inputs.shape != (len(times), len(self.inputs)) or not len(inputs):
+            raise InputError(
+                f"inputs have shape {inputs.shape}, not ({len(times)}, {len(self.inputs)}) with "
+                f"at least one sample"
+            )
         self.check_reach(times, inputs)
         n = len(self.coordinates)
         solution = newton_loops.Solution(np.full((len(inputs), n), np.nan), new_counts())

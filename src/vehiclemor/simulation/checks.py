@@ -42,7 +42,9 @@ def check_inputs(maneuver: Maneuver, model: str, inputs: Sequence[str]) -> None:
 
 def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     """Raise `InputError` if a value is no finite positive number, or is below the smallest."""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
+        value, bool
+    )
     if not (number and 0.0 < float(value) < np.inf and float(value) >= smallest):  # type: ignore[arg-type]
         bound = f"at least {smallest:g}" if smallest else "positive"
         raise InputError(f"{name} is {value!r}; it must be a finite number, {bound}")
@@ -56,8 +58,20 @@ def cut_short(maneuver: Maneuver) -> str:
     return f"the maneuver would end at {last:.4g} s, after the run"
 
 
-def check_times(times: np.ndarray, maneuver: Maneuver) -> None:
-    """Raise `InputError` if output times (samples,) in s don't increase within the maneuver."""
+def output_times(given: Any, maneuver: Maneuver) -> np.ndarray:
+    """Output times (samples,) in s; the maneuver's where none are given.
+
+    Raises
+    ------
+    InputError
+        If they don't increase within the maneuver.
+    """
+    if given is None:
+        return maneuver.times
+    try:
+        times = loop_array(given)
+    except (TypeError, ValueError):
+        raise InputError(f"output times are {given!r}, no list of times in s") from None
     if times.ndim != 1:
         raise InputError("output times must be a list of times in s")
     slack = 1e-9 * maneuver.duration
@@ -65,6 +79,7 @@ def check_times(times: np.ndarray, maneuver: Maneuver) -> None:
         raise InputError("output times must be finite and increasing")
     if len(times) == 0 or times[0] < 0.0 or times[-1] > maneuver.duration + slack:
         raise InputError(f"output times must lie within the maneuver, 0 to {maneuver.duration:g} s")
+    return times
 
 
 def left_validity(

@@ -42,39 +42,58 @@ def signal_of(maneuver: Maneuver) -> Ready:
         )
     # A short pulse may lie between the probes of the whole run.
     inside = np.concatenate([np.linspace(a, b, 18)[1:-1] for a, b in pairwise(edges)])
-    samples = np.concatenate([values, maneuver.at(inside)])
+    times, samples = np.concatenate([probe, inside]), np.concatenate([values, maneuver.at(inside)])
     largest = np.abs(samples).max(axis=0) + 1e-300
-    parts = [_segment(maneuver, a, b, largest) for a, b in pairwise(edges)]
+    parts = [_segment(maneuver, (a, b), largest, (times, samples)) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
     return ready(Signal(edges, first.astype(np.int64), np.concatenate(parts)))
 
 
-def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.ndarray:
-    """Polynomials (pieces, inputs, 6) between two break points."""
+def _segment(
+    maneuver: Maneuver,
+    ends: tuple[float, float],
+    largest: np.ndarray,
+    known: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Polynomials (pieces, inputs, 6) between two break points.
+
+    Parameters
+    ----------
+    known
+        Times and inputs that the polynomials must give too, as far as they lie inside.
+    """
+    a, b = ends
     # One-sided values at the ends, where the input may jump.
-    inside = 1e-13 * (b - a)
-    nodes, powers = _interpolation()
+    inside = min(max(1e-13, 2.0 * np.spacing(b) / (b - a)), 1e-6)
+    known_places = (known[0] - a) / (b - a)
+    within = (known_places > inside) & (known_places < 1.0 - inside)
+    known_places, known_values = known_places[within], known[1][within]
 
     def inputs_at(places: np.ndarray) -> np.ndarray:
-        times = np.clip(a + (b - a) * places, a + inside, b - inside)
+        times = a + (b - a) * np.clip(places, inside, 1.0 - inside)
         values = maneuver.at(times.ravel())
         if not np.isfinite(values).all():
             raise InputError(f"an input is not finite between t = {a:g} and {b:g} s")
         return values.reshape(*places.shape, -1)
 
+    nodes = _nodes()
+    middles = 0.5 * (nodes[1:] + nodes[:-1])
     pieces = 8
     while pieces <= MOST_PIECES:
         left = np.arange(pieces)[:, None]
         values = inputs_at((left + nodes) / pieces)
-        if np.all(values == values[0, 0]):
+        if np.all(values == values[0, 0]) and np.all(known_values == values[0, 0]):
             constant = np.zeros((1, values.shape[2], DEGREE + 1))
             constant[0, :, 0] = values[0, 0]
             return constant
-        coefficients = np.einsum("pk,nki->nip", powers, values)
-        middles = 0.5 * (nodes[1:] + nodes[:-1])
-        between = coefficients @ middles ** np.arange(DEGREE + 1)[:, None]
-        error = np.abs(between.swapaxes(1, 2) - inputs_at((left + middles) / pieces)) / largest
-        if error.max() < ACCURACY:
+        coefficients = np.einsum("pk,nki->nip", _powers(nodes), values)
+        # The first and the last node have been moved inside.
+        coefficients[0] = (_powers(np.fmax(nodes, inside * pieces)) @ values[0]).T
+        coefficients[-1] = (_powers(np.fmin(nodes, 1.0 - inside * pieces)) @ values[-1]).T
+        between = (coefficients @ middles ** np.arange(DEGREE + 1)[:, None]).swapaxes(1, 2)
+        errors = between - inputs_at((left + middles) / pieces)
+        further = _values(coefficients, known_places) - known_values
+        if max(np.abs(e / largest).max(initial=0.0) for e in (errors, further)) < ACCURACY:
             return np.ascontiguousarray(coefficients)
         pieces *= 2
     raise InputError(
@@ -84,7 +103,18 @@ def _segment(maneuver: Maneuver, a: float, b: float, largest: np.ndarray) -> np.
 
 
 @cache
-def _interpolation() -> tuple[np.ndarray, np.ndarray]:
-    """Nodes on [0, 1], both ends among them, and the powers' coefficients by values there."""
-    nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
-    return nodes, np.linalg.inv(nodes[:, None] ** np.arange(DEGREE + 1))
+def _nodes() -> np.ndarray:
+    """Chebyshev points on [0, 1], both ends among them."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
+
+
+def _powers(nodes: np.ndarray) -> np.ndarray:
+    """Coefficients of the powers of the polynomials that are 1 at one node, 0 at the others."""
+    return np.linalg.inv(nodes[:, None] ** np.arange(DEGREE + 1))
+
+
+def _values(coefficients: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Polynomials (places, inputs) at places between 0 and 1 of their segment."""
+    pieces = np.floor(places * len(coefficients)).astype(int)
+    powers = (places * len(coefficients) - pieces)[:, None] ** np.arange(DEGREE + 1)
+    return np.einsum("nip,np->ni", coefficients[pieces], powers)

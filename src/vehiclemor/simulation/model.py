@@ -125,7 +125,7 @@ class Model:
         InputError
             If it is neither a known name nor a state.
         """
-        if isinstance(name, np.ndarray):
+        if not isinstance(name, str | None):
             return self._state(name, "start").copy()
         name = name or self.starts[0]
         if name not in self.initial:

@@ -35,14 +35,31 @@ def along(
     InputError
         If a path has another shape: the kernel reads as many numbers as it knows.
     """
-    states, inputs = (loop_array(path) for path in paths)
+    try:
+        states, inputs = (np.atleast_1d(loop_array(path)) for path in paths)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"states and inputs must be arrays of numbers: {error}") from None
     for path, kind, size in zip((states, inputs), ("states", "inputs"), sizes[:2], strict=True):
         if path.shape != (len(states), size):
             raise InputError(f"{kind} have shape {path.shape}, not ({len(states)}, {size})")
     result = np.empty((len(states), sizes[2]))
-    address = np.array([kernels.address(name)], dtype=np.int64)
+    address = np.array([address_of(kernels, name)], dtype=np.int64)
     path_loops()["kernel_path"](states, inputs, address, constants, result)
     return result
+
+
+def address_of(kernels: Kernels, name: str) -> int:
+    """Address of a kernel for compiled loops, which don't look before they call it.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    address = kernels.address(name)
+    if not address:
+        raise InputError(f"the equations have no {name}")
+    return address
 
 
 def path_loops() -> Mapping[str, Loop]:

@@ -66,6 +66,8 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float) -> Spans:
     cuts = cuts[cuts <= end]
     # Times that differ by rounding are one.
     cuts = cuts[np.concatenate([[True], np.diff(cuts) > 1e-9 * max(end, 1.0)])]
+    # Also a run that ends at once has a span, to be recorded in.
+    cuts = np.array([0.0, end]) if len(cuts) == 1 else cuts
     cuts[-1] = end
     middles = (cuts[1:] + cuts[:-1]) / 2.0
     segments = np.clip(np.searchsorted(breaks, middles) - 1, 0, len(breaks) - 2)

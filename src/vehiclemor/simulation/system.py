@@ -11,8 +11,9 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Ready, ready
+from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.simulation.checks import check_positive, check_times, loop_array
+from vehiclemor.simulation.checks import check_positive, loop_array, output_times
 from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.structures import (
@@ -24,7 +25,7 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
-from vehiclemor.simulation.paths import along, path_loops
+from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
@@ -152,8 +153,8 @@ class System:
             Kernel that takes whole steps, if any.
         """
         places = ("derivative", "outputs", "second_order", "speeds")
-        found = [self.kernels.address(name) if name in names else 0 for name in places]
-        found.append(self.kernels.address(fused) if fused else 0)
+        found = [address_of(self.kernels, name) if name in names else 0 for name in places]
+        found.append(address_of(self.kernels, fused) if fused else 0)
         kernels = np.array(found, dtype=np.int64)
         return Equations(kernels, self.constants, self.error_scale, self.turning)
 
@@ -166,6 +167,11 @@ class System:
 
     def jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """df/dx (dim, dim) by central differences; columns of inactive states are zero."""
+        if (np.shape(x), np.shape(u)) != ((len(self.reference),), (self.inputs,)):
+            raise InputError(
+                f"x and u have shapes {np.shape(x)} and {np.shape(u)}, not "
+                f"({len(self.reference)},) and ({self.inputs},)"
+            )
         result = np.empty((len(x), len(x)))
         loop = path_loops()["jacobian_at"]
         equations, work = self.called("full", ""), np.empty((3, len(x)))
@@ -251,7 +257,6 @@ class System:
         self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
     ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
-        times = maneuver.times if solver.times is None else loop_array(solver.times)
         longest = solver.longest_step
         check_positive("tolerance", solver.tolerance, SMALLEST_TOLERANCE)
         if longest is not None:
@@ -260,7 +265,7 @@ class System:
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
-        check_times(times, maneuver)
+        times = output_times(solver.times, maneuver)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
         fused = self.fused.get(name, "") if full else ""

@@ -220,3 +220,9 @@ def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
             patch.setattr(module, name, lambda *_: "another")
             ask()
     assert len(set(names)) == len(names) - 1 == 8
+
+
+def test_an_array_in_another_byte_order_is_refused(loop, bundle):
+    other = bundle._replace(rows=bundle.rows.astype(">f8"))
+    with pytest.raises(TypeError, match="rows"):
+        loop(other, 1.0, 0, np.zeros(3))

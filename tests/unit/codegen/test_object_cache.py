@@ -4,6 +4,8 @@ import ast
 import logging
 import os
 import stat
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -208,6 +210,29 @@ def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
     object_cache._folder.cache_clear()
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "chosen"))
     assert cache_folder() == tmp_path / "chosen"
+
+
+def test_a_process_that_goes_elsewhere_keeps_its_cache(tmp_path, monkeypatch, fetch, made):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("VEHICLEMOR_CACHE", "relative")
+    fetch()
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    fetch()
+    assert len(made) == 1
+    assert cache_folder() == tmp_path / "relative"
+
+
+def test_the_cache_of_one_process_is_removed_at_its_end(tmp_path):
+    (tmp_path / "file").write_text("")
+    code = "from vehiclemor.codegen.object_cache import cache_folder; print(cache_folder())"
+    chosen = {"VEHICLEMOR_CACHE": str(tmp_path / "file"), "TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-c", code]
+    ran = subprocess.run(
+        command, env=os.environ | chosen, capture_output=True, text=True, check=True
+    )
+    assert Path(ran.stdout.strip()).parent == tmp_path
+    assert not Path(ran.stdout.strip()).exists()
 
 
 # Machine code and derivations

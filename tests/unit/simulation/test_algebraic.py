@@ -146,6 +146,31 @@ def test_wrong_arguments_are_one_line(
             function(q, u)
 
 
+@pytest.mark.parametrize("times", [[], [0.0, 2.0, 1.0], [0.0, 11.0], 1.0, [[0.0, 1.0]], "abc"])
+def test_wrong_output_times_are_one_line(model: AlgebraicModel, nominal: Maneuver, times) -> None:
+    with pytest.raises(InputError, match="output times"):
+        model.simulate(nominal, times=times)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x"])
+def test_a_tolerance_that_means_nothing_is_one_line(model, nominal, tolerance) -> None:
+    with pytest.raises(InputError, match="tolerance"):
+        model.simulate(nominal, tolerance=tolerance)
+
+
+@pytest.mark.parametrize("shape", [(2,), (2, 1), (2, 3), (5, 2), (0, 2)])
+def test_inputs_of_another_shape_are_one_line(model: AlgebraicModel, shape) -> None:
+    with pytest.raises(InputError, match="inputs have shape"):
+        model.solve_path(np.zeros(2), np.zeros(shape))
+
+
+@pytest.mark.parametrize("path", [None, 1.0, "abc", np.zeros(8), np.zeros((2, 3))])
+def test_a_path_of_another_shape_is_one_line(model: AlgebraicModel, path) -> None:
+    for function in (model.outputs_at, model.residual_at):
+        with pytest.raises(InputError, match="states"):
+            function(path, np.zeros((2, 2)))
+
+
 def test_strided_arguments_are_read_rightly(
     model: AlgebraicModel, rng: np.random.Generator
 ) -> None:

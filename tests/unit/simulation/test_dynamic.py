@@ -8,7 +8,7 @@ import pytest
 from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import kernels as codegen_kernels
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.errors import InputError
+from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.reduction.projection.dynamic import check_subspace
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.registry import component
@@ -105,3 +105,45 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
     function = model.mass_matrix if lacking == "second_order" else model.speeds_of_rates
     with pytest.raises(InputError, match=f"has no {lacking}"):
         function(model.start())
+
+
+# Borders
+
+
+@pytest.mark.parametrize("solver", INTEGRATORS)
+@pytest.mark.parametrize("end", [0.0, 1e-13, 1e-12, 1e-10, 1e-8])
+def test_a_run_that_ends_at_once_is_its_start(vehicle, solver, end):
+    straight = component("maneuver", "rack_straight_ahead")
+    found = vehicle.simulate(straight, times=np.array([end]), solver=solver, tolerance=1e-6)
+    np.testing.assert_allclose(found.states[0], vehicle.start(), atol=1e-6)
+
+
+@pytest.mark.parametrize("solver", INTEGRATORS)
+def test_a_start_with_rates_that_are_not_finite_says_so(vehicle, solver):
+    straight = component("maneuver", "rack_straight_ahead")
+    with pytest.raises(ConvergenceError, match=r"a state is not finite at t = 0 s"):
+        vehicle.simulate(straight, np.full(52, 1e200), solver=solver)
+
+
+def test_a_start_may_be_any_sequence(standard):
+    model = standard()
+    np.testing.assert_array_equal(model.start([0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3, 0.4])
+    with pytest.raises(InputError, match=r"start has shape \(2,\)"):
+        model.start([1.0, 2.0])
+
+
+def test_the_system_refuses_what_its_machine_code_would_read_beyond(standard):
+    system = standard().system
+    for x, u in ((np.zeros(3), np.zeros(3)), (np.zeros(4), np.zeros(1)), (np.zeros(4), 0.0)):
+        with pytest.raises(InputError, match="x and u have shapes"):
+            system.jacobian(x, u)
+
+
+def test_a_kernel_that_is_not_there_is_never_called(standard):
+    system = standard().system
+    lacking = {k: v for k, v in system.kernels.sources.items() if k not in ("speeds", "outputs")}
+    system = replace(system, kernels=Kernels(lacking))
+    with pytest.raises(InputError, match="no speeds"):
+        system.called("coordinates", "")
+    with pytest.raises(InputError, match="no outputs"):
+        system.along("outputs", np.zeros((1, 4)), np.zeros((1, 3)), 8)

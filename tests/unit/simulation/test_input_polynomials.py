@@ -146,6 +146,27 @@ def test_a_short_pulse_between_named_corners_is_accepted():
     assert value(signal, 3.0022) == pytest.approx(pulse(np.array([3.0022])), abs=1e-12)
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.02])
+def test_a_short_pulse_without_a_name_is_followed_where_a_probe_meets_it(offset):
+    """Between the points that a few pieces are made of, but not between the 1001 of a run."""
+    pulse = steered(lambda t: offset + 0.02 * np.exp(-(((t - 4.4321) / 0.011) ** 2)))
+    found = value(signal_of(pulse), 4.4321)
+    assert found == pytest.approx([offset + 0.02], abs=1e-11)
+
+
+@pytest.mark.parametrize(("rate", "duration"), [(3.0, 1000.0), (100.0, 10.0)])
+def test_many_periods_are_followed_to_the_very_ends(rate, duration):
+    signal = signal_of(steered(lambda t: np.sin(rate * t), duration=duration))
+    times = np.concatenate([np.geomspace(1e-12, 1.0, 50), np.linspace(0.0, duration, 501)])
+    for t in (*times, *(duration - times)):
+        assert value(signal, t) == pytest.approx([np.sin(rate * t)], abs=1e-11)
+
+
+def test_break_points_may_lie_close_together():
+    step = steered(lambda t: np.where(t < 3, 0.0, np.where(t < 3 + 1e-9, 1.0, 2.0)), (3, 3 + 1e-9))
+    assert [float(value(signal_of(step), t)[0]) for t in (2.0, 3 + 5e-10, 4.0)] == [0.0, 1.0, 2.0]
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_value_that_is_no_number_is_refused_with_its_time(bad):
     with pytest.raises(InputError) as error:

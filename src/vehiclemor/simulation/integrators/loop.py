@@ -57,7 +57,7 @@ def integrate(
     start
         State (n,).
     buffer, integers
-        Scratch space, see `catalogue.scratch_sizes`.
+        Scratch space, see `catalogue.scratch_size`.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def integrate(
         work = work_space(buffer, first, integers, dim, inputs)
         if entered:
             project(problem, t, x, work.y, counts)
-            while sample < len(samples) and samples[sample] <= t:
+            while sample < len(samples) and samples[sample] <= t + 1e-12 * (1.0 + abs(t)):
                 lift(problem, work.y, path[sample])
                 sample += 1
         if segment >= 0 and spans.segments[span] != segment:
@@ -140,6 +140,8 @@ def over_span(problem, times, h, method, control, work, output, sample):
     if h <= 0.0:
         # The slope changes the state by a hundredth of its scale, at most.
         size = error_norm(problem, f, y, 1.0)
+        if not math.isfinite(size):
+            return NOT_FINITE, t, h, sample
         h = control.longest
         if not size <= 1e-10:
             h = max(control.shortest_first, 0.01 / size)

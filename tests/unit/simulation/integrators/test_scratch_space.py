@@ -1,0 +1,109 @@
+"""No integrator or formulation writes beyond the scratch space that is reserved for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.unit.python_system import python_system
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.vehicle.feature_system import feature_system
+from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.system import Solver, System
+
+GUARD, MARK = 64, 12345
+HEAD = "(_x, _u, _constants, _work, _result):"
+
+
+def oscillators(n: int, inputs: int) -> System:
+    """n / 2 driven oscillators of unit mass; an odd last state decays."""
+    half = n // 2
+    force = [
+        f"{-1.0 - i}*_x[{i}] + {-0.3}*_x[{half + i}]"
+        + "".join(f" + 1.0*_u[{j}]" for j in range(inputs))
+        for i in range(half)
+    ]
+    rates = [f"_x[{half + i}]" for i in range(half)]
+    lines = [f"    _result[{k}] = {f}" for k, f in enumerate([*rates, *force])]
+    if n % 2:
+        lines.append(f"    _result[{n - 1}] = -1.0*_x[{n - 1}]")
+    parts = [f"def derivative{HEAD}", *lines]
+    if half and not n % 2:
+        parts += [f"def speeds{HEAD}", *(f"    _result[{i}] = {v}" for i, v in enumerate(rates))]
+        parts += [f"def second_order{HEAD}"]
+        for i in range(half):
+            parts += [f"    _result[{i}, {j}] = {float(i == j)}" for j in range(half)]
+            parts += [f"    _result[{i}, {half}] = {force[i]}"]
+    kernels = Kernels(kernel_sources("\n".join(parts)))
+    plain = python_system(lambda x, _: 0.0 * x, [0.0] * n, inputs)
+    return replace(plain, kernels=kernels)
+
+
+def steered(inputs: int) -> Maneuver:
+    def signal(times, frequency, amplitude):
+        del frequency, amplitude
+        return np.column_stack([np.sin((j + 1) * times) for j in range(inputs)])
+
+    return Maneuver("m", "", signal, tuple("abc"[:inputs]), 2.0, 21, lambda _: (1.3,))
+
+
+def two_windows(formulation: str, n: int, rank: int) -> ProjectionWindows:
+    """Subspaces of the largest and of the smallest dimension."""
+    rng, half = np.random.default_rng(n), n // 2
+    rows = half if formulation == "coordinates" else n
+    trial = np.zeros((2, 2 * rank if formulation == "coordinates" else rank, n))
+    for basis in trial:
+        basis[:rank, :rows] = np.linalg.qr(rng.normal(size=(rows, rows)))[0][:rank]
+    ranks = np.array([rank, 1]) * (2 if formulation == "coordinates" else 1)
+    edges = np.array([0.0, 0.9, 2.0])
+    return ProjectionWindows(formulation, edges, np.zeros((2, n)), trial, trial.copy(), ranks)
+
+
+def guarded(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A copy with marks before and behind it, and the whole."""
+    whole = np.full(array.size + 2 * GUARD, MARK, dtype=array.dtype)
+    inner = whole[GUARD:-GUARD].reshape(array.shape)
+    inner[...] = array
+    return inner, whole
+
+
+def check(system: System, inputs: int, windows: ProjectionWindows, solver: str) -> None:
+    start = np.linspace(1.0, 2.0, len(system.reference))
+    loop, given = system.prepared(steered(inputs), start, windows, Solver(solver, 1e-5))
+    buffer, floats = guarded(given.buffer)
+    integers, whole = guarded(given.integers)
+    path, states = guarded(given.output.path)
+    output = given.output._replace(path=path)
+    assert loop(*given._replace(buffer=buffer, integers=integers, output=output)) == 0
+    assert np.isfinite(path).all()
+    for guard in (floats, whole, states):
+        assert (guard[:GUARD] == MARK).all()
+        assert (guard[-GUARD:] == MARK).all()
+
+
+@pytest.mark.parametrize("inputs", [1, 3])
+@pytest.mark.parametrize("n", [1, 2, 4, 9, 30])
+@pytest.mark.parametrize("solver", INTEGRATORS)
+def test_a_run_of_the_full_system_stays_in_its_space(n, inputs, solver):
+    check(oscillators(n, inputs), inputs, whole_space(n), solver)
+
+
+@pytest.mark.parametrize("inputs", [1, 3])
+@pytest.mark.parametrize(("n", "rank"), [(2, 1), (4, 1), (4, 2), (30, 15)])
+@pytest.mark.parametrize("formulation", ["state", "coordinates"])
+@pytest.mark.parametrize("solver", [name for name in INTEGRATORS if not frozen(name)])
+def test_a_reduced_run_stays_in_its_space(n, rank, inputs, formulation, solver):
+    check(oscillators(n, inputs), inputs, two_windows(formulation, n, rank), solver)
+
+
+@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
+@pytest.mark.parametrize("diagonal", [(), (2, 1)])
+def test_a_step_as_one_kernel_stays_in_its_space(solver, diagonal):
+    terms = ("z0", "z1", "z2", "u0", "z0 * z1 * z2", "1.0")
+    features = Features(3, 1, (), terms, diagonal=diagonal)
+    system = feature_system(features, np.zeros(0), -0.1 * np.ones((6, 6)), np.ones(6), np.zeros(3))
+    assert (solver in system.fused) == (solver == "ros34pw2" or bool(diagonal))
+    check(system, 1, whole_space(6), solver)
