@@ -173,7 +173,7 @@ def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle, solv
         expected = pytest.approx(calls(vehicle, x, tolerance), rel=0.1)
         assert calls(vehicle, turn(x, 2.0), tolerance) == expected
     # As it would without turning states into the Jacobian's heading and back.
-    fixed = replace(vehicle, turning=np.zeros(0, dtype=np.int64))
+    fixed = replace(vehicle, definition=replace(vehicle.definition, heading_pairs=()))
     assert calls(fixed, turn(x, 2.0), 1e-5) > 1.4 * calls(vehicle, x, 1e-5)
 
 

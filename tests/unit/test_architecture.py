@@ -75,9 +75,9 @@ def test_no_file_is_long(name):
 SIMULATION = """
 import json, sys
 import vehiclemor as vm
-from vehiclemor.maneuvers import {maneuver}
+from vehiclemor.registry import component
 model = vm.model("{name}")
-run = model.simulate({maneuver})
+run = model.simulate(component('maneuver', '{maneuver}'))
 print(json.dumps([sorted(sys.modules), run.states[-1].tolist()]))
 """
 RUNS = {

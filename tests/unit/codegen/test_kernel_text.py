@@ -29,7 +29,7 @@ AT = {x: 1.7, y: 2.3, p: 0.6}
 @pytest.fixture(scope="module")
 def program() -> Program:
     """The double wishbone's."""
-    return DEFINITION.derive().program
+    return DEFINITION.derive()
 
 
 def program_of(expression: sp.Expr) -> Program:

@@ -91,7 +91,7 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
     shapes = {k: v for k, v in whole.equations.shapes.items() if k != lacking}
     sources = {k: v for k, v in whole.equations.sources.items() if k != lacking}
     equations = replace(whole.equations, shapes=shapes, sources=sources)
-    model = replace(whole, equations=equations, kernels=Kernels(sources))
+    model = replace(whole, equations=equations)
     settings = DynamicPodSettings(rank=1, snapshots=2, formulation="state", inner_product="range")
     check_subspace(model, settings)
     for wrong in ({"formulation": "coordinates"}, {"inner_product": "energy"}):

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.parameters import point
+from vehiclemor.parameters import Declared, point
 
 # Hard points at the design position, left side.
-POINTS = dict.fromkeys(
+POINTS: dict[str, Declared] = dict.fromkeys(
     (
         *("upper_arm_front_pivot", "upper_arm_rear_pivot", "upper_ball_joint"),
         *("lower_arm_front_pivot", "lower_arm_rear_pivot", "lower_ball_joint"),
