@@ -121,7 +121,7 @@ class AlgebraicModel(Model):
         """
         check_inputs(maneuver, self.name, self.inputs)
         self.start(start)
-        times = output_times(times, maneuver)
+        times = output_times(times, maneuver, repeats=True)
         return self.solve_path(
             times,
             maneuver.at(times),

@@ -58,8 +58,13 @@ def cut_short(maneuver: Maneuver) -> str:
     return f"the maneuver would end at {last:.4g} s, after the run"
 
 
-def output_times(given: Any, maneuver: Maneuver) -> np.ndarray:
+def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.ndarray:
     """Output times (samples,) in s; the maneuver's where none are given.
+
+    Parameters
+    ----------
+    repeats
+        Whether a time may stand twice, as the edges of windows do in snapshots.
 
     Raises
     ------
@@ -75,7 +80,8 @@ def output_times(given: Any, maneuver: Maneuver) -> np.ndarray:
     if times.ndim != 1:
         raise InputError("output times must be a list of times in s")
     slack = 1e-9 * maneuver.duration
-    if not (np.isfinite(times).all() and np.all(np.diff(times) > 0.0)):
+    steps = np.diff(times)
+    if not (np.isfinite(times).all() and np.all(steps >= 0.0 if repeats else steps > 0.0)):
         raise InputError("output times must be finite and increasing")
     if len(times) == 0 or times[0] < 0.0 or times[-1] > maneuver.duration + slack:
         raise InputError(f"output times must lie within the maneuver, 0 to {maneuver.duration:g} s")
