@@ -47,10 +47,10 @@ def reference(model):
 def test_derivation(benchmark):
     """Symbolic derivation with elimination, common subexpressions and hoisting."""
     benchmark.group = "symbolics"
-    equations = benchmark.pedantic(
+    program = benchmark.pedantic(
         component("model", "independent_suspension_vehicle").derive, rounds=3
     )
-    assert isinstance(equations.program, Program)
+    assert isinstance(program, Program)
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "dropped"])
