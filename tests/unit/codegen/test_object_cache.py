@@ -203,7 +203,7 @@ def test_a_file_that_cannot_be_written_is_made_by_every_process(folder, fetch, m
 def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
     import platformdirs
 
-    monkeypatch.delenv("VEHICLEMOR_CACHE")
+    monkeypatch.delenv("VEHICLEMOR_CACHE", raising=False)
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
     object_cache._folder.cache_clear()
     assert cache_folder() == tmp_path / "own" / "vehiclemor"
