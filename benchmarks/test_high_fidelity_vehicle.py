@@ -13,7 +13,8 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.input_polynomials import signal_of
-from vehiclemor.simulation.integrators.catalogue import problem_size, rhs_loop
+from vehiclemor.simulation.integrators.catalogue import rhs_loop
+from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.structures import FINISHED, Place
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
@@ -113,7 +114,7 @@ def spans(model):
     ready, times = signal_of(rack_lane_change), rack_lane_change.times
     edges, n = ready.bundle.edges, 2 * len(model.coordinates)
     equations, subspaces = model.system.called("full", ""), whole_space(n).subspaces
-    loop, buffer = rhs_loop("full"), np.empty(problem_size(n, len(model.inputs)))
+    loop, buffer = rhs_loop("full"), np.empty(scratch_end(n, len(model.inputs)))
     for segment in range(len(edges) - 1):
         a, b = edges[segment : segment + 2]
         last = b == rack_lane_change.duration

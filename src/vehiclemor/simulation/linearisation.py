@@ -8,6 +8,7 @@ import numpy as np
 
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.structures import Place, Signal
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
@@ -31,7 +32,7 @@ def reduced_jacobian(
     signal = Signal(np.array([0.0, 1.0]), np.array([0, 1]), nothing)
     loop = catalogue.rhs_loop(windows.formulation)
     equations = model.system.called(windows.formulation, "")
-    buffer = np.empty(catalogue.problem_size(n, len(model.inputs)))
+    buffer = np.empty(scratch_end(n, len(model.inputs)))
     place, columns = Place(0.0, 0, window), []
     for j in range(dim):
         step = 1e-6 * max(1.0, abs(y[j]))

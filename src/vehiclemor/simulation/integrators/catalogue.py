@@ -13,6 +13,7 @@ from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
+from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.structures import Control
 
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
@@ -275,17 +276,11 @@ def time_loop(chosen: Integrator, formulation: str, fused: bool) -> Loop:
     return loops(modules, ("integrate",))["integrate"]
 
 
-def problem_size(n: int, inputs: int) -> int:
-    """Floats of scratch space that `loop.on_span` needs, for n states."""
-    half = n // 2
-    return 3 * n + inputs + 2 * half * (half + 1)
-
-
 def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, fused: bool) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs."""
     squares = chosen.fused_squares if fused else chosen.squares
     own = chosen.rows * dim + squares * dim * dim + 3 * inputs + chosen.numbers
-    return problem_size(n, inputs) + own
+    return scratch_end(n, inputs) + own
 
 
 FORMULATIONS = ("inputs", "full", "vehicle_frame", "state", "coordinates")
