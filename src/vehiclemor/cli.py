@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,21 +14,21 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from vehiclemor import __version__, api
-from vehiclemor.errors import InputError, VehiclemorError
+from vehiclemor.errors import InputError, MachineError, VehiclemorError, machine_reason
 
 if TYPE_CHECKING:
     import xarray as xr
     from rich.progress import TaskID
 
-# Exit statuses: 0 done, 1 a published bound is missed or a simulation failed, 2 wrong input,
-# 130 interrupted.
-MISSED, FAILED, WRONG_INPUT, INTERRUPTED = 1, 1, 2, 130
+MISSED, FAILED, WRONG_INPUT, STOPPED = 1, 1, 2, 128
+HELP = """Benchmark suite for model order reduction of multibody vehicle models.
 
-app = App(
-    name="vehiclemor",
-    version=__version__,
-    help="Benchmark suite for model order reduction of multibody vehicle models.",
-)
+Exit status: 0 done; 1 a published bound is missed, a simulation has failed, cells of a study have
+the status error, or the machine has failed (no space, no memory, a killed worker); 2 wrong input;
+130 or 143 stopped by Ctrl-C or SIGTERM.
+"""
+
+app = App(name="vehiclemor", version=__version__, help=HELP, suppress_keyboard_interrupt=False)
 
 
 @app.command(name="list")
@@ -288,19 +290,48 @@ def cite() -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; wrong input is one line on standard error and exit status 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that can't show a name must not end a study.
+            stream.reconfigure(errors="backslashreplace")
     try:
-        status = app(given, exit_on_error=False, print_error=False, result_action="return_value")
+        with _stopped_by_sigterm():
+            status = app(
+                given, exit_on_error=False, print_error=False, result_action="return_value"
+            )
+    except MachineError as error:
+        return _failed(str(error), FAILED)
     except (CycloptsError, VehiclemorError) as error:
-        print("vehiclemor: " + " ".join(str(error).split()), file=sys.stderr)
-        return WRONG_INPUT
-    except KeyboardInterrupt:
-        text = "vehiclemor: interrupted; finished cells are stored, run again to resume"
-        print(text, file=sys.stderr)
-        return INTERRUPTED
+        return _failed(str(error), WRONG_INPUT)
+    except KeyboardInterrupt as stop:
+        number = stop.args[0] if stop.args else signal.SIGINT
+        text = "stopped; finished cells of a study are stored, run again to resume"
+        return _failed(text, STOPPED + number)
     except BrokenPipeError:
         sys.stderr.close()
         return 0
+    except (MemoryError, OSError) as error:
+        return _failed(machine_reason(error) or str(error), FAILED)
     return int(status or 0)
+
+
+def _failed(text: str, status: int) -> int:
+    print("vehiclemor: " + " ".join(text.split()), file=sys.stderr)
+    return status
+
+
+@contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end the program as Ctrl-C does: workers ended, partial files removed."""
+
+    def stop(number: int, _: object) -> None:
+        raise KeyboardInterrupt(number)
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 if __name__ == "__main__":
