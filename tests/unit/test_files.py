@@ -47,9 +47,8 @@ def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
     def full(_: Path) -> None:
         raise OSError(28, "No space left on device")
 
-    with pytest.raises(
-        MachineError, match=r"file\.txt: can't be written \(No space left on device\)"
-    ):
+    line = r"file\.txt: can't be written \(No space left on device\)"
+    with pytest.raises(MachineError, match=line):
         write_whole(tmp_path / "file.txt", full)
 
 

@@ -7,6 +7,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -32,8 +33,8 @@ Progress = Callable[[str, int, int], None]
 Groups = Sequence[Sequence[Experiment]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
-# Groups that wait for a worker, so that none is idle; those of a large study are not all sent.
-WAITING = 4
+# Groups sent for each worker, so that none is idle; more would not fit into its queue.
+WAITING = 2
 KILLED = "a worker process was killed, perhaps for lack of memory"
 _LOG = logging.getLogger("vehiclemor")
 
@@ -154,6 +155,8 @@ def evaluated_by_workers(
 
     from joblib.externals.loky import get_reusable_executor
 
+    # A system without `pgrep` makes the pool say so, at length, when it ends workers.
+    warnings.filterwarnings("ignore", "Failed to kill subprocesses")
     # Without the empty value a worker that crashes would print where each of its threads was.
     pool = get_reusable_executor(
         jobs, initializer=begin, initargs=(os.getpid(),), env={"PYTHONFAULTHANDLER": ""}
