@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FACTS = ROOT / "paper" / "facts.json"
-# [source: variable, label, label, ...]
+# [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")
 # What an expression may call; everything else is arithmetic.
 FUNCTIONS: dict[str, Callable] = {
@@ -43,7 +43,7 @@ PREDICTIVE = {
     "predictive": (["model", "method"], "method"),
     "outside": (["model", "method", "scenario"], "outside"),
     "targets": (["model", "item"], "target"),
-    "terms": (["model", "start", "case"], "paper"),
+    "terms": (["model", "method"], "paper"),
 }
 
 
@@ -74,7 +74,7 @@ def selected(dataset: xr.Dataset, query: str) -> xr.DataArray:
     """A variable at labels, each a `label` of one dimension or `dimension=number`."""
     import numpy as np
 
-    variable, *labels = [part.strip() for part in query.split(",")]
+    variable, *labels = [part.strip() for part in query.split(";")]
     array = dataset[variable]
     for label in labels:
         name, _, value = label.rpartition("=")
@@ -105,6 +105,10 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         return cost_table(model, folder).set_index(["start", "case"]).to_xarray()
     if kind == "operations":
         return operation_table(model).set_index("kernel").to_xarray()
+    if kind == "benchmark":
+        rows = json.loads((folder / "benchmark.json").read_text(encoding="utf-8"))["benchmarks"]
+        values = {_benchmark(row["fullname"]): row["stats"] | row["extra_info"] for row in rows}
+        return pd.DataFrame.from_dict(values, "index").rename_axis("name").to_xarray()
     if kind == "published":
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
@@ -116,6 +120,11 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     return run_studies(source, folder, jobs)[source]
 
 
+def _benchmark(name: str) -> str:
+    """`benchmarks/test_MODEL.py::test_WHAT[CASE]` as `MODEL WHAT CASE`."""
+    return " ".join(re.split(r"/test_|\.py::test_|[\[\]]", name)[1:]).strip()
+
+
 def stored_files(source: str, folder: Path) -> list[Path]:
     """Files that a source is read from; none for what the package itself tells."""
     from vehiclemor.registry import names
@@ -123,6 +132,8 @@ def stored_files(source: str, folder: Path) -> list[Path]:
     kind, _, model = source.partition(" ")
     if kind in ("operations", "published"):
         return []
+    if kind == "benchmark":
+        return [folder / "benchmark.json"]
     studies = [source]
     if kind == "costs":
         studies = [f"timing-{model}"]
@@ -135,14 +146,15 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
     """What gave the numbers of a source, and when."""
     from vehiclemor.study.provenance import machine, versions
 
-    commands = {"costs": "compare", "published": "compare", "operations": "figures"}
     kind = source.partition(" ")[0]
-    command = commands.get(kind, "compare predictive" if kind in PREDICTIVE else f"run {source}")
+    commands = {"costs": "vehiclemor compare", "benchmark": "tox -e bench", "published": ""}
+    commands |= dict.fromkeys(PREDICTIVE, "vehiclemor compare predictive")
+    commands["operations"] = "python paper/regenerate.py"
     written = max((path.stat().st_mtime for path in files), default=None)
     when = datetime.now(UTC) if written is None else datetime.fromtimestamp(written, UTC)
     return {
         "results": source,
-        "command": f"vehiclemor {command}",
+        "command": commands.get(kind, f"vehiclemor run {source}"),
         "date": when.date().isoformat(),
         "commit": _commit(),
         "kernels": str(dataset.attrs.get("kernel_hash", "")),
