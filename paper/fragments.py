@@ -78,6 +78,14 @@ def printed_numbers(declared: Manifest) -> Iterator[Printed]:
 
 
 def only_match(file: str, text: str, fragment: str) -> re.Match[str]:
+    """Where a fragment stands in a text, which has it once."""
+    found = matches(text, fragment)
+    if len(found) != 1:
+        raise VehiclemorError(f"{file} has {len(found)} times, not once: {fragment.strip()!r}")
+    return found[0]
+
+
+def matches(text: str, fragment: str) -> list[re.Match[str]]:
     """Where a fragment stands in a text, whatever its numbers and its line ends are."""
     words: list[str] = []
     end = 0
@@ -85,10 +93,7 @@ def only_match(file: str, text: str, fragment: str) -> re.Match[str]:
     for place in PLACE.finditer(fragment):
         words += [_flexible(fragment[end : place.start()]), PRINTED]
         end = place.end()
-    matches = list(re.finditer("".join([*words, _flexible(fragment[end:])]), text))
-    if len(matches) != 1:
-        raise VehiclemorError(f"{file} has {len(matches)} times, not once: {fragment!r}")
-    return matches[0]
+    return list(re.finditer("".join([*words, _flexible(fragment[end:])]), text))
 
 
 def _flexible(words: str) -> str:
@@ -114,7 +119,7 @@ def uncovered(declared: Manifest, file: str) -> list[str]:
     spans = [number.span for number in printed_numbers(declared) if number.file == file]
     for part in declared.verbatim:
         if part.file == file:
-            spans += [only_match(file, text, words).span() for words in part.texts]
+            spans += [match.span() for words in part.texts for match in matches(text, words)]
     spans += [code.span() for code in UNREAD.finditer(text)]
     return [
         f"{file}, line {text.count(chr(10), 0, match.start()) + 1}: {match[0]}"
