@@ -3,8 +3,8 @@
 Usage: python paper/facts.py [--results DIR] [--jobs N] [--stored]
 
 `paper/numbers.toml` gives each number as an expression over results.  This script runs the studies
-that the results folder lacks, keeps the values in `paper/facts.json`, and writes them into the texts.
-With --stored it takes only what the folder holds; other numbers stay, and it says which.
+that the results folder lacks, keeps the values in `paper/facts.json`, and writes them into the
+texts.  With --stored it takes only what the folder holds; other numbers stay, and it says which.
 """
 
 from __future__ import annotations
@@ -171,7 +171,8 @@ def _commit() -> str:
 
     def answer(*arguments: str) -> str:
         command = [git, "-C", str(ROOT), *arguments, "--", "src", "data"]
-        return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+        run = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - fixed words
+        return run.stdout.strip()
 
     return answer("log", "-1", "--format=%h") + ("+" if answer("status", "--porcelain") else "")
 

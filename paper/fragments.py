@@ -1,4 +1,4 @@
-"""Where numbers stand in README and handbook: fragments of the texts, declared in `numbers.toml`."""
+"""Where numbers stand in README and handbook: fragments that `numbers.toml` declares."""
 
 from __future__ import annotations
 
