@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 
 class VehiclemorError(Exception):
@@ -25,7 +26,17 @@ class UnreachableError(VehiclemorError):
 
 
 class ConvergenceError(VehiclemorError):
-    """An iteration did not converge, or met a value that is not finite."""
+    """An iteration did not converge, or met a value that is not finite.
+
+    Attributes
+    ----------
+    trajectory
+        The run as far as it went, with its counts; None if there is none.
+    """
+
+    def __init__(self, message: str, trajectory: Any = None) -> None:
+        super().__init__(message)
+        self.trajectory = trajectory
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
