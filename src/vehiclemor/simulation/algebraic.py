@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -131,11 +132,13 @@ class AlgebraicModel(Model):
             )
         return float(reached[0])
 
-    @property
+    @cached_property
     def _mechanism(self) -> newton_loops.Mechanism:
         stops = self.definition.stops
         largest = np.array([stops.get(name, np.inf) for name in self.coordinates])
-        return newton_loops.Mechanism(self.design, largest, self.constants)
+        jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
+        orientation = int(np.linalg.slogdet(jacobian).sign)
+        return newton_loops.Mechanism(self.design, largest, self.constants, orientation)
 
     def _buffer(self) -> np.ndarray:
         n = len(self.coordinates)

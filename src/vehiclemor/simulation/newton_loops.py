@@ -3,9 +3,10 @@
 Every entry returns why it has stopped, and writes the sample at which to `Solution.counts`.
 
 A solution is on the branch of the design position if it is joined to it by steps of the inputs in
-each of which Newton's method contracts: while the second correction is at most a quarter of the
-first, the solution is the only one near, and the Jacobian regular up to there (Newton-Kantorovich;
-P. Deuflhard, Newton Methods for Nonlinear Problems, 2011, sections 2.1 and 5.1).
+each of which Newton's method contracts: then it is the only one near, and the Jacobian is regular
+on the way (Newton-Kantorovich; P. Deuflhard, Newton Methods for Nonlinear Problems, 2011, sections
+2.1 and 5.1).  The first two corrections only estimate that.  Beside a fold they can be small by
+chance, so that the sign of the Jacobian's determinant is looked at too, but where they are tiny.
 """
 
 import math
@@ -16,8 +17,10 @@ from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector,
 CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)
 # Places of the counts; behind them the sample at which a loop has stopped.
 ITERATIONS, RESIDUALS, JACOBIANS, LINEAR_SOLVES, SAMPLE = range(5)
-# Largest ratio of the first two corrections of an iteration that stays on the branch.
-CONTRACTION = 0.25
+# Largest first correction (rad or m), and largest ratio of the second to it, on the branch.
+CORRECTION, CONTRACTION = 0.1, 1.0 / 16.0
+# A second correction (rad or m) below which the iteration can't have crossed a fold.
+CERTAIN = 1e-5
 # Substeps that an increment is cut into at most; beyond, any mechanism is torn apart.
 MOST_SUBSTEPS = 1e4
 # Sizes that the compiler knows: coordinates, inputs.
@@ -56,11 +59,14 @@ class Mechanism(NamedTuple):
         Largest magnitude (N,) of each coordinate.
     constants
         Of the kernels.
+    orientation
+        Sign of the Jacobian's determinant at the design position: it changes at a fold.
     """
 
     start: Vector
     stops: Vector
     constants: Vector
+    orientation: Int
 
 
 class Work(NamedTuple):
@@ -161,16 +167,21 @@ def stopped(counts, iterations, jacobians, status):
 def small_solve(a, r):
     """Solve the leading r x r block of a for column N by elimination with partial pivoting.
 
-    The solution replaces column N.  False if a pivot is zero or not finite.
+    The solution replaces column N.  Gives the sign of the determinant, zero if a pivot is zero or
+    not finite.
     """
+    sign = 1
     for k in range(r):
         pivot = k
         for i in range(k + 1, r):
             if abs(a[i, k]) > abs(a[pivot, k]):
                 pivot = i
         if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
-            return False
+            return 0
+        if a[pivot, k] < 0.0:
+            sign = -sign
         if pivot != k:
+            sign = -sign
             for j in range(k, r):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
             a[k, N], a[pivot, N] = a[pivot, N], a[k, N]
@@ -185,12 +196,13 @@ def small_solve(a, r):
         for j in range(k + 1, r):
             total -= a[k, j] * a[j, N]
         a[k, N] = total / a[k, k]
-    return True
+    return sign
 
 
-def newton(q, u, constants, dense, iteration, work):
+def newton(q, u, mechanism, dense, iteration, work):
     """Newton's method from q, which it changes: its iterations, negative where it has failed."""
-    step, full, largest = work.step, work.full, 0.0
+    constants, step, full = mechanism.constants, work.step, work.full
+    first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
         if dense:
             residual_jacobian(q, u, constants, full)
@@ -203,11 +215,19 @@ def newton(q, u, constants, dense, iteration, work):
         for i in range(N):
             q[i] -= step[i]
         if all_below(step, N, iteration.tolerance):
-            return count
+            if second <= CERTAIN:
+                return count
+            residual_jacobian(q, u, constants, full)
+            same = small_solve(full, N) == mechanism.orientation
+            return count + 1 if same else -count - 1
         if count == 1:
-            largest = largest_of(step)
-        elif count == 2 and not all_below(step, N, CONTRACTION * largest):
-            return -count
+            first = largest_of(step)
+            if not first <= CORRECTION:
+                return -count
+        elif count == 2:
+            second = largest_of(step)
+            if not second <= CONTRACTION * first:
+                return -count
     return -iteration.limit
 
 
@@ -228,7 +248,7 @@ def moved(q, u, place, target, mechanism, dense, iteration, work):
         u[place] = target
         if abs(target - before) > length:
             u[place] = before + math.copysign(length, target - before)
-        taken = newton(q, u, mechanism.constants, dense, iteration, work)
+        taken = newton(q, u, mechanism, dense, iteration, work)
         iterations += abs(taken)
         if taken > 0 and within(q, mechanism.stops):
             length = min(2.0 * length, iteration.largest_increment)
@@ -298,7 +318,7 @@ def newton_path(
         for substep in range(1, substeps + 1):
             for i in range(INPUTS):
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
-            taken = newton(q, u, mechanism.constants, dense, iteration, work)
+            taken = newton(q, u, mechanism, dense, iteration, work)
             iterations += abs(taken)
             if taken < 0:
                 taken = approach(q, u, target, mechanism, dense, iteration, work)
