@@ -3,6 +3,7 @@
 from vehiclemor.codegen.loop_types import Int, Matrix, Vector, matrix, vector
 from vehiclemor.simulation.newton_loops import (
     CONVERGED,
+    CORRECTION,
     INPUTS,
     OFF_BRANCH,
     SAMPLE,
@@ -21,15 +22,15 @@ from vehiclemor.simulation.newton_loops import (
     stopped,
 )
 
-# Largest ratio of two corrections: on the branch, simplified iterations contract by half.
+# Largest ratio of the first two corrections: the same inverse across a fold can't contract.
 CHORD_CONTRACTION = 0.5
 INLINED = ("chord",)
 
 
 def chord(q, u, constants, inverse, iteration, step, phi):
     """Simplified iteration from q, which it changes: evaluations, negative where it has failed."""
-    before = 0.0
-    for count in range(iteration.limit):
+    bound = CORRECTION
+    for count in range(1, iteration.limit + 1):
         residual(q, u, constants, phi)
         for i in range(N):
             step[i] = 0.0
@@ -39,10 +40,12 @@ def chord(q, u, constants, inverse, iteration, step, phi):
         for i in range(N):
             q[i] -= step[i]
         if all_below(step, N, iteration.tolerance):
-            return count + 1
-        if count > 0 and not all_below(step, N, CHORD_CONTRACTION * before):
-            return -1 - count
-        before = largest_of(step)
+            return count
+        if count <= 2:
+            largest = largest_of(step)
+            if not largest <= bound:
+                return -count
+            bound = CHORD_CONTRACTION * largest
     return -iteration.limit
 
 
