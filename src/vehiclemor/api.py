@@ -54,6 +54,31 @@ def studies() -> dict[str, str]:
     return {name: read_toml(study_path(name), StudyFile).title for name in data_names("studies")}
 
 
+def describe(
+    name: str,
+    parameters: Mapping[str, object] | None = None,
+    parameter_file: str | Path | None = None,
+) -> dict[str, object]:
+    """What a model, method, maneuver or study declares; lists of dictionaries are tables.
+
+    Parameters
+    ----------
+    name
+        Registered name, name or TOML file of a study, or `study-schema`, `protocol-schema`,
+        `parameter-schema` for the keys of such a file.
+    parameters, parameter_file
+        As of `model()`.
+
+    Raises
+    ------
+    VehiclemorError
+        If nothing has that name, or a parameter is wrong.
+    """
+    from vehiclemor.report.description.describe import description
+
+    return description(name, parameters, Path(parameter_file) if parameter_file else None)
+
+
 def model(
     name: str,
     parameters: Mapping[str, object] | None = None,
@@ -210,9 +235,11 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     Returns
     -------
     pandas.DataFrame
-        Of `paper` the columns model, item, published, reproduced, unit, floor, replay, verdict
-        (`met`, `missed` or `not_comparable`), reason; those of the others are described at
-        `predictive_comparison` and `model_comparison` in `vehiclemor.report`.
+        Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
+        floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
+        that the paper doesn't have), measure, reason, threshold_source; described at
+        `comparison.rows.Row`, those of the others at `predictive_comparison` and
+        `model_comparison` in `vehiclemor.report`.
     """
     from vehiclemor.report.comparison.kinds import comparison
 

@@ -58,7 +58,7 @@ def test_two_processes_give_the_same_dataset(study, uninterrupted, tmp_path):
 
 
 def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_path):
-    command = [sys.executable, "-m", "vehiclemor.cli", "run", str(study), "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "vehiclemor", "run", str(study), "--out", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True)
     cells = tmp_path / "cells"
     deadline = time.monotonic() + 120

@@ -11,6 +11,7 @@ import numpy as np
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import DESIGN_START
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
@@ -29,9 +30,6 @@ LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_dense", "chord")
-# A mechanism without forces has no equilibrium to find: the name stands for its design position,
-# so that studies can name the same start for every kind of model.
-START = "equilibrium"
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -52,7 +50,7 @@ class AlgebraicModel(Model):
     @property
     def design(self) -> np.ndarray:
         """Coordinates (n,) at the design position, where all inputs are zero."""
-        return self.initial[START]
+        return self.initial[DESIGN_START]
 
     def start(self, name: Start | None = None) -> np.ndarray:
         """Coordinates (n,) at the design position, whose name is the only start.
@@ -64,7 +62,7 @@ class AlgebraicModel(Model):
         """
         if not isinstance(name, str | None):
             raise InputError(
-                f"{self.name} starts from its {START} alone: where it is follows from its inputs"
+                f"{self.name} starts from {DESIGN_START!r} alone: its inputs say where it is"
             )
         return super().start(name)
 

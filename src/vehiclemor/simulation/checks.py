@@ -172,13 +172,5 @@ def lifted_wheels(
 
 
 def loop_array(values: Any) -> np.ndarray:
-    """Floats in the one kind of array that the loops are compiled for.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If there is more to a value than a real number, or less.
-    """
-    if np.ma.isMaskedArray(values) or np.iscomplexobj(values):
-        raise TypeError("masked or complex values")
+    """Floats in the one kind of array that the loops are compiled for."""
     return np.require(values, float, ("C", "A", "W"))

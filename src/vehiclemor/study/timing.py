@@ -20,14 +20,14 @@ from vehiclemor.models.report import TimingCase
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.run_timer import repeated
+from vehiclemor.simulation.run_timer import CLOCK, repeated
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.scenario import Scenario, start_of
-from vehiclemor.study.store import prepare_folder, stored
+from vehiclemor.study.store import stored
 from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
@@ -70,7 +70,6 @@ def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: s
         parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    prepare_folder(folder)
     return stored_timing(folder, name, [content, CASE_ROUNDS], every_start)
 
 
@@ -78,7 +77,7 @@ def stored_timing(
     folder: Path, name: str, content: object, make: Callable[[], xr.Dataset]
 ) -> xr.Dataset:
     """What the file `studies/<name>.nc` holds for this content and machine, or else is made."""
-    text = json.dumps([content, machine(), REPEATS])
+    text = json.dumps([content, machine(), REPEATS, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     return stored(folder / "studies" / f"{name}.nc", "timing", key, make)
 

@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.errors import ConvergenceError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.settings import OnlineSettings, Settings, Tolerance, one_of
+from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
@@ -32,7 +33,7 @@ class AlgebraicSettings(Settings):
 class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
-    solver: Annotated[str, one_of(tuple(INTEGRATORS))] = Field(
+    solver: Annotated[str, OneOf(tuple(INTEGRATORS))] = Field(
         "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
         "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "
@@ -60,8 +61,14 @@ class FullOrderModel:
         return len(self.model.coordinates)
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Full-order trajectory at the maneuver's output times."""
-        return self.model.simulate(maneuver, start, solver=self.solver, tolerance=self.tolerance)
+        """Full-order trajectory at the maneuver's output times; it may have diverged."""
+        how = {"solver": self.solver, "tolerance": self.tolerance}
+        try:
+            return self.model.simulate(maneuver, start, **how)
+        except ConvergenceError as error:
+            if error.trajectory is None:
+                raise
+            return error.trajectory
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""

@@ -1,0 +1,45 @@
+"""`vehiclemor compare`: numbers side by side, judged."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from vehiclemor import api
+from vehiclemor.cli.exit_status import MISSED
+
+
+def compare(
+    what: str = "paper",
+    *,
+    json_output: Annotated[bool, Parameter(name="--json", negative="")] = False,
+    out: Path = api.RESULTS,
+    jobs: int = 1,
+) -> int:
+    """Set published numbers beside reproduced ones, or reduced models beside full order.
+
+    Exit status 1 if a bound is missed; what can't be compared, since the machine was too busy or
+    the start is ours, counts neither way.
+
+    Parameters
+    ----------
+    what
+        The comparison: paper (published beside reproduced), predictive (reduced models on inputs
+        that they have not seen), or the name of a model (every method that fits it).
+    json_output
+        Print JSON.
+    out
+        Results folder; studies and timings that are missing are run first.
+    jobs
+        Number of processes for missing studies.
+    """
+    rows = api.compare(what, out, jobs)
+    if json_output:
+        print(rows.to_json(orient="records", indent=2))
+    else:
+        from vehiclemor.report.comparison.kinds import comparison_text
+
+        print(comparison_text(what, rows, out))
+    # The comparison of a model judges nothing that was published.
+    judged = what in ("paper", "predictive")
+    return MISSED if judged and "missed" in set(rows["verdict"]) else 0

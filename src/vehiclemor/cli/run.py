@@ -1,0 +1,32 @@
+"""`vehiclemor run`: a study, resumed where an earlier run stopped."""
+
+import time
+from pathlib import Path
+
+from vehiclemor import api
+from vehiclemor.cli.progress import progress_of_cells
+
+
+def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
+    """Run a study; what an earlier run has finished is not computed again.
+
+    Parameters
+    ----------
+    study
+        Name of a study or collection, or a TOML file.
+    jobs
+        Number of processes.
+    out
+        Results folder.
+    """
+    from vehiclemor.study.run import run_studies
+
+    began = time.perf_counter()
+    with progress_of_cells() as progress:
+        results = run_studies(study, out, jobs, progress)
+    for name, dataset in results.items():
+        statuses = [str(status) for status in dataset["status"].values.ravel()]
+        counted = ", ".join(f"{statuses.count(s)} {s}" for s in sorted(set(statuses)))
+        print(f"{name}: {counted}; {out / 'studies' / (name + '.nc')}")
+    print(f"{time.perf_counter() - began:.1f} s")
+    return 0
