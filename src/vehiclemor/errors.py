@@ -1,7 +1,8 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class VehiclemorError(Exception):
@@ -26,6 +27,25 @@ class UnreachableError(VehiclemorError):
 
 class ConvergenceError(VehiclemorError):
     """An iteration did not converge, or met a value that is not finite."""
+
+
+def one_line(error: BaseException) -> str:
+    """Kind and text of an error in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+
+
+@contextmanager
+def blamed(whose: str) -> Iterator[None]:
+    """Turn what the code of a plug-in raises into one line that names it.
+
+    What the user can mend and what the machine does (files, memory) passes.
+    """
+    try:
+        yield
+    except (VehiclemorError, OSError, MemoryError):
+        raise
+    except Exception as error:
+        raise InputError(f"{whose}: {one_line(error)}") from error
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

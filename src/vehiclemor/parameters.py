@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import field_validator
 
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import FileSchema, read_toml
@@ -167,14 +168,12 @@ def load_parameters(
 
 def _number_or_list(value: object, name: str) -> float | list[float]:
     try:
-        if isinstance(value, bool):
-            raise TypeError
-        array = np.array(value, dtype=float)
-        return [float(component) for component in array] if array.ndim else float(array)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"parameter {name}: {value!r} is not a number or list of numbers"
-        ) from None
+        array = real_array(value)
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.ndim > 1:
+        raise InputError(f"parameter {name}: {quoted(value)} is not a number or list of numbers")
+    return array.tolist()
 
 
 def _check_value(

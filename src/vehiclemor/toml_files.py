@@ -31,6 +31,8 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 def _parsed(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise FileError(f"{path}: tables or lists are nested too deeply") from None
     except FileNotFoundError:
         raise FileError(f"{path}: no such file") from None
     except OSError as error:

@@ -29,7 +29,7 @@ def plug_in(tmp_path, monkeypatch):
         ("def fit(:", "SyntaxError"),
         ("raise RuntimeError('at import')", "RuntimeError: at import"),
         ("import no_such_package", "no_such_package"),
-        ("summary = 'half'", "has no reference"),
+        ("summary = 'half'", "is of type module: it must be a Method"),
     ],
 )
 def test_a_broken_plug_in_is_named_and_harmless(plug_in, text, words):

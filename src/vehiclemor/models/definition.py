@@ -90,7 +90,8 @@ class ModelDefinition:
     error_scale
         State -> magnitude in its unit below which its errors count absolutely, 1 by default.
     validity
-        Output -> (smallest, largest) value in its unit at which the model means anything.
+        Output or input -> (smallest, largest) value in its unit at which the model means anything.
+        A run that leaves that of an output has diverged, an input beyond its own is refused.
     loads
         Outputs that are zero where a wheel has left the road.
     report
@@ -156,10 +157,22 @@ class ModelDefinition:
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself, so that a plug-in's author reads one clear line."""
+        if not isinstance(self.name, str) or not isinstance(self.summary, str):
+            raise InputError("name and summary of a model must be text")
         if self.kind not in KINDS:
             raise InputError(
                 f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"
             )
+        for kind in ("coordinates", "speeds", "inputs", "outputs"):
+            quantities = getattr(self, kind)
+            if not all(isinstance(quantity, Quantity) for quantity in quantities):
+                raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
+            names = [quantity.name for quantity in quantities]
+            if len(set(names)) != len(names) or not (names or kind == "speeds"):
+                raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
+        for name, declared in self.parameters.items():
+            if not isinstance(declared, Declared):
+                raise InputError(f"model {self.name!r}: parameter {name!r} is not declared by a unit")
         needed = "design_coordinates" if self.kind == "ae" else "starts"
         if getattr(self, needed) is _unset:
             raise InputError(f"model {self.name!r} of kind {self.kind} declares no {needed}")
@@ -177,7 +190,7 @@ class ModelDefinition:
         self._known("planar", self.planar, self.states)
         self._known("heading_pairs", (n for pair in self.heading_pairs for n in pair), self.states)
         self._known("error_scale", self.error_scale, self.states)
-        self._known("validity", self.validity, outputs)
+        self._known("validity", self.validity, outputs | {q.name for q in self.inputs})
         self._known("loads", self.loads, outputs)
         shown = (*report.outputs, *report.printed_outputs, *report.settings_outputs)
         self._known("report", (*shown, *report.bounds), outputs)

@@ -61,7 +61,7 @@ class ReducedSystem:
 
     def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
         """Path of the reduced states."""
-        check_inputs(maneuver, self.model.name, self.model.inputs)
+        check_inputs(maneuver, self.model.definition)
         state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
         how = Solver(self.solver, self.tolerance, times)
         return self.system.run(maneuver, state, self.spaces, how)

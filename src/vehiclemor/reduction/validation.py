@@ -12,9 +12,18 @@ from vehiclemor.registry import unknown
 
 
 def validated(
-    method: Method, kind: str, given: Mapping[str, object], preset: str = "recommended"
+    method: Method,
+    kind: str,
+    given: Mapping[str, object],
+    preset: str = "recommended",
+    coordinates: int | None = None,
 ) -> Any:
     """All settings of a method: those given, else those of the preset, else the defaults.
+
+    Parameters
+    ----------
+    coordinates
+        Number of the model's coordinates: a rank that is not given is at most that.
 
     Returns
     -------
@@ -27,14 +36,19 @@ def validated(
         If a name is not declared, or a value has the wrong kind or is out of bounds.
     """
     presets = method.presets_of(kind)
-    if preset not in presets:
+    if not isinstance(preset, str) or preset not in presets:
         raise unknown(f"preset of {method.name}", preset, presets)
     declared = method.settings.get(kind, Settings)
     for name in given:
         if name not in declared.model_fields:
             raise unknown(f"setting of {method.name}", name, declared.model_fields)
+    chosen = dict(presets[preset])
+    if coordinates is not None and "rank" in declared.model_fields:
+        rank = chosen.get("rank", declared.model_fields["rank"].default)
+        if isinstance(rank, int) and rank > coordinates:
+            chosen["rank"] = coordinates
     try:
-        return declared.model_validate({**presets[preset], **given})
+        return declared.model_validate(chosen | dict(given))
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(f"{method.name}: {first['loc'][0]} {_wrong(first)}") from None
@@ -57,6 +71,7 @@ def _wrong(error: Any) -> str:
         "greater_than_equal": lambda: f"is {value:g}; it must be at least {limits['ge']:g}",
         "greater_than": lambda: f"is {value:g}; it must be above {limits['gt']:g}",
         "less_than_equal": lambda: f"is {value:g}; it must be at most {limits['le']:g}",
+        "less_than": lambda: f"is {value:g}; it must be below {limits['lt']:g}",
         "int_type": lambda: f"is {value!r}, not an integer",
         "float_type": lambda: f"is {value!r}, not a number",
         "string_type": lambda: f"is {value!r}; allowed: text",

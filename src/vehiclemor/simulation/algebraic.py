@@ -119,7 +119,7 @@ class AlgebraicModel(Model):
         ConvergenceError
             If an iteration fails; time and reachable range are named.
         """
-        check_inputs(maneuver, self.name, self.inputs)
+        check_inputs(maneuver, self.definition)
         self.start(start)
         times = output_times(times, maneuver, repeats=True)
         return self.solve_path(

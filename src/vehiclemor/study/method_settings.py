@@ -31,7 +31,8 @@ def complete_settings(
     method: Method = component("method", method_name)
     if not method.accepts(model)[0]:
         return {}
-    return validated(method, model.kind, given or {}, preset).model_dump()
+    coordinates = len(model.coordinates)
+    return validated(method, model.kind, given or {}, preset, coordinates).model_dump()
 
 
 def for_method(model: Model, method_name: str, settings: Settings) -> Any:

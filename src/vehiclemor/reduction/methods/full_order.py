@@ -8,7 +8,7 @@ from pydantic import Field
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.settings import OnlineSettings, Settings, Tolerance, one_of
+from vehiclemor.reduction.settings import OnlineSettings, Settings, StepTolerance, Tolerance, one_of
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
@@ -24,9 +24,7 @@ class AlgebraicSettings(Settings):
         description="newton: fresh Jacobians; newton_dense: without the generated elimination; "
         "chord: constant inverse and predictor",
     )
-    tolerance: float = Field(
-        NEWTON_TOLERANCE, gt=0.0, description="largest step of the last iteration"
-    )
+    tolerance: StepTolerance = NEWTON_TOLERANCE
 
 
 class DynamicSettings(OnlineSettings):

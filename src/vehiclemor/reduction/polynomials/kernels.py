@@ -103,7 +103,7 @@ def checked_inputs(model: AlgebraicModel, maneuver: Maneuver) -> np.ndarray:
     InputError
         If the maneuver's inputs are not the model's, or one isn't finite.
     """
-    check_inputs(maneuver, model.name, model.inputs)
+    check_inputs(maneuver, model.definition)
     times = maneuver.times
     inputs = loop_array(maneuver.at(times))
     bad = np.argwhere(~np.isfinite(inputs))

@@ -1,10 +1,10 @@
 """Study files: the grid of a study declared in TOML, validated on loading."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
@@ -19,9 +19,16 @@ MOST_CELLS = 1_000_000
 class Span(FileSchema):
     """Equidistant values, both ends included."""
 
-    first: float
-    last: float
+    first: float = Field(allow_inf_nan=False)
+    last: float = Field(allow_inf_nan=False)
     count: int = Field(ge=1, le=10_000)
+
+
+# Told apart by their form, so that what is wrong with one is not read as the other.
+Axis = Annotated[
+    Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
+    Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
+]
 
 
 class MethodEntry(FileSchema):
@@ -49,7 +56,7 @@ class StudyFile(FileSchema):
     training: str = "matched"
     training_set: list[list[float]] = Field(default_factory=list)
     keep: Literal["trajectories", "metrics"] = "trajectories"
-    grid: dict[str, list[int | float | str] | Span] = Field(default_factory=dict)
+    grid: dict[str, Axis] = Field(default_factory=dict)
     methods: list[MethodEntry] = Field(default_factory=list)
 
     @property
@@ -66,13 +73,12 @@ class StudyFile(FileSchema):
 
     @field_validator("grid")
     @classmethod
-    def _not_empty(
-        cls, value: dict[str, list[int | float | str] | Span]
-    ) -> dict[str, list[int | float | str] | Span]:
+    def _not_empty(cls, value: dict[str, Axis]) -> dict[str, Axis]:
         for name, entry in value.items():
-            if isinstance(entry, list) and not entry:
+            points = values(entry)
+            if not points:
                 raise ValueError(f"{name} has no values")
-            if isinstance(entry, list) and len(set(entry)) != len(entry):
+            if len(set(points)) != len(points):
                 raise ValueError(f"{name} has the same value twice")
         return value
 
@@ -91,6 +97,10 @@ class StudyFile(FileSchema):
         doubles = {label for label in labels if labels.count(label) > 1}
         if doubles:
             raise ValueError(f"label {sorted(doubles)[0]!r} is used twice")
+        for entry in self.methods:
+            for name in self.grid.keys() & entry.settings.keys():
+                method = entry.label or entry.method
+                raise ValueError(f"{name} is set twice: in the grid and in the settings of {method}")
         size = len(self.methods)
         for entry in self.grid.values():
             size *= len(values(entry))
@@ -99,7 +109,7 @@ class StudyFile(FileSchema):
         return self
 
 
-def values(entry: list[int | float | str] | Span) -> list[int | float | str]:
+def values(entry: Axis) -> list[int | float | str]:
     """Values of one grid entry."""
     if isinstance(entry, Span):
         # Rounded, so that 1.1 is 1.1 and a grid holds the nominal point exactly.
