@@ -172,7 +172,9 @@ class ModelDefinition:
                 raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
         for name, declared in self.parameters.items():
             if not isinstance(declared, Declared):
-                raise InputError(f"model {self.name!r}: parameter {name!r} is not declared by a unit")
+                raise InputError(
+                    f"model {self.name!r}: parameter {name!r} is not declared by a unit"
+                )
         needed = "design_coordinates" if self.kind == "ae" else "starts"
         if getattr(self, needed) is _unset:
             raise InputError(f"model {self.name!r} of kind {self.kind} declares no {needed}")

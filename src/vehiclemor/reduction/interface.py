@@ -121,7 +121,9 @@ class Method:
         with blamed(f"method {self.name!r}: settings"):
             wrong = [kind for kind, s in self.settings.items() if not issubclass(s, Settings)]
         if wrong:
-            raise InputError(f"method {self.name!r}: settings of {wrong[0]} are no class of Settings")
+            raise InputError(
+                f"method {self.name!r}: settings of {wrong[0]} are no class of Settings"
+            )
         with blamed(f"method {self.name!r}: presets"):
             for kind, presets in self.presets.items():
                 for preset, name in ((p, n) for p, values in presets.items() for n in values):

@@ -64,7 +64,11 @@ StepTolerance = Annotated[
 ]
 Tolerance = Annotated[
     float,
-    Field(ge=1e-13, le=LARGEST_TOLERANCE, description="largest local error of a state relative to its typical size"),
+    Field(
+        ge=1e-13,
+        le=LARGEST_TOLERANCE,
+        description="largest local error of a state relative to its typical size",
+    ),
 ]
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.arguments import real_array
 from vehiclemor.codegen.derivation import Derivation, derivation
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
-from vehiclemor.arguments import real_array
 from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.models.definition import ModelDefinition, Values
 from vehiclemor.parameters import ParameterSet, load_parameters

@@ -53,7 +53,7 @@ def check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
     values = maneuver.at(times)
     for name, (low, high) in bounded.items():
         column = values[:, names.index(name)]
-        outside = np.flatnonzero((column < low) | (column > high))
+        outside = np.flatnonzero(np.isfinite(column) & ((column < low) | (column > high)))
         if len(outside):
             sample, unit = outside[0], units[name]
             raise InputError(
@@ -72,6 +72,9 @@ def check_resolved(maneuver: Maneuver) -> None:
     step = times[1]
     values = maneuver.at(times)
     inside = maneuver.at(times[:-1] + between * step)
+    # What is not finite is found, with its time, by whoever solves it.
+    if not (np.isfinite(values).all() and np.isfinite(inside).all()):
+        return
     off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])
     everywhere = np.concatenate([values, inside])
     wrong = off > 0.25 * (everywhere.max(axis=0) - everywhere.min(axis=0))

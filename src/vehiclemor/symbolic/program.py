@@ -140,7 +140,9 @@ def _sympified(name: str, expressions: Sequence[object], shape: tuple[int, ...])
     if len(found) != math.prod(shape):
         raise ValueError(f"{name} has {len(found)} results, its shape {shape} another number")
     for expression in found:
-        if not isinstance(expression, sp.Expr) or expression.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
+        if not isinstance(expression, sp.Expr) or expression.has(
+            sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I
+        ):
             raise ValueError(f"{name}: {expression} is no real number")
     return found
 

@@ -100,7 +100,9 @@ class StudyFile(FileSchema):
         for entry in self.methods:
             for name in self.grid.keys() & entry.settings.keys():
                 method = entry.label or entry.method
-                raise ValueError(f"{name} is set twice: in the grid and in the settings of {method}")
+                raise ValueError(
+                    f"{name} is set twice: in the grid and in the settings of {method}"
+                )
         size = len(self.methods)
         for entry in self.grid.values():
             size *= len(values(entry))
