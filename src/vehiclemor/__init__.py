@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vehiclemor.api import compare as compare
+    from vehiclemor.api import describe as describe
     from vehiclemor.api import figures as figures
     from vehiclemor.api import maneuvers as maneuvers
     from vehiclemor.api import methods as methods
@@ -22,6 +23,7 @@ __version__ = "0.1.0"
 __all__ = [
     "VehiclemorError",
     "compare",
+    "describe",
     "figures",
     "maneuvers",
     "methods",

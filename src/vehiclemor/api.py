@@ -58,6 +58,31 @@ def studies() -> dict[str, str]:
     return {name: read_toml(study_path(name), StudyFile).title for name in data_names("studies")}
 
 
+def describe(
+    name: str,
+    parameters: Mapping[str, object] | None = None,
+    parameter_file: str | Path | None = None,
+) -> dict[str, object]:
+    """What a model, method, maneuver or study declares; lists of dictionaries are tables.
+
+    Parameters
+    ----------
+    name
+        Registered name, name or TOML file of a study, or `study-schema`, `protocol-schema`,
+        `parameter-schema` for the keys of such a file.
+    parameters, parameter_file
+        As of `model()`.
+
+    Raises
+    ------
+    VehiclemorError
+        If nothing has that name, or a parameter is wrong.
+    """
+    from vehiclemor.report.description.describe import description
+
+    return description(name, parameters, Path(parameter_file) if parameter_file else None)
+
+
 def model(
     name: str,
     parameters: Mapping[str, object] | None = None,

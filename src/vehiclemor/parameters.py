@@ -107,6 +107,11 @@ class ParameterSet:
         return np.concatenate([np.atleast_1d(self[name]) for name in self.entries])
 
 
+def parameter_path(model: str) -> Path:
+    """File with the package's own public data for a model."""
+    return data_folder() / "parameters" / f"{model}.toml"
+
+
 def load_parameters(
     model: str,
     expected: Mapping[str, Declared],
@@ -133,7 +138,7 @@ def load_parameters(
     InputError
         If an override names no parameter or has a wrong shape or value.
     """
-    path = path or data_folder() / "parameters" / f"{model}.toml"
+    path = path or parameter_path(model)
     content = read_toml(path, ParameterFile)
     if content.model != model:
         raise FileError(f"{path}: parameters of model {content.model!r}, not of {model!r}")

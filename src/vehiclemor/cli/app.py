@@ -12,6 +12,7 @@ from vehiclemor.cli.exit_status import INTERRUPTED, WRONG_INPUT
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.run import run
+from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
 from vehiclemor.errors import VehiclemorError
 
@@ -21,7 +22,7 @@ app = App(
     help="Benchmark suite for model order reduction of multibody vehicle models.",
 )
 app.command(list_components, name="list")
-for command in (simulate, run, compare, figures, cite):
+for command in (show, simulate, run, compare, figures, cite):
     app.command(command)
 
 

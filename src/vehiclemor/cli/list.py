@@ -1,11 +1,16 @@
 """`vehiclemor list`: what is registered."""
 
 import json
+import shutil
+import textwrap
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from vehiclemor import api
+
+# A longer name has a line of its own.
+LONGEST = 30
 
 
 def list_components(
@@ -27,9 +32,15 @@ def list_components(
     if json_output:
         print(json.dumps(found if what is None else found[what], indent=2))
         return 0
+    # A table of rich would take a tenth of the time of this command.
+    width = shutil.get_terminal_size().columns
     for kind, entries in found.items():
         print(f"{kind}:")
-        width = max(len(name) for name in entries)
+        column = min(max(map(len, entries)), LONGEST) + 4
         for name, summary in entries.items():
-            print(f"  {name:<{width}}  {summary}")
+            lines = textwrap.wrap(summary, width - column) or [""]
+            beside = [] if len(name) > LONGEST else [f"  {name}".ljust(column) + lines.pop(0)]
+            print("\n".join([*(beside or [f"  {name}"]), *(" " * column + li for li in lines)]))
+        print()
+    print("vehiclemor show NAME says more of each; vehiclemor show study-schema: your own study.")
     return 0

@@ -16,7 +16,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
-from vehiclemor.codegen.object_cache import fetched
+from vehiclemor.codegen.object_cache import cache_folder, fetched
 from vehiclemor.codegen.sources import source_digest
 
 if TYPE_CHECKING:
@@ -59,13 +59,22 @@ class Derivation:
 
 def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
     """The derivation of a model: from disk, or made by `derive` and written there."""
-    parts = [source_digest(LAYERS, (), (derive,)), name, f"sympy {version('sympy')}"]
-    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
     def make() -> bytes:
         return json.dumps(asdict(derived(derive()))).encode()
 
-    return _read(fetched(f"derivations/{name}_{digest}.json", make))
+    return _read(fetched(_file(name, derive), make))
+
+
+def is_derived(name: str, derive: Callable[[], Program]) -> bool:
+    """Whether the derivation of a model is on disk."""
+    return (cache_folder() / _file(name, derive)).exists()
+
+
+def _file(name: str, derive: Callable[[], Program]) -> str:
+    parts = [source_digest(LAYERS, (), (derive,)), name, f"sympy {version('sympy')}"]
+    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+    return f"derivations/{name}_{digest}.json"
 
 
 def derived(program: Program) -> Derivation:

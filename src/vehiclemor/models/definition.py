@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 # Algebraic equations; ordinary differential equations; those with constraints.
 KINDS = ("ae", "ode", "dae")
+# A mechanism without forces has no equilibrium to find: the name stands for its design position,
+# so that studies can name the same start for every kind of model.
+DESIGN_START = "equilibrium"
 # Values of the parameters by name: scalars as floats, points as arrays (3,).
 Values = Mapping[str, Any]
 # Values of the solved parameters, state (2 n,), inputs -> time derivative (2 n,) of the state.

@@ -10,6 +10,7 @@ import numpy as np
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import DESIGN_START
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import check_inputs, check_positive, output_times
@@ -24,9 +25,6 @@ LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_dense", "chord")
-# A mechanism without forces has no equilibrium to find: the name stands for its design position,
-# so that studies can name the same start for every kind of model.
-START = "equilibrium"
 # Rack displacements at which the limits of travel are found; between them the tighter ones count.
 RACKS_OF_REACH = 9
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -46,7 +44,7 @@ class AlgebraicModel(Model):
     @property
     def design(self) -> np.ndarray:
         """Coordinates (n,) at the design position, where all inputs are zero."""
-        return self.initial[START]
+        return self.initial[DESIGN_START]
 
     def residual(self, q: Any, u: Any) -> np.ndarray:
         """Residual Phi(q; u), shape (n,)."""

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.arguments import real_array
-from vehiclemor.codegen.derivation import Derivation, derivation
+from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
-from vehiclemor.models.definition import ModelDefinition, Values
+from vehiclemor.models.definition import DESIGN_START, ModelDefinition, Values
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -62,18 +62,26 @@ def build(
     return make(definition, parameters)
 
 
+def build_derived(name: str) -> Model | None:
+    """A model that was derived before; deriving one takes long where it is only described."""
+    definition: ModelDefinition = component("model", name)
+    return build(name) if is_derived(name, definition.derive) else None
+
+
 def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> AlgebraicModel:
     """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
     # Imported here: a model of one kind needs nothing of the other.
-    from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, START, AlgebraicModel
+    from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
 
     with blamed(f"model {definition.name!r}: design_coordinates"):
         design = real_array(definition.design_coordinates(parameters.values()))
     equations, digest = compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
     check_equations(definition, equations)
-    _check_states(definition, {START: design})
+    _check_states(definition, {DESIGN_START: design})
     constants = hoisted_constants(equations, parameters, [])
-    model = AlgebraicModel(definition, equations, parameters, digest, constants, {START: design})
+    model = AlgebraicModel(
+        definition, equations, parameters, digest, constants, {DESIGN_START: design}
+    )
     nothing = np.zeros(len(model.inputs))
     gap = float(np.abs(model.residual(design, nothing)).max())
     if not gap < CLOSED:

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.settings import OnlineSettings, Settings, StepTolerance, Tolerance, one_of
+from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
@@ -30,7 +30,7 @@ class AlgebraicSettings(Settings):
 class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
-    solver: Annotated[str, one_of(tuple(INTEGRATORS))] = Field(
+    solver: Annotated[str, OneOf(tuple(INTEGRATORS))] = Field(
         "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
         "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "

@@ -1,5 +1,6 @@
 """Study files: the grid of a study declared in TOML, validated on loading."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -34,10 +35,12 @@ Axis = Annotated[
 class MethodEntry(FileSchema):
     """One method of a study: settings that differ from a preset, under a label of its own."""
 
-    method: str
-    label: str = ""
-    preset: str = "recommended"
-    settings: dict[str, int | float | str] = Field(default_factory=dict)
+    method: str = Field(description="registered name")
+    label: str = Field("", description="name of its results; the method's by default")
+    preset: str = Field("recommended", description="preset that its settings differ from")
+    settings: dict[str, int | float | str] = Field(
+        default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
+    )
 
 
 class StudyFile(FileSchema):
@@ -47,22 +50,47 @@ class StudyFile(FileSchema):
     `study/plans/protocol.py`).
     """
 
-    title: str
-    studies: list[str] = Field(default_factory=list)
-    protocols: list[str] = Field(default_factory=list)
-    model: str = ""
-    maneuver: str = ""
-    start: list[str] = Field(default_factory=list)
-    training: str = "matched"
-    training_set: list[list[float]] = Field(default_factory=list)
-    keep: Literal["trajectories", "metrics"] = "trajectories"
-    grid: dict[str, Axis] = Field(default_factory=dict)
-    methods: list[MethodEntry] = Field(default_factory=list)
+    title: str = Field(description="one line")
+    studies: list[str] = Field(
+        default_factory=list, description="of a collection: names of studies, or TOML files"
+    )
+    protocols: list[str] = Field(
+        default_factory=list, description="names of protocols, or TOML files: see protocol-schema"
+    )
+    model: str = Field("", description="registered name; needed for a grid")
+    maneuver: str = Field("", description="registered name; the model's own by default")
+    start: list[str] = Field(
+        default_factory=list, description="initial conditions; the model's first by default"
+    )
+    training: str = Field(
+        "matched",
+        description="input that is trained on: matched (the tested one), nominal (factors 1), set",
+    )
+    training_set: list[list[float]] = Field(
+        default_factory=list,
+        description="of training = set: pairs [frequency factor, amplitude factor]",
+    )
+    keep: Literal["trajectories", "metrics"] = Field(
+        "trajectories", description="histories and errors, or errors alone"
+    )
+    grid: dict[str, Axis] = Field(
+        default_factory=dict,
+        description="dimension -> values; frequency_factor, amplitude_factor, or any setting",
+    )
+    methods: list[MethodEntry] = Field(
+        default_factory=list, description="each is run at every point of the grid"
+    )
 
     @property
     def labelled(self) -> dict[str, MethodEntry]:
         """Label -> method of the study."""
         return {entry.label or entry.method: entry for entry in self.methods}
+
+    @property
+    def cells(self) -> int:
+        """Number of points of the grid, times starts and methods."""
+        sizes = (len(values(entry)) for entry in self.grid.values())
+        return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
 
     @field_validator("training_set")
     @classmethod
@@ -103,11 +131,8 @@ class StudyFile(FileSchema):
                 raise ValueError(
                     f"{name} is set twice: in the grid and in the settings of {method}"
                 )
-        size = len(self.methods)
-        for entry in self.grid.values():
-            size *= len(values(entry))
-        if size > MOST_CELLS:
-            raise ValueError(f"the grid has {size} cells, more than {MOST_CELLS}")
+        if self.cells > MOST_CELLS:
+            raise ValueError(f"the grid has {self.cells} cells, more than {MOST_CELLS}")
         return self
 
 

@@ -1,0 +1,38 @@
+"""Tables on the terminal: as wide as that is, 80 columns where there is none."""
+
+from collections.abc import Mapping, Sequence
+
+
+def print_table(rows: Sequence[Mapping[str, object]]) -> None:
+    """Print rows with the same keys, which are the headings; empty columns are left out.
+
+    The first column is never wrapped, and columns of numbers are aligned right.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    headings = [h for h in rows[0] if any(row[h] not in ("", None, [], {}) for row in rows)]
+    for heading in headings:
+        numbers = all(isinstance(row[heading], int | float) for row in rows)
+        table.add_column(
+            heading,
+            justify="right" if numbers else "left",
+            overflow="fold",
+            no_wrap=heading == headings[0],
+        )
+    for row in rows:
+        table.add_row(*(_text(row[heading]) for heading in headings))
+    console = Console(highlight=False, markup=False)
+    with console.capture() as captured:
+        console.print(table)
+    print("\n".join(line.rstrip() for line in captured.get().splitlines()))
+
+
+def _text(value: object) -> str:
+    """A number with six digits; nothing for what is missing."""
+    if isinstance(value, list):
+        return ", ".join(map(_text, value))
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "" if value is None else str(value)

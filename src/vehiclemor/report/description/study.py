@@ -1,0 +1,61 @@
+"""A study: what it runs, and how many cells its grid has."""
+
+from vehiclemor.registry import component
+from vehiclemor.study.plans.protocol import SETS
+from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.study.plans.study_file import (
+    StudyFile,
+    load_studies,
+    named_file,
+    study_path,
+    values,
+)
+from vehiclemor.toml_files import read_toml
+
+
+def study_description(name: str) -> dict[str, object]:
+    """Grid and methods of a study, its members if it is a collection, or its protocols."""
+    path = study_path(name)
+    study = read_toml(path, StudyFile)
+    head = {"study": path.stem, "summary": study.title, "file": str(path)}
+    if study.studies:
+        rows = [
+            {"study": member, "cells": content.cells, "summary": content.title}
+            for member, content in load_studies(name).items()
+        ]
+        return {**head, "cells": sum(row["cells"] for row in rows), "studies": rows}
+    if study.protocols:
+        return head | {f"protocol {name}": _protocol(name) for name in study.protocols}
+    grid = {key: values(entry) for key, entry in study.grid.items()}
+    return {
+        **head,
+        "model": study.model,
+        "maneuver": study.maneuver or component("model", study.model).maneuver,
+        "starts": study.start or ["the model's first"],
+        "training": study.training,
+        "cells": study.cells,
+        "keeps": study.keep,
+        "grid": [
+            {"dimension": key, "values": ", ".join(map(str, entry))} for key, entry in grid.items()
+        ],
+        "methods": [
+            {
+                "label": label,
+                "method": entry.method,
+                "preset": entry.preset,
+                "settings": ", ".join(f"{k}={v}" for k, v in entry.settings.items()),
+            }
+            for label, entry in study.labelled.items()
+        ],
+    }
+
+
+def _protocol(name: str) -> dict[str, object]:
+    """What a protocol trains, chooses by and tests; scenarios are counted."""
+    protocol = read_toml(named_file("protocol", "protocols", name), ProtocolFile)
+    counted = {s: sum(g.scenarios for g in getattr(protocol, s)) for s in SETS}
+    return {
+        "model": protocol.model,
+        "runs": [f"{count} {purpose}" for purpose, count in counted.items()],
+        "contestants": [entry.label for entry in protocol.contestants],
+    }
