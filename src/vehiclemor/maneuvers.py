@@ -7,6 +7,7 @@ import numpy as np
 
 from vehiclemor.arguments import count, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed
+from vehiclemor.short_repr import ShortRepr
 
 # Bounds far beyond anything that is meant.  A maneuver that is a thousand times slower does not
 # begin within its run, one that is a thousand times faster is over between two output times.
@@ -16,7 +17,7 @@ MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
-class Maneuver:
+class Maneuver(ShortRepr):
     """Inputs u(t) of a model over a fixed duration.
 
     Attributes
@@ -41,6 +42,8 @@ class Maneuver:
     InputError
         If it contradicts this, or its functions give anything else when they are called.
     """
+
+    repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
 
     name: str
     summary: str

@@ -12,6 +12,7 @@ from pydantic import field_validator
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # No road vehicle has a part farther than this from its origin (m).
@@ -80,7 +81,7 @@ class ParameterFile(FileSchema):
 
 
 @dataclass(frozen=True)
-class ParameterSet:
+class ParameterSet(ShortRepr):
     """Validated parameters of one model, SI units.
 
     Attributes

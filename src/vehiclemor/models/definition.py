@@ -14,6 +14,7 @@ from vehiclemor.errors import InputError, did_you_mean
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.models.report import ModelReport, completed
 from vehiclemor.parameters import Declared
+from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -43,7 +44,7 @@ def _unset(values: Values) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ModelDefinition:
+class ModelDefinition(ShortRepr):
     """Declaration of a model; its entry point names an instance.
 
     It holds no symbols: `derive` imports what it needs when it is called, so that a model that was
@@ -118,6 +119,8 @@ class ModelDefinition:
     right side of the stabilised constraints on q'') and `violations` (c x 2: constraints and their
     rates).
     """
+
+    repr_fields = ("name", "kind", "summary")
 
     name: str
     kind: str

@@ -15,6 +15,7 @@ from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -77,7 +78,7 @@ def fits_all(model: Model, settings: Any) -> None:
 
 
 @dataclass(frozen=True)
-class Method:
+class Method(ShortRepr):
     """A reduction method.
 
     Attributes
@@ -100,6 +101,8 @@ class Method:
         Kind of model -> name of a preset -> values that differ from the defaults.  The preset
         `recommended` is the defaults where it isn't named.
     """
+
+    repr_fields = ("name", "summary", "reference")
 
     name: str
     summary: str

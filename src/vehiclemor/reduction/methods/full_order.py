@@ -10,6 +10,7 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
 from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.model import Model
@@ -44,7 +45,7 @@ def _strongest(solver: str, tolerance: float) -> Presets:
 
 
 @dataclass(frozen=True)
-class FullOrderModel:
+class FullOrderModel(ShortRepr):
     """The full-order model behind the interface of a reduced model."""
 
     model: Model

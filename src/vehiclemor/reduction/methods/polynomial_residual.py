@@ -30,6 +30,7 @@ from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, p
 from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -62,7 +63,7 @@ class PolynomialResidualSettings(Settings):
 
 
 @dataclass(frozen=True)
-class PolynomialResidualModel:
+class PolynomialResidualModel(ShortRepr):
     """Polynomial reduced equations g(x) = response^T (u - u_mean).
 
     Attributes
