@@ -39,7 +39,8 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise FileError(f"{path}: can't be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise FileError(f"{path}: not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
+    # A number of thousands of digits is no TOML error, but no number either; nor is "\0" a path.
+    except ValueError as error:
         raise FileError(f"{path}: not a valid TOML file: {error}") from None
 
 

@@ -1,14 +1,19 @@
-"""The border where settings come in: one clear line for whatever is wrong with them."""
+"""The border of methods: settings that come in, and what a fit and its runs give back."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
+from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.interface import Method
+from vehiclemor.maneuvers import Maneuver
+from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.registry import unknown
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import STATUSES, Trajectory
 
 
 def validated(
@@ -52,6 +57,39 @@ def validated(
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(f"{method.name}: {first['loc'][0]} {_wrong(first)}") from None
+
+
+def checked_fit(method: str, reduced: Any) -> Any:
+    """A reduced model; `TypeError` if what `fit` gave is none."""
+    for name in ("simulate", "best_approximation", "offline", "effective_rank"):
+        if not hasattr(reduced, name):
+            raise TypeError(f"method {method!r}: fit gives {quoted(reduced)}, which has no {name}")
+    if not isinstance(reduced.offline, Offline):
+        raise TypeError(f"method {method!r}: offline is {quoted(reduced.offline)}, no Offline")
+    if not isinstance(reduced.effective_rank, int | np.integer):
+        rank = quoted(reduced.effective_rank)
+        raise TypeError(f"method {method!r}: effective_rank is {rank}, no whole number")
+    return reduced
+
+
+def checked_run(model: Model, maneuver: Maneuver, reduced: Any, run: Any) -> Trajectory:
+    """A trajectory at the output times; `TypeError` if what `simulate` gave is none."""
+    whose = f"{type(reduced).__module__}.{type(reduced).__name__}: simulate gives"
+    if not isinstance(run, Trajectory):
+        raise TypeError(f"{whose} {quoted(run)}, no Trajectory")
+    samples = maneuver.samples
+    for name in ("coordinates", "speeds", "outputs"):
+        shape = (samples, len(getattr(model, name)))
+        found = np.asarray(getattr(run, name))
+        if found.shape != shape or found.dtype != float:
+            raise TypeError(f"{whose} {name} {found.shape} of {found.dtype}, not {shape} of floats")
+    if np.shape(run.time) != (samples,):
+        raise TypeError(f"{whose} {np.size(run.time)} times, not the {samples} of the maneuver")
+    if run.status not in STATUSES or not isinstance(run.seconds, float | int):
+        raise TypeError(f"{whose} status {run.status!r} and seconds {quoted(run.seconds)}")
+    if not isinstance(run.counts, Mapping):
+        raise TypeError(f"{whose} counts {quoted(run.counts)}, not numbers by name")
+    return run
 
 
 def parsed(text: str) -> object:

@@ -138,6 +138,8 @@ def _some_fits(model: Model, cells: list[Experiment]) -> None:
             method.check(model, for_method(model, cell.method, cell.settings))
         except InputError as error:
             first = first or error
+        except Exception:  # noqa: BLE001 - a plug-in's bug is a result of its own cells
+            return
         else:
             return
     if first is not None:
