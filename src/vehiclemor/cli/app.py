@@ -3,11 +3,12 @@
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
+from vehiclemor.cli.conversion import strict
 from vehiclemor.cli.exit_status import INTERRUPTED, WRONG_INPUT
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
@@ -20,6 +21,7 @@ app = App(
     name="vehiclemor",
     version=__version__,
     help="Benchmark suite for model order reduction of multibody vehicle models.",
+    default_parameter=Parameter(converter=strict),
 )
 app.command(list_components, name="list")
 for command in (show, simulate, run, compare, figures, cite):

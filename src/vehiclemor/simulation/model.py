@@ -130,7 +130,7 @@ class Model(ShortRepr):
         """
         if not isinstance(name, str | None):
             return self._state(name, "start").copy()
-        name = name or self.starts[0]
+        name = self.starts[0] if name is None else name
         if name not in self.initial:
             raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")
         return self.initial[name].copy()
