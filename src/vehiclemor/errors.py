@@ -1,12 +1,20 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
+import errno
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+# What of the system's errors is the machine's doing, whoever has asked for it.
+MACHINE_ERRORS = {
+    getattr(errno, name)
+    for name in ("ENOSPC", "EDQUOT", "EIO", "ENOMEM", "EMFILE", "ENFILE")
+    if hasattr(errno, name)
+}
+
 
 class VehiclemorError(Exception):
-    """Base of all errors that reach a user as one line and exit status 2."""
+    """Base of all errors that reach a user as one line; exit status 2 if not said otherwise."""
 
 
 class InputError(VehiclemorError):
@@ -15,6 +23,13 @@ class InputError(VehiclemorError):
 
 class FileError(VehiclemorError):
     """A file is missing, unreadable, foreign or can't be written."""
+
+
+class MachineError(VehiclemorError):
+    """The machine has failed, not the input: no space, no memory, a killed process.
+
+    Never a result: what it has spoiled is computed again.  Exit status 1.
+    """
 
 
 class GeometryError(VehiclemorError):
@@ -29,6 +44,15 @@ class ConvergenceError(VehiclemorError):
     """An iteration did not converge, or met a value that is not finite."""
 
 
+def machine_reason(error: BaseException) -> str:
+    """What has failed, if an exception is the machine's doing; else empty."""
+    if isinstance(error, MemoryError):
+        return " ".join(f"not enough memory {error}".split())
+    if isinstance(error, OSError) and error.errno in MACHINE_ERRORS:
+        return f"{error.strerror}"
+    return ""
+
+
 def one_line(error: BaseException) -> str:
     """Kind and text of an error in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
@@ -38,13 +62,15 @@ def one_line(error: BaseException) -> str:
 def blamed(whose: str) -> Iterator[None]:
     """Turn what the code of a plug-in raises into one line that names it.
 
-    What the user can mend and what the machine does (files, memory) passes.
+    What the user can mend and what the machine does passes.
     """
     try:
         yield
-    except (VehiclemorError, OSError, MemoryError):
+    except VehiclemorError:
         raise
     except Exception as error:
+        if machine_reason(error):
+            raise
         raise InputError(f"{whose}: {one_line(error)}") from error
 
 
