@@ -1,7 +1,5 @@
 """Broken plug-ins: named, and harmless to everything else."""
 
-import importlib
-import sys
 from importlib.metadata import EntryPoint
 
 import numpy as np
@@ -16,12 +14,14 @@ from vehiclemor.errors import InputError
 def plug_in(tmp_path, monkeypatch):
     """Register a module text as a method, beside the built-ins."""
 
-    def register(name, text):
-        (tmp_path / f"{name}_module.py").write_text(text)
+    def register(name, text, attribute=""):
+        # A name of its own in each test: what was imported before stays imported.
+        module = f"{name}_{tmp_path.name}"
+        (tmp_path / f"{module}.py").write_text(text)
         monkeypatch.syspath_prepend(tmp_path)
-        entry = EntryPoint(name, f"{name}_module", registry.GROUPS["method"])
-        known = registry._entries("method")
-        monkeypatch.setattr(registry, "_entries", {"method": {**known, name: entry}}.__getitem__)
+        known = {kind: dict(registry._entries(kind)) for kind in registry.GROUPS}
+        known["method"][name] = EntryPoint(name, f"{module}{attribute}", registry.GROUPS["method"])
+        monkeypatch.setattr(registry, "_entries", known.__getitem__)
 
     return register
 
@@ -84,14 +84,8 @@ method = "replay"
 
 @pytest.fixture
 def faulty(plug_in):
-    """A method whose text ends in a change; its module is new each time."""
-
-    def register(change):
-        sys.modules.pop("faulty_module", None)
-        plug_in("faulty", f"{REPLAY}{change}\n")
-        importlib.invalidate_caches()
-
-    return register
+    """A method whose text ends in a change."""
+    return lambda change: plug_in("faulty", f"{REPLAY}{change}\n", ":METHOD")
 
 
 @pytest.mark.parametrize(
