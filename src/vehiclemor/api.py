@@ -213,8 +213,10 @@ def run_study(
     """
     from vehiclemor.study.plans.grid_results import flattened
     from vehiclemor.study.run import run_studies
+    from vehiclemor.study.workers import listening
 
-    results = run_studies(study, Path(out), jobs, progress)
+    with listening(progress):
+        results = run_studies(study, Path(out), jobs)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
 
 

@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import MISSED
+from vehiclemor.cli.progress import progress_of_cells
 
 
 def compare(
@@ -32,7 +33,8 @@ def compare(
     jobs
         Number of processes for missing studies.
     """
-    rows = api.compare(what, out, jobs)
+    with progress_of_cells():
+        rows = api.compare(what, out, jobs)
     if json_output:
         print(rows.to_json(orient="records", indent=2))
     else:

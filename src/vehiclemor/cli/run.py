@@ -10,6 +10,8 @@ from vehiclemor.cli.progress import progress_of_cells
 def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     """Run a study; what an earlier run has finished is not computed again.
 
+    A cell that stands at several points of the grid is computed once.
+
     Parameters
     ----------
     study
@@ -22,11 +24,11 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     from vehiclemor.study.run import run_studies
 
     began = time.perf_counter()
-    with progress_of_cells() as progress:
-        results = run_studies(study, out, jobs, progress)
+    with progress_of_cells():
+        results = run_studies(study, out, jobs)
     for name, dataset in results.items():
         statuses = [str(status) for status in dataset["status"].values.ravel()]
         counted = ", ".join(f"{statuses.count(s)} {s}" for s in sorted(set(statuses)))
-        print(f"{name}: {counted}; {out / 'studies' / (name + '.nc')}")
+        print(f"{name}: {len(statuses)} grid points: {counted}; {out / 'studies' / (name + '.nc')}")
     print(f"{time.perf_counter() - began:.1f} s")
     return 0

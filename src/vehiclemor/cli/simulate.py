@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,10 +11,18 @@ from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
+from vehiclemor.cli.key_values import key_values
+from vehiclemor.cli.picture import picture_file
+from vehiclemor.cli.table import print_table, print_wrapped
 from vehiclemor.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from vehiclemor.simulation.model import Model
+
+RESERVED = {"frequency", "amplitude", "maneuver", "start", "preset", "training", "training_set"}
+FLOOR = "floor: RMS error of the projection onto the same subspaces, the best in the states"
 
 
 def simulate(
@@ -27,8 +36,11 @@ def simulate(
     start: str | None = None,
     preset: str = "recommended",
     training: str = "matched",
+    parameter: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     parameters: Path | None = None,
     out: Path | None = None,
+    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")] = None,
+    all_outputs: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Simulate a model with a method; errors are against the full-order solution.
 
@@ -52,27 +64,27 @@ def simulate(
         Preset of the method's settings.
     training
         matched, or nominal (trained on the unperturbed input).
+    parameter
+        name=value: a parameter of the model in SI units, a point as x,y,z; may be given several
+        times.  `vehiclemor show MODEL` has names, units and bounds.
     parameters
         Parameter file; the model's own public data by default.
     out
         netCDF file for the result.
+    plot
+        Draw the result into this file, or into MODEL-METHOD.png here.
+    all_outputs
+        Print errors of every output, not only of those that tables show.
     """
-    from vehiclemor.reduction.validation import parsed
-
-    chosen: dict[str, Any] = {}
-    for setting in settings:
-        key, separator, value = setting.partition("=")
-        if not separator or not key:
-            raise InputError(f"--set {setting!r} is not key=value")
-        if key in chosen:
-            raise InputError(f"--set {key} is given twice")
-        chosen[key] = parsed(value)
+    chosen: dict[str, Any] = key_values("--set", settings)
+    for key in RESERVED & set(chosen):
+        raise InputError(f"--set {key}: not a setting of a method; use --{key}")
+    picture = None
+    if plot is not None:
+        picture = picture_file("--plot", plot, f"{model}-{method}")
     if out is not None:
         _check_writable(out)
-    ready = api.model(model, parameter_file=parameters)
-    reserved = {"frequency", "amplitude", "maneuver", "start", "preset", "training", "training_set"}
-    for key in reserved & set(chosen):
-        raise InputError(f"--set {key}: not a setting of a method; use --{key}")
+    ready = api.model(model, key_values("--parameter", parameter), parameters)
     dataset = api.simulate(
         ready,
         method,
@@ -88,7 +100,14 @@ def simulate(
         from vehiclemor.study.store import write_dataset
 
         write_dataset(dataset, out)
-    _print_simulation(dataset, ready.counts, out)
+    print_errors(dataset, ready, all_outputs)
+    if picture is not None:
+        api.plot(dataset, path=picture)
+    written = [path for path in (out, picture) if path is not None]
+    for path in written:
+        print(f"written: {path}")
+    if not written:
+        print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
@@ -103,18 +122,37 @@ def _check_writable(out: Path) -> None:
         read_dataset(out, "source", "vehiclemor")
 
 
-def _print_simulation(dataset: xr.Dataset, counts: Iterable[str], out: Path | None) -> None:
-    status = dataset["status"].item()
-    print(f"{dataset.attrs['title']}: {status} {dataset['message'].item()}".rstrip())
-    if dataset["remark"].item():
-        print(dataset["remark"].item())
-    print(f"{'output':<20} {'RMS error':>12} {'floor':>12} {'largest':>12} {'range':>12}")
-    for output in dataset["output"].values:
-        row = dataset.sel(output=output)
-        columns = ("rms_error", "floor_rms_error", "max_error", "signal_range")
-        numbers = " ".join(f"{row[name].item():12.3e}" for name in columns)
-        print(f"{output:<20} {numbers} {row['output_unit'].item()}")
-    print(", ".join(f"{name.replace('_', ' ')} {dataset[name].item()}" for name in counts))
-    print(f"seconds in the compiled loop {dataset['seconds'].item():.3e}")
-    if out is not None:
-        print(f"written: {out}")
+def print_errors(dataset: xr.Dataset, model: Model, all_outputs: bool) -> None:
+    """Errors of the outputs against the full-order solution, and what the run has cost."""
+    status, message, remark = (dataset[n].item() for n in ("status", "message", "remark"))
+    print_wrapped(f"{dataset.attrs['title']}: {status} {message}".rstrip())
+    if remark:
+        print_wrapped(remark)
+    shown: Sequence[str] = model.outputs if all_outputs else model.definition.shown.outputs
+    rows = [_row(dataset.sel(output=output)) for output in shown]
+    print_table(rows, digits=3)
+    further = len(model.outputs) - len(shown)
+    counts = ", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in model.counts)
+    seconds = dataset["seconds"]
+    if not all(math.isnan(row["floor"]) for row in rows):
+        print_wrapped(FLOOR)
+    if further:
+        print_wrapped(f"{further} more outputs: --all-outputs")
+    print_wrapped(counts)
+    print_wrapped(f"{seconds.item():.2e} s: {seconds.attrs['long_name']}")
+
+
+def _row(dataset: xr.Dataset) -> dict[str, Any]:
+    """Errors of one output; an error of exactly zero is that of the full-order run itself."""
+    columns = {
+        "RMS error": "rms_error",
+        "floor": "floor_rms_error",
+        "largest error": "max_error",
+        "range": "signal_range",
+    }
+    numbers = {heading: dataset[name].item() or math.nan for heading, name in columns.items()}
+    return {
+        "output": dataset["output"].item(),
+        **numbers,
+        "unit": dataset["output_unit"].item(),
+    }

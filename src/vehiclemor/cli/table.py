@@ -1,12 +1,16 @@
 """Tables on the terminal: as wide as that is, 80 columns where there is none."""
 
+import math
+import shutil
+import textwrap
 from collections.abc import Mapping, Sequence
 
 
-def print_table(rows: Sequence[Mapping[str, object]]) -> None:
+def print_table(rows: Sequence[Mapping[str, object]], digits: int = 6) -> None:
     """Print rows with the same keys, which are the headings; empty columns are left out.
 
-    The first column is never wrapped, and columns of numbers are aligned right.
+    The first column is never wrapped, and columns of numbers are aligned right; a number that is
+    none is a dash.
     """
     from rich.console import Console
     from rich.table import Table
@@ -22,17 +26,22 @@ def print_table(rows: Sequence[Mapping[str, object]]) -> None:
             no_wrap=heading == headings[0],
         )
     for row in rows:
-        table.add_row(*(_text(row[heading]) for heading in headings))
+        table.add_row(*(_text(row[heading], digits) for heading in headings))
     console = Console(highlight=False, markup=False)
     with console.capture() as captured:
         console.print(table)
     print("\n".join(line.rstrip() for line in captured.get().splitlines()))
 
 
-def _text(value: object) -> str:
-    """A number with six digits; nothing for what is missing."""
+def print_wrapped(line: str, indent: str = "") -> None:
+    """Print a line, broken where the terminal ends; what follows is indented."""
+    width = shutil.get_terminal_size().columns
+    print(textwrap.fill(line, width, initial_indent=indent, subsequent_indent=indent + "  "))
+
+
+def _text(value: object, digits: int) -> str:
     if isinstance(value, list):
-        return ", ".join(map(_text, value))
+        return ", ".join(_text(part, digits) for part in value)
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return "-" if math.isnan(value) else f"{value:.{digits}g}"
     return "" if value is None else str(value)

@@ -40,16 +40,6 @@ def validated(
         raise InputError(f"{method.name}: {first['loc'][0]} {_wrong(first)}") from None
 
 
-def parsed(text: str) -> object:
-    """A value from the command line: an integer, a number or text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
-
-
 def _wrong(error: Any) -> str:
     """What is wrong with a value, in the words of this package."""
     value, limits = error["input"], error.get("ctx", {})

@@ -13,15 +13,13 @@ from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.store import cell_path, prepare_folder, stored
-from vehiclemor.study.workers import Progress, Workers
+from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def run_studies(
-    study: str, folder: Path, jobs: int = 1, progress: Progress | None = None
-) -> dict[str, xr.Dataset]:
+def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
     """Run a study, or all studies of a collection, and combine the results.
 
     Parameters
@@ -32,8 +30,6 @@ def run_studies(
         Results folder; cells that it holds already are not computed again.
     jobs
         Number of processes.
-    progress
-        Called with (study, finished cells, all cells).
 
     Returns
     -------
@@ -47,9 +43,9 @@ def run_studies(
     protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
     grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
     prepare_folder(folder)
-    results = {p.study: run_protocol(p, folder, jobs, progress) for p in protocols}
+    results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
     for grid in grids:
-        workers = Workers(grid.name, folder, jobs, progress)
+        workers = Workers(grid.name, folder, jobs)
         workers([[cell] for cell in grid.unique.values()])
         results[grid.name] = stored(
             folder / "studies" / f"{grid.name}.nc",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,20 +16,29 @@ from vehiclemor.study.store import cell_path, read_dataset, write_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
+# Called with (name, finished experiments, all experiments).
 Progress = Callable[[str, int, int], None]
+# Who is told: studies are run deep inside of comparisons and figures too.
+_LISTENER: ContextVar[Progress | None] = ContextVar("progress", default=None)
+
+
+@contextmanager
+def listening(progress: Progress | None) -> Iterator[None]:
+    """Tell a function of the progress of every study that is run inside."""
+    token = _LISTENER.set(progress)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(token)
 
 
 @dataclass
 class Workers:
-    """Evaluates what is missing of some experiments, in so many jobs, and stores it.
-
-    `progress` is called with (name, finished experiments, all experiments).
-    """
+    """Evaluates what is missing of some experiments, in so many jobs, and stores it."""
 
     name: str
     folder: Path
     jobs: int = 1
-    progress: Progress | None = None
     done: int = 0
     total: int = 0
 
@@ -54,8 +65,8 @@ class Workers:
 
     def _report(self, count: int) -> None:
         self.done += count
-        if self.progress:
-            self.progress(self.name, self.done, self.total)
+        if progress := _LISTENER.get():
+            progress(self.name, self.done, self.total)
 
     def _evaluated(self, work: list[list[Experiment]]) -> Iterator[int]:
         # Starting processes costs seconds: a handful of groups is quicker without.
