@@ -26,7 +26,7 @@ class Offline:
     Attributes
     ----------
     seconds
-        Training simulations and fit.
+        CPU time of the process, for training simulations and fit.
     evaluations
         Evaluations of the full model's equations in training simulations.
     """
@@ -38,9 +38,9 @@ class Offline:
 def offline_cost(
     began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0
 ) -> Offline:
-    """Seconds since `began` (`time.perf_counter()`), evaluations of the runs and `further` ones."""
+    """Seconds since `began` (`time.process_time()`), evaluations of the runs and `further` ones."""
     evaluations = sum(run.counts[model.evaluations] for run in runs) + further
-    return Offline(time.perf_counter() - began, evaluations)
+    return Offline(time.process_time() - began, evaluations)
 
 
 class ReducedModel(Protocol):

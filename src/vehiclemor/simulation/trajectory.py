@@ -42,7 +42,7 @@ class Trajectory:
     counts
         Solver counts by name, those of `Model.counts`.
     seconds
-        Time spent in the compiled loop; 0 where nothing was computed.
+        CPU time of the thread in the compiled loop; 0 where nothing was computed.
     status
         One of `STATUSES`; from the failure on, a diverged trajectory is not a number.
     message

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.run_timer import CLOCK
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def trajectory_dataset(
     for name, long_name in model.counts.items():
         attributes = {"units": "1", "long_name": long_name}
         variables[name] = ((), trajectory.counts.get(name, 0), attributes)
-    seconds = {"units": "s", "long_name": "time spent in the compiled loop"}
+    seconds = {"units": "s", "long_name": "time spent in the compiled loop", "clock": CLOCK}
     variables["seconds"] = ((), trajectory.seconds, seconds)
     for name, long_name in (
         ("status", f"one of {', '.join(STATUSES)}"),

@@ -20,7 +20,7 @@ from vehiclemor.models.report import TimingCase
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.run_timer import repeated
+from vehiclemor.simulation.run_timer import CLOCK, repeated
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
@@ -78,7 +78,7 @@ def stored_timing(
     folder: Path, name: str, content: object, make: Callable[[], xr.Dataset]
 ) -> xr.Dataset:
     """What the file `studies/<name>.nc` holds for this content and machine, or else is made."""
-    text = json.dumps([content, machine(), REPEATS])
+    text = json.dumps([content, machine(), REPEATS, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     return stored(folder / "studies" / f"{name}.nc", "timing", key, make)
 

@@ -23,11 +23,12 @@ def variables(found: Mapping[str, object], *dimensions: str) -> dict[str, tuple]
     """Values with unit and meaning, on dimensions and on the quantity that their unit goes with."""
     result: dict[str, tuple] = {}
     for name, values in found.items():
-        unit, meaning = _declared().variables[name]
+        unit, meaning, *clock = _declared().variables[name]
         quantity = unit.removeprefix("see ").removesuffix("_unit")
         own = () if quantity == unit else (quantity,)
-        units = {"units": unit} if unit else {}
-        result[name] = ((*dimensions, *own), values, units | {"long_name": meaning})
+        attributes = ({"units": unit} if unit else {}) | {"long_name": meaning}
+        attributes |= {"clock": clock[0]} if clock else {}
+        result[name] = ((*dimensions, *own), values, attributes)
     return result
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 from pydantic import Field
@@ -30,7 +30,7 @@ class Modal:
 
     def simulate(self, maneuver, start):
         (a, b, c), times, inputs = self.equations, maneuver.times, maneuver.at(maneuver.times)
-        began, step, n = perf_counter(), times[1], len(a)
+        began, step, n = process_time(), times[1], len(a)
         # Exact where inputs are linear between the output times.
         held = np.kron([[0.0, step, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], np.eye(n))
         held[:n, :n] = step * a
@@ -38,7 +38,7 @@ class Modal:
         z = [self.left @ (self.model.start(start) - self.centre)]
         for first, second in pairwise(inputs @ b.T + c):
             z.append(free @ z[-1] + at_start @ first + change @ (second - first))
-        states, seconds = self.centre + np.array(z) @ self.right.T, perf_counter() - began
+        states, seconds = self.centre + np.array(z) @ self.right.T, process_time() - began
         return self.model.trajectory(times, inputs, states, [0] * len(self.model.counts), seconds)
 
     def best_approximation(self, states):
@@ -46,7 +46,7 @@ class Modal:
 
 
 def fit(model, training, settings):
-    began, x, none = perf_counter(), model.start(), np.zeros(len(model.inputs))
+    began, x, none = process_time(), model.start(), np.zeros(len(model.inputs))
     a, rate = model.system.jacobian(x, none), model.derivative(x, none)
     steps = 1e-6 * np.eye(len(none))
     b = np.array([model.derivative(x, s) - model.derivative(x, -s) for s in steps]).T / 2e-6

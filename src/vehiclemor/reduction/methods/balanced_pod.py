@@ -66,7 +66,7 @@ def check(model: DynamicModel, settings: BalancedPodSettings) -> None:
 
 def fit(model: DynamicModel, training: Training, settings: BalancedPodSettings) -> ReducedSystem:
     """Balance the gramians of the training runs and of the linearisation."""
-    began = time.perf_counter()
+    began = time.process_time()
     shape, count = VehicleShape(model), settings.snapshots
     runs = [run.snapshots(count) for run in with_mirrored(training)]
     # Gramians are integrals in time: each snapshot is weighted by its time step.

@@ -65,7 +65,7 @@ def fit(
     model: DynamicModel, training: Training, settings: BalancedTruncationSettings
 ) -> ReducedVehicle:
     """Linearise and balance; no training run is looked at."""
-    began = time.perf_counter()
+    began = time.process_time()
     shape = VehicleShape(model)
     lateral = projected(shape, lateral_modes(shape), settings.rank)
     return linear_vehicle(shape, lateral, settings, began)

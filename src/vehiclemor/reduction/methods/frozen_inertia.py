@@ -28,7 +28,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
     from vehiclemor.models.high_fidelity import frozen_quantities as frozen
     from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
 
-    began = time.perf_counter()
+    began = time.process_time()
     made, constants = frozen_kernels(model)
     encode = frozen_encoder(model)
     names = [quantity.name for quantity in (*frozen.COORDINATES, *frozen.SPEEDS)]
@@ -42,7 +42,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         np.array([i for i, name in enumerate(names) if name not in cyclic]),
         np.zeros(0, dtype=np.int64),
     )
-    cost = Offline(time.perf_counter() - began)
+    cost = Offline(time.process_time() - began)
     return transformed_system(model, system, encode, cost, settings)
 
 

@@ -58,7 +58,7 @@ def fit(model: DynamicModel, training: Training, settings: GlobalPodSettings) ->
     """One POD subspace of all training runs, each over its own duration."""
     from scipy.linalg import null_space
 
-    began = time.perf_counter()
+    began = time.process_time()
     n, count = len(model.coordinates), settings.snapshots
     runs = [run.snapshots(count) for run in with_mirrored(training)]
     start = model.start()

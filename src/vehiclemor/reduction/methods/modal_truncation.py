@@ -65,7 +65,7 @@ def fit(
     model: DynamicModel, training: Training, settings: ModalTruncationSettings
 ) -> ReducedVehicle:
     """Linearise and truncate; no training run is looked at."""
-    began = time.perf_counter()
+    began = time.process_time()
     shape = VehicleShape(model)
     static = settings.static_correction == "yes"
     lateral = truncated(lateral_modes(shape), settings.fastest, static)

@@ -78,7 +78,7 @@ def fit(
     """Project the training runs on their POD basis and fit the operators."""
     if not training:
         raise InputError("operator inference needs training runs")
-    began = time.perf_counter()
+    began = time.process_time()
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     u, deviations, rates, motion = shape_samples(shape, runs)

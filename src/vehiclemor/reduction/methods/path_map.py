@@ -118,7 +118,7 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     InputError
         If the rack moves in training, or the travel takes too few values for the degree.
     """
-    began = time.perf_counter()
+    began = time.process_time()
     degree = settings.degree
     runs = [run.recorded() for run in training]
     inputs = np.concatenate([run.inputs for run in runs])

@@ -181,7 +181,7 @@ def fit(
     InputError
         If the mechanism doesn't move in training.
     """
-    began = time.perf_counter()
+    began = time.process_time()
     count, degree = settings.snapshots, settings.degree
     runs = [run.snapshots(count) for run in training]
     states = np.concatenate([run.coordinates for run in runs])

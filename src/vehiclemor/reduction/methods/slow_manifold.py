@@ -77,7 +77,7 @@ class SlowManifoldSettings(OnlineSettings):
 
 def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
-    began = time.perf_counter()
+    began = time.process_time()
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest)

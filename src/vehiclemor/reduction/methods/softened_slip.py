@@ -56,14 +56,14 @@ def softened(model: DynamicModel, factor: float) -> DynamicModel:
 
 def fit(model: DynamicModel, training: Training, settings: SoftenedSlipSettings) -> ReducedSystem:
     """States of the softened vehicle, outputs of the original; no training run is looked at."""
-    began = time.perf_counter()
+    began = time.process_time()
     soft = softened(model, settings.factor)
     return ReducedSystem(
         model,
         soft.system,
         whole_space(2 * len(model.coordinates)),
         len(model.coordinates),
-        Offline(time.perf_counter() - began),
+        Offline(time.process_time() - began),
         settings.solver,
         settings.tolerance,
         # The full space holds all states.

@@ -84,7 +84,7 @@ def fit_windows(
     model: AlgebraicModel, training: Training, edges: np.ndarray, settings: AlgebraicPodSettings
 ) -> AlgebraicProjection:
     """POD subspaces between edges (windows + 1,) in s, of snapshots as in `dynamic.fit_windows`."""
-    began = time.perf_counter()
+    began = time.process_time()
     count, rank = settings.snapshots, settings.rank
     moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]
     histories = [run.at(np.concatenate(moments)) for run in training]

@@ -116,7 +116,7 @@ def fit_windows(
     if len(durations) > 1:
         lengths = ", ".join(f"{duration:g}" for duration in durations)
         raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
-    began = time.perf_counter()
+    began = time.process_time()
     count, formulation = settings.snapshots, settings.formulation
     moments = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
     # The same time twice, at inner edges, needs one sample.

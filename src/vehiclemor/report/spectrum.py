@@ -1,0 +1,107 @@
+"""Singular values of the paper's subspaces, and the energy that their leading modes hold.
+
+Masoudi, Uchida, McPhee (2015), equations 5 to 8: the eigenvalues l_j of the snapshots' correlation
+matrix are the squares of the singular values in step 3 of section 3, and a subspace of rank r
+leaves out their sum over j > r.  Eigenvalues are those of the snapshots of one control period with
+its mean removed, as step 2 has it, and a share does not depend on how the integral is discretised.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.reduction.methods import pod
+from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.validation import validated
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+PRESETS = ("literal", "recommended")
+# Name -> unit, meaning.
+VARIABLES = {
+    "singular_value": ("1", "singular value over the first one"),
+    "energy": ("1", "share of the eigenvalues' sum that the leading modes hold"),
+    "left_out": ("1", "share that they leave out (equation 8)"),
+}
+
+
+def spectrum(models: Sequence[str]) -> xr.Dataset:
+    """Singular values and energies of every control period of POD, in the nominal run.
+
+    Returns
+    -------
+    xarray.Dataset
+        `singular_value` (over the largest of its control period), `energy` (cumulative share) and
+        `left_out` (1 - energy, without cancellation) on the dimensions `model`, `preset` (`literal`
+        is the paper's: Euclidean, all states; `recommended` has the inner product of the default
+        settings), `window` (control periods from 0 on) and `mode` (from 1 on), NaN where a model
+        has less of them.  Coordinates `rank`, `control_period` (s) and `snapshots` on `model`.
+    """
+    return _side_by_side([_of_model(name) for name in models], "model")
+
+
+def spectrum_table(model: str) -> pd.DataFrame:
+    """One row for each preset and mode.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Of all control periods the median and the largest singular value (over the first of its
+        period), the least energy, and the largest share that is left out.
+    """
+    data = spectrum([model]).squeeze("model", drop=True)
+    values = data["singular_value"]
+    found = {
+        "median_singular_value": values.median("window"),
+        "largest_singular_value": values.max("window"),
+        "least_energy": data["energy"].min("window"),
+        "largest_left_out": data["left_out"].max("window"),
+    }
+    table = data[[]].assign(found).to_dataframe(["preset", "mode"]).reset_index()
+    return table[["preset", "mode", *found]].dropna(ignore_index=True)
+
+
+def _of_model(name: str) -> xr.Dataset:
+    model = build(name)
+    definition = component("model", name)
+    maneuver = component("maneuver", definition.maneuver)
+    training = training_runs(model, maneuver, model.starts[0], "matched")
+    parts = []
+    for preset in PRESETS:
+        settings = validated(pod.METHOD, model.kind, definition.shown.paper_fixed, preset)
+        fitted = pod.fit(model, training, settings)
+        values = np.array([basis.singular_values for basis in fitted.bases])
+        parts.append(_shares(values).assign_coords(preset=preset))
+    chosen = {key: getattr(settings, key) for key in ("rank", "control_period", "snapshots")}
+    return _side_by_side(parts, "preset").assign_coords(model=name, **chosen)
+
+
+def _side_by_side(parts: Sequence[xr.Dataset], dimension: str) -> xr.Dataset:
+    import xarray as xr
+
+    return xr.concat(parts, dimension, coords="different", compat="equals", join="outer")
+
+
+def _shares(values: np.ndarray) -> xr.Dataset:
+    """Spectra of singular values (windows, modes); no share where nothing moves."""
+    import xarray as xr
+
+    squares = values**2
+    with np.errstate(invalid="ignore"):
+        tails = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1] / squares.sum(axis=1, keepdims=True)
+        left_out = np.hstack([tails[:, 1:], 0.0 * tails[:, :1]])
+        found = {"singular_value": values / values[:, :1], "energy": 1.0 - left_out}
+    found["left_out"] = left_out
+    described = {
+        name: (("window", "mode"), found[name], {"units": unit, "long_name": text})
+        for name, (unit, text) in VARIABLES.items()
+    }
+    places = {"window": np.arange(len(values)), "mode": np.arange(1, values.shape[1] + 1)}
+    return xr.Dataset(described, places)
