@@ -15,11 +15,13 @@ from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
 from vehiclemor.errors import VehiclemorError
+from vehiclemor.resources import handbook_folder
 
 app = App(
     name="vehiclemor",
     version=__version__,
-    help="Benchmark suite for model order reduction of multibody vehicle models.",
+    help="Benchmark suite for model order reduction of multibody vehicle models.\n\n"
+    f"Handbook (notation, findings, how to add a model or a method): {handbook_folder()}",
 )
 app.command(list_components, name="list")
 for command in (show, simulate, run, compare, figures, cite):

@@ -14,7 +14,7 @@ from vehiclemor.cli.table import print_table, print_wrapped
 def show(
     name: str,
     *,
-    parameter: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     parameters: Path | None = None,
     json_output: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> int:

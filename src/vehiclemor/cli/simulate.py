@@ -29,14 +29,16 @@ def simulate(
     model: str,
     *,
     method: str = "full_order",
-    settings: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),
+    settings: Annotated[
+        tuple[str, ...], Parameter(name="--set", negative="", show_default=False)
+    ] = (),
     maneuver: str | None = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     start: str | None = None,
     preset: str = "recommended",
     training: str = "matched",
-    parameter: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     parameters: Path | None = None,
     out: Path | None = None,
     plot: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")] = None,
