@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vehiclemor import api
-from vehiclemor.cli.progress import progress_of_cells
+from vehiclemor.cli.progress import shown_progress
 from vehiclemor.errors import InputError
 
 
@@ -31,7 +31,7 @@ def figures(
     chosen = [name.strip() for name in only.split(",") if name.strip()]
     if only and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    with progress_of_cells():
+    with shown_progress():
         written = api.figures(chosen, out, results, jobs)
     for path in written:
         print(path)

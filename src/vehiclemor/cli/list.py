@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from vehiclemor import api
+from vehiclemor.cli.table import print_wrapped
 
 # A longer name has a line of its own.
 LONGEST = 30
@@ -42,5 +43,5 @@ def list_components(
             beside = [] if len(name) > LONGEST else [f"  {name}".ljust(column) + lines.pop(0)]
             print("\n".join([*(beside or [f"  {name}"]), *(" " * column + li for li in lines)]))
         print()
-    print("vehiclemor show NAME says more of each; vehiclemor show study-schema: your own study.")
+    print_wrapped("vehiclemor show NAME says more of each, study-schema how to write a study")
     return 0

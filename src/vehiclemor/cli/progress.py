@@ -1,4 +1,4 @@
-"""Progress of the cells of studies: a bar on a terminal, lines elsewhere."""
+"""Progress of studies and of rounds of times: a bar on a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
-    from vehiclemor.study.workers import Progress
+    from vehiclemor.study.progress import Progress
 
 # Without a terminal there is a line every so many seconds.
 INTERVAL = 5.0
 
 
 @contextmanager
-def progress_of_cells() -> Iterator[None]:
-    """Show the progress of all studies that are run inside, on standard error."""
+def shown_progress() -> Iterator[None]:
+    """Show how far all that is run inside is, on standard error."""
     from rich.console import Console
 
-    from vehiclemor.study.workers import listening
+    from vehiclemor.study.progress import listening
 
     console = Console(stderr=True)
     with _bar(console) if console.is_terminal else _lines() as update, listening(update):
@@ -38,32 +38,34 @@ def _bar(console: Console) -> Iterator[Progress]:
     tasks: dict[str, TaskID] = {}
     with Progress(console=console) as bar:
 
-        def update(study: str, done: int, total: int) -> None:
-            if study not in tasks:
-                tasks[study] = bar.add_task(study)
-            bar.update(tasks[study], completed=done, total=total)
+        def update(work: str, done: int, total: int) -> None:
+            if work not in tasks:
+                tasks[work] = bar.add_task(work)
+            bar.update(tasks[work], completed=done, total=total)
 
         yield update
 
 
 @contextmanager
 def _lines() -> Iterator[Progress]:
-    """A line when a study begins, and one every few seconds while something is missing."""
+    """A line when some work begins, and one every few seconds while something is missing."""
     began = time.monotonic()
     found: dict[str, tuple[int, int]] = {}
     ended = threading.Event()
 
-    def update(study: str, done: int, total: int) -> None:
-        if study not in found and done < total:
-            print(f"{study}: {total - done} of {total} cells to compute", file=sys.stderr)
-        found[study] = done, total
+    def update(work: str, done: int, total: int) -> None:
+        if work not in found and done < total:
+            print(f"{work}: {total - done} of {total} to compute", file=sys.stderr)
+        # The latest is the last.
+        found.pop(work, None)
+        found[work] = done, total
 
     def tell() -> None:
         while not ended.wait(INTERVAL):
-            study, (done, total) = list(found.items())[-1] if found else ("", (0, 0))
+            work, (done, total) = list(found.items())[-1] if found else ("", (0, 0))
             if done < total:
                 elapsed = time.monotonic() - began
-                print(f"{study}: {done} of {total} cells, {elapsed:.0f} s", file=sys.stderr)
+                print(f"{work}: {done} of {total}, {elapsed:.0f} s", file=sys.stderr)
 
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()

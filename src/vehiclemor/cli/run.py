@@ -4,7 +4,8 @@ import time
 from pathlib import Path
 
 from vehiclemor import api
-from vehiclemor.cli.progress import progress_of_cells
+from vehiclemor.cli.progress import shown_progress
+from vehiclemor.cli.table import print_wrapped
 
 
 def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
@@ -24,11 +25,12 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     from vehiclemor.study.run import run_studies
 
     began = time.perf_counter()
-    with progress_of_cells():
+    with shown_progress():
         results = run_studies(study, out, jobs)
     for name, dataset in results.items():
         statuses = [str(status) for status in dataset["status"].values.ravel()]
         counted = ", ".join(f"{statuses.count(s)} {s}" for s in sorted(set(statuses)))
-        print(f"{name}: {len(statuses)} grid points: {counted}; {out / 'studies' / (name + '.nc')}")
+        path = out / "studies" / f"{name}.nc"
+        print_wrapped(f"{name}: {len(statuses)} grid points: {counted}; {path}")
     print(f"{time.perf_counter() - began:.1f} s")
     return 0

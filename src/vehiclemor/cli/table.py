@@ -34,9 +34,16 @@ def print_table(rows: Sequence[Mapping[str, object]], digits: int = 6) -> None:
 
 
 def print_wrapped(line: str, indent: str = "") -> None:
-    """Print a line, broken where the terminal ends; what follows is indented."""
-    width = shutil.get_terminal_size().columns
-    print(textwrap.fill(line, width, initial_indent=indent, subsequent_indent=indent + "  "))
+    """Print a line, broken where the terminal ends, but no path; what follows is indented."""
+    lines = textwrap.wrap(
+        line,
+        shutil.get_terminal_size().columns,
+        initial_indent=indent,
+        subsequent_indent=indent + "  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    print("\n".join(lines))
 
 
 def _text(value: object, digits: int) -> str:

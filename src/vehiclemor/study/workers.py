@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.progress import tell
 from vehiclemor.study.store import cell_path, read_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-
-# Called with (name, finished experiments, all experiments).
-Progress = Callable[[str, int, int], None]
-# Who is told: studies are run deep inside of comparisons and figures too.
-_LISTENER: ContextVar[Progress | None] = ContextVar("progress", default=None)
-
-
-@contextmanager
-def listening(progress: Progress | None) -> Iterator[None]:
-    """Tell a function of the progress of every study that is run inside."""
-    token = _LISTENER.set(progress)
-    try:
-        yield
-    finally:
-        _LISTENER.reset(token)
 
 
 @dataclass
@@ -65,8 +49,7 @@ class Workers:
 
     def _report(self, count: int) -> None:
         self.done += count
-        if progress := _LISTENER.get():
-            progress(self.name, self.done, self.total)
+        tell(self.name, self.done, self.total)
 
     def _evaluated(self, work: list[list[Experiment]]) -> Iterator[int]:
         # Starting processes costs seconds: a handful of groups is quicker without.
