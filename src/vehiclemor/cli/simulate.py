@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from vehiclemor.simulation.model import Model
 
-RESERVED = {"frequency", "amplitude", "maneuver", "start", "preset", "training", "training_set"}
 FLOOR = "floor: RMS error of the projection onto the same subspaces, the best in the states"
 
 
@@ -78,12 +78,8 @@ def simulate(
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
-    chosen: dict[str, Any] = key_values("--set", settings)
-    for key in RESERVED & set(chosen):
-        raise InputError(f"--set {key}: not a setting of a method; use --{key}")
-    picture = None
-    if plot is not None:
-        picture = picture_file("--plot", plot, f"{model}-{method}")
+    chosen = _settings(settings)
+    picture = None if plot is None else picture_file("--plot", plot, f"{model}-{method}")
     if out is not None:
         _check_writable(out)
     ready = api.model(model, key_values("--parameter", parameter), parameters)
@@ -98,19 +94,29 @@ def simulate(
         training=training,
         **chosen,
     )
+    print_errors(dataset, ready, all_outputs)
+    _keep(dataset, out, picture)
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _settings(given: Sequence[str]) -> dict[str, Any]:
+    settings = key_values("--set", given)
+    for key in inspect.signature(api.simulate).parameters.keys() & settings.keys():
+        raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
+    return settings
+
+
+def _keep(dataset: xr.Dataset, out: Path | None, picture: Path | None) -> None:
     if out is not None:
         from vehiclemor.study.store import write_dataset
 
         write_dataset(dataset, out)
-    print_errors(dataset, ready, all_outputs)
+        print(f"written: {out}")
     if picture is not None:
         api.plot(dataset, path=picture)
-    written = [path for path in (out, picture) if path is not None]
-    for path in written:
-        print(f"written: {path}")
-    if not written:
+        print(f"written: {picture}")
+    if out is None and picture is None:
         print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
-    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
 def _check_writable(out: Path) -> None:

@@ -17,7 +17,7 @@ def study_description(name: str) -> dict[str, object]:
     """Grid and methods of a study, its members if it is a collection, or its protocols."""
     path = study_path(name)
     study = read_toml(path, StudyFile)
-    head = {"study": path.stem, "summary": study.title, "file": str(path)}
+    head: dict[str, object] = {"study": path.stem, "summary": study.title, "file": str(path)}
     if study.studies:
         rows = [
             {"study": member, "grid points": content.points, "summary": content.title}
