@@ -19,7 +19,8 @@ from vehiclemor.toml_files import FileSchema
 
 @pytest.mark.parametrize("name", names("model"))
 def test_a_model_shows_all_that_it_declares(name):
-    shown, definition = vm.describe(name), component("model", name)
+    model, definition = vm.model(name), component("model", name)
+    shown = vm.describe(name)
     for kind in ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints"):
         declared = [(q.name, q.unit, q.long_name) for q in getattr(definition, kind)]
         assert [tuple(row.values()) for row in shown[kind]] == declared
@@ -28,7 +29,6 @@ def test_a_model_shows_all_that_it_declares(name):
         assert (row["name"], row["value"], row["unit"]) == (parameter, entry.value, entry.unit)
         assert (row["status"], row["source"]) == (entry.status, entry.source)
     assert {row["source"] for row in shown["sources"]} >= {e.source for e in entries.values()}
-    model = vm.model(name)
     assert shown["starts"] == list(model.starts)
     accepting = [m for m in names("method") if component("method", m).accepts(model)[0]]
     assert shown["methods"] == accepting
@@ -36,6 +36,7 @@ def test_a_model_shows_all_that_it_declares(name):
 
 @pytest.mark.parametrize("name", names("method"))
 def test_a_method_shows_every_setting_of_every_kind(name):
+    models = {model: vm.model(model) for model in names("model")}
     shown, method = vm.describe(name), component("method", name)
     for kind, declared in method.settings.items():
         (table,) = [rows for key, rows in shown.items() if {"settings,", kind} <= set(key.split())]
@@ -46,7 +47,7 @@ def test_a_method_shows_every_setting_of_every_kind(name):
     presets = {(row["preset"], row["kind"]) for row in shown["presets"]}
     assert presets == {(p, kind) for kind in method.settings for p in method.presets_of(kind)}
     for row in shown["models"]:
-        accepted, reason = method.accepts(vm.model(row["model"]))
+        accepted, reason = method.accepts(models[row["model"]])
         assert (row["accepted"], row["reason"]) == ("yes" if accepted else "no", reason)
 
 

@@ -3,19 +3,19 @@
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App
 
 from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
-from vehiclemor.cli.exit_status import INTERRUPTED, WRONG_INPUT
+from vehiclemor.cli.ending import ended
+from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.plot import plot
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
-from vehiclemor.errors import VehiclemorError
 from vehiclemor.resources import handbook_folder
 
 app = App(
@@ -23,6 +23,9 @@ app = App(
     version=__version__,
     help="Benchmark suite for model order reduction of multibody vehicle models.\n\n"
     f"Handbook (notation, findings, how to add a model or a method): {handbook_folder()}",
+    help_epilogue=MEANING,
+    # It must reach `ended`, which tells how to resume.
+    suppress_keyboard_interrupt=False,
 )
 COMMANDS = {
     "list": list_components,
@@ -41,16 +44,6 @@ for name, command in COMMANDS.items():
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; wrong input is one line on standard error and exit status 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        status = app(given, exit_on_error=False, print_error=False, result_action="return_value")
-    except (CycloptsError, VehiclemorError) as error:
-        print("vehiclemor: " + " ".join(str(error).split()), file=sys.stderr)
-        return WRONG_INPUT
-    except KeyboardInterrupt:
-        text = "vehiclemor: interrupted; finished cells are stored, run again to resume"
-        print(text, file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
-    return int(status or 0)
+    return ended(
+        lambda: app(given, exit_on_error=False, print_error=False, result_action="return_value")
+    )

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from vehiclemor import api
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.cli.picture import picture_file
-from vehiclemor.cli.table import print_wrapped
+from vehiclemor.report.printing import wrapped
 
 
 def plot(
@@ -43,6 +43,6 @@ def plot(
     dataset, point = at_point(stored_result(result, results), chosen)
     plot_result(dataset, picture, kind)
     if point:
-        print_wrapped(f"at {point}; --select dimension=value draws another point")
+        print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
     print(f"written: {picture}")
     return 0

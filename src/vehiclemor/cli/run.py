@@ -5,7 +5,7 @@ from pathlib import Path
 
 from vehiclemor import api
 from vehiclemor.cli.progress import shown_progress
-from vehiclemor.cli.table import print_wrapped
+from vehiclemor.report.printing import wrapped
 
 
 def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
@@ -31,6 +31,6 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
         statuses = [str(status) for status in dataset["status"].values.ravel()]
         counted = ", ".join(f"{statuses.count(s)} {s}" for s in sorted(set(statuses)))
         path = out / "studies" / f"{name}.nc"
-        print_wrapped(f"{name}: {len(statuses)} grid points: {counted}; {path}")
+        print(wrapped(f"{name}: {len(statuses)} grid points: {counted}; {path}", 0, 2))
     print(f"{time.perf_counter() - began:.1f} s")
     return 0

@@ -8,7 +8,8 @@ from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.key_values import key_values
-from vehiclemor.cli.table import print_table, print_wrapped
+from vehiclemor.cli.table import print_table
+from vehiclemor.report.printing import wrapped
 
 
 def show(
@@ -53,7 +54,7 @@ def _print(key: str, content: object, indent: str = "") -> None:
             print_table(rows)
     elif content:
         text = ", ".join(map(str, content)) if isinstance(content, list) else content
-        print_wrapped(f"{key}: {text}", indent)
+        print(wrapped(f"{key}: {text}", len(indent), len(indent) + 2))
 
 
 def _by_source(key: str, rows: list[dict[str, object]]) -> dict[str, list[dict[str, object]]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,15 +13,10 @@ from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.cli.picture import picture_file
-from vehiclemor.cli.table import print_table, print_wrapped
 from vehiclemor.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from vehiclemor.simulation.model import Model
-
-FLOOR = "floor: RMS error of the projection onto the same subspaces, the best in the states"
 
 
 def simulate(
@@ -94,7 +88,10 @@ def simulate(
         training=training,
         **chosen,
     )
-    print_errors(dataset, ready, all_outputs)
+    from vehiclemor.report.simulation import simulation_text
+
+    shown = ready.outputs if all_outputs else ready.definition.shown.outputs
+    print(simulation_text(dataset, shown, ready.counts))
     _keep(dataset, out, picture)
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
@@ -128,39 +125,3 @@ def _check_writable(out: Path) -> None:
         raise InputError(f"--out {out}: the folder {out.parent} does not exist")
     if out.exists():
         read_dataset(out, "source", "vehiclemor")
-
-
-def print_errors(dataset: xr.Dataset, model: Model, all_outputs: bool) -> None:
-    """Errors of the outputs against the full-order solution, and what the run has cost."""
-    status, message, remark = (dataset[n].item() for n in ("status", "message", "remark"))
-    print_wrapped(f"{dataset.attrs['title']}: {status} {message}".rstrip())
-    if remark:
-        print_wrapped(remark)
-    shown: Sequence[str] = model.outputs if all_outputs else model.definition.shown.outputs
-    rows = [_row(dataset.sel(output=output)) for output in shown]
-    print_table(rows, digits=3)
-    further = len(model.outputs) - len(shown)
-    counts = ", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in model.counts)
-    seconds = dataset["seconds"]
-    if not all(math.isnan(row["floor"]) for row in rows):
-        print_wrapped(FLOOR)
-    if further:
-        print_wrapped(f"{further} more outputs: --all-outputs")
-    print_wrapped(counts)
-    print_wrapped(f"{seconds.item():.2e} s: {seconds.attrs['long_name']}")
-
-
-def _row(dataset: xr.Dataset) -> dict[str, Any]:
-    """Errors of one output; an error of exactly zero is that of the full-order run itself."""
-    columns = {
-        "RMS error": "rms_error",
-        "floor": "floor_rms_error",
-        "largest error": "max_error",
-        "range": "signal_range",
-    }
-    numbers = {heading: dataset[name].item() or math.nan for heading, name in columns.items()}
-    return {
-        "output": dataset["output"].item(),
-        **numbers,
-        "unit": dataset["output_unit"].item(),
-    }

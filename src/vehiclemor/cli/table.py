@@ -1,16 +1,14 @@
-"""Tables on the terminal: as wide as that is, 80 columns where there is none."""
+"""Tables of text on the terminal: every column but the first is wrapped where needed."""
 
-import math
-import shutil
-import textwrap
 from collections.abc import Mapping, Sequence
 
+from vehiclemor.report.printing import width
 
-def print_table(rows: Sequence[Mapping[str, object]], digits: int = 6) -> None:
+
+def print_table(rows: Sequence[Mapping[str, object]]) -> None:
     """Print rows with the same keys, which are the headings; empty columns are left out.
 
-    The first column is never wrapped, and columns of numbers are aligned right; a number that is
-    none is a dash.
+    The first column is never wrapped, and columns of numbers are aligned right.
     """
     from rich.console import Console
     from rich.table import Table
@@ -26,29 +24,16 @@ def print_table(rows: Sequence[Mapping[str, object]], digits: int = 6) -> None:
             no_wrap=heading == headings[0],
         )
     for row in rows:
-        table.add_row(*(_text(row[heading], digits) for heading in headings))
-    console = Console(highlight=False, markup=False)
+        table.add_row(*(_text(row[heading]) for heading in headings))
+    console = Console(width=width(), highlight=False, markup=False)
     with console.capture() as captured:
         console.print(table)
     print("\n".join(line.rstrip() for line in captured.get().splitlines()))
 
 
-def print_wrapped(line: str, indent: str = "") -> None:
-    """Print a line, broken where the terminal ends, but no path; what follows is indented."""
-    lines = textwrap.wrap(
-        line,
-        shutil.get_terminal_size().columns,
-        initial_indent=indent,
-        subsequent_indent=indent + "  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    print("\n".join(lines))
-
-
-def _text(value: object, digits: int) -> str:
+def _text(value: object) -> str:
     if isinstance(value, list):
-        return ", ".join(_text(part, digits) for part in value)
+        return ", ".join(_text(part) for part in value)
     if isinstance(value, float):
-        return "-" if math.isnan(value) else f"{value:.{digits}g}"
+        return f"{value:.6g}"
     return "" if value is None else str(value)
