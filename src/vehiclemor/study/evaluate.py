@@ -48,11 +48,10 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
         values are missing, and `status` and `message` tell why.
     """
     kept = model is None
-    with first_use(f"{experiment.model} with {experiment.method}"):
-        model = model or model_of(experiment)
-        with one_thread():
-            found = attempt(partial(_evaluated, experiment, model, kept))
-            return _failed(experiment, model, found) if isinstance(found, Failure) else found
+    model = model or model_of(experiment)
+    with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
+        found = attempt(partial(_evaluated, experiment, model, kept))
+        return _failed(experiment, model, found) if isinstance(found, Failure) else found
 
 
 def _evaluated(experiment: Experiment, model: Model, kept: bool) -> xr.Dataset:
