@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import field_validator
+from pydantic import Field, field_validator
 
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # No road vehicle has a part farther than this from its origin (m).
@@ -46,19 +48,21 @@ def point() -> Declared:
 class Source(FileSchema):
     """Where values come from, and under which licence they are used."""
 
-    text: str
-    licence: str
+    text: str = Field(description="the publication or file, so that it can be found")
+    licence: str = Field(description="under which its values are used")
 
 
 class Parameter(FileSchema):
     """One entry of a parameter file."""
 
-    value: float | list[float]
-    unit: str
-    source: str
-    status: Literal["published", "derived", "assumed"]
-    symbol: str
-    description: str
+    value: float | list[float] = Field(description="a number, or a point [x, y, z]")
+    unit: str = Field(description="the SI unit that the model declares")
+    source: str = Field(description="one of `sources`")
+    status: Literal["published", "derived", "assumed"] = Field(
+        description="as the source has it, computed from that, or chosen"
+    )
+    symbol: str = Field(description="in the notation")
+    description: str = Field(description="what it is")
 
     @field_validator("value")
     @classmethod
@@ -72,14 +76,14 @@ class Parameter(FileSchema):
 class ParameterFile(FileSchema):
     """Schema of `data/parameters/*.toml`."""
 
-    model: str
-    title: str
-    sources: dict[str, Source]
-    parameters: dict[str, Parameter]
+    model: str = Field(description="registered name")
+    title: str = Field(description="one line")
+    sources: dict[str, Source] = Field(description="key -> where values come from")
+    parameters: dict[str, Parameter] = Field(description="name -> value; all that the model needs")
 
 
 @dataclass(frozen=True)
-class ParameterSet:
+class ParameterSet(ShortRepr):
     """Validated parameters of one model, SI units.
 
     Attributes
@@ -172,14 +176,12 @@ def load_parameters(
 
 def _number_or_list(value: object, name: str) -> float | list[float]:
     try:
-        if isinstance(value, bool):
-            raise TypeError
-        array = np.array(value, dtype=float)
-        return [float(component) for component in array] if array.ndim else float(array)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"parameter {name}: {value!r} is not a number or list of numbers"
-        ) from None
+        array = real_array(value)
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.ndim > 1:
+        raise InputError(f"parameter {name}: {quoted(value)} is not a number or list of numbers")
+    return array.tolist()
 
 
 def _check_value(

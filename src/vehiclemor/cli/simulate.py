@@ -119,9 +119,13 @@ def _keep(dataset: xr.Dataset, out: Path | None, picture: Path | None) -> None:
 def _check_writable(out: Path) -> None:
     from vehiclemor.study.store import read_dataset
 
-    if out.is_dir():
-        raise InputError(f"--out {out}: is a folder, not a file")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: the folder {out.parent} does not exist")
-    if out.exists():
+    try:
+        if out.is_dir():
+            raise InputError(f"--out {out}: is a folder, not a file")
+        if not out.parent.is_dir():
+            raise InputError(f"--out {out}: the folder {out.parent} does not exist")
+        exists = out.exists()
+    except OSError as error:
+        raise InputError(f"--out {out}: can't be written ({error.strerror})") from None
+    if exists:
         read_dataset(out, "source", "vehiclemor")
