@@ -109,15 +109,28 @@ def test_pictures_are_named_and_written(tmp_path, capsys, monkeypatch):
 def test_a_result_draws_itself(tmp_path):
     dataset = vm.simulate("double_wishbone", "pod")
     figure = dataset.vehiclemor.plot("histories", tmp_path / "a.png")
-    drawn = [axis.get_lines() for axis in figure.axes]
-    assert any(
-        np.array_equal(line.get_ydata(), dataset["outputs"].sel(output="spindle_y"))
-        for lines in drawn
-        for line in lines
-    )
+    lines = [line.get_ydata() for axis in figure.axes for line in axis.get_lines()]
+    history = dataset["outputs"].sel(output="spindle_y").values
+    assert any(np.array_equal(line, history) for line in lines)
     write_dataset(dataset, tmp_path / "run.nc")
     vm.plot(tmp_path / "run.nc", path=tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (3, "result is 3"),
+        (xr.Dataset({"a": 1.0}), "neither a run nor a study"),
+        ("figure-99", "unknown study"),
+        ("figure-11", "vehiclemor run figure-11 makes it"),
+        ("paper", "is a collection"),
+        ("none.nc", "no such result"),
+    ],
+)
+def test_what_can_not_be_drawn_is_one_line(tmp_path, result, words):
+    with pytest.raises(vm.VehiclemorError, match=words):
+        vm.plot(result, results=tmp_path)
 
 
 def test_progress_without_a_terminal_is_lines(capsys, monkeypatch):
