@@ -17,8 +17,10 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+from vehiclemor.codegen.process_lock import locked
 from vehiclemor.errors import FileError
 from vehiclemor.files import write_whole
+from vehiclemor.progress import making
 
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -85,6 +87,8 @@ def _distrust(status: os.stat_result) -> str:
 def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     """Content of a file of the cache; made and written if it is missing, damaged or not ours.
 
+    One process makes it, while others that want it wait.
+
     Parameters
     ----------
     name
@@ -93,10 +97,16 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
         Gives the content.
     """
     path = cache_folder() / name
-    content = _checked(path, name)
+    content, reason = _checked(path, name)
+    if reason:
+        _LOG.warning("%s is made again: %s", path, reason)
     if content is None:
-        content = make()
-        _keep(path, _digest(name, content) + b"\n" + content)
+        what = path.stem.partition("-")[0]
+        with making(what, derived=name.startswith("derivations")), locked(path):
+            content, _ = _checked(path, name)
+            if content is None:
+                content = make()
+                _keep(path, _digest(name, content) + b"\n" + content)
     return content
 
 
@@ -105,20 +115,19 @@ def _digest(name: str, content: bytes) -> bytes:
     return hashlib.sha256(name.encode() + b"\n" + content).hexdigest().encode()
 
 
-def _checked(path: Path, name: str) -> bytes | None:
-    """Content of a file, if it can be trusted."""
+def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
+    """Content of a file, or why it can't be trusted; neither where there is none."""
     try:
         with path.open("rb") as file:
             reason = _distrust(os.fstat(file.fileno()))
             digest, _, content = file.read().partition(b"\n")
     except FileNotFoundError:
-        return None
+        return None, ""
     except OSError as error:
         digest, content, reason = b"", b"", error.strerror or "it can't be read"
     if not reason and _digest(name, content) == digest:
-        return content
-    _LOG.warning("%s is made again: %s", path, reason or "the file is damaged")
-    return None
+        return content, ""
+    return None, reason or "the file is damaged"
 
 
 def _keep(path: Path, content: bytes) -> None:
