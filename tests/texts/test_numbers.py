@@ -65,6 +65,7 @@ def page(tmp_path, monkeypatch):
     texts = [
         "pitch {[s: rms_error; pod; rank=3] | .1e} rad at r = 3",
         "over {count([s: status] == 'ok') | d} ways",
+        "{[s: rms_error; pod; rank=3] | .1e} rad at r = 3 over",
     ]
     part = Fragments(file="page.md", texts=texts)
     declared = Manifest(sources={"s": "study"}, varying=[], fragments=[part], verbatim=[])

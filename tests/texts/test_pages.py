@@ -8,8 +8,11 @@ from configparser import ConfigParser
 import pytest
 import schemas
 
+import vehiclemor
 from tests.texts.markdown import NAMES, ROOT, TEXTS, blocks, console_commands, inline_commands
 from vehiclemor.cli.app import app, main
+from vehiclemor.report.citation import citations
+from vehiclemor.report.published import load_published
 from vehiclemor.study.plans.study_file import study_path
 
 README = ROOT / "README.md"
@@ -130,6 +133,17 @@ def test_toml_blocks_are_toml(path):
     for block in blocks(path):
         if block.language == "toml":
             tomllib.loads(block.content)
+
+
+def test_citation_names_this_version_and_the_published_paper():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    paper = load_published().paper
+    assert f"\nversion: {vehiclemor.__version__}\n" in citation
+    assert f"\n## {vehiclemor.__version__}\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    for value in (f'"{paper.title}"', f'"{paper.journal}"', paper.doi, f"year: {paper.year}"):
+        assert value in citation
+    assert paper.doi in README.read_text(encoding="utf-8")
+    assert paper.doi in citations()
 
 
 def test_scripts_of_the_paper_explain_themselves():
