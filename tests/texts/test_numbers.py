@@ -130,6 +130,11 @@ def test_a_wrong_query_is_named(page, query, word):
         facts.evaluate(f"[s: {query}]", data)
 
 
+def test_a_missing_benchmark_is_one_line(tmp_path):
+    with pytest.raises(VehiclemorError, match="tox -e bench"):
+        facts.load("benchmark", tmp_path, 1)
+
+
 def test_numbers_are_printed_as_the_texts_have_them():
     printed = [fragments.rendered(v, f) for v, f in ((5.6e-5, ".1e"), (25.0, "d"), (4e7, ".0e"))]
     assert printed == ["5.6e-5", "25", "4e7"]

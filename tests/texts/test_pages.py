@@ -86,7 +86,9 @@ def test_environments_of_tox_exist(path):
 @PAGES
 def test_commands_can_be_parsed(path):
     for words in [*console_commands(path), *inline_commands(path)]:
-        if words[0] == "vehiclemor" and len(words) > 1:
+        if words[0] == "vehiclemor" and len(words) == 2:
+            assert words[1] in app, words
+        elif words[0] == "vehiclemor":
             app.parse_args(words[1:], exit_on_error=False, print_error=False)
             if words[1] == "run" and not words[2].startswith("my_"):
                 study_path(words[2])
