@@ -3,11 +3,12 @@
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
+from vehiclemor.cli.conversion import strict
 from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.figures import figures
@@ -20,6 +21,7 @@ app = App(
     name="vehiclemor",
     version=__version__,
     help="Benchmark suite for model order reduction of multibody vehicle models.",
+    default_parameter=Parameter(converter=strict),
     help_epilogue=MEANING,
     # It must reach `ended`, which tells how to resume.
     suppress_keyboard_interrupt=False,

@@ -1,5 +1,6 @@
 """`vehiclemor simulate`: one run of a model with a method, and its errors."""
 
+import inspect
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -64,9 +65,8 @@ def simulate(
     if out is not None:
         _check_writable(out)
     ready = api.model(model, parameter_file=parameters)
-    reserved = {"frequency", "amplitude", "maneuver", "start", "preset", "training", "training_set"}
-    for key in reserved & set(chosen):
-        raise InputError(f"--set {key}: not a setting of a method; use --{key}")
+    for key in inspect.signature(api.simulate).parameters.keys() & chosen.keys():
+        raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
     dataset = api.simulate(
         ready,
         method,
@@ -93,9 +93,13 @@ def simulate(
 def _check_writable(out: Path) -> None:
     from vehiclemor.study.store import read_dataset
 
-    if out.is_dir():
-        raise InputError(f"--out {out}: is a folder, not a file")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: the folder {out.parent} does not exist")
-    if out.exists():
+    try:
+        if out.is_dir():
+            raise InputError(f"--out {out}: is a folder, not a file")
+        if not out.parent.is_dir():
+            raise InputError(f"--out {out}: the folder {out.parent} does not exist")
+        exists = out.exists()
+    except OSError as error:
+        raise InputError(f"--out {out}: can't be written ({error.strerror})") from None
+    if exists:
         read_dataset(out, "source", "vehiclemor")

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vehiclemor.short_repr import ShortRepr
+
 # A named initial condition of a model, or a state (n,).
 Start = str | np.ndarray
 STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
@@ -30,7 +32,7 @@ EVALUATIONS = {"ae": "residual_evaluations", "ode": "rhs_calls", "dae": "rhs_cal
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class Trajectory(ShortRepr):
     """Result of one simulation.
 
     Attributes

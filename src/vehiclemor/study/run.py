@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.arguments import count, quoted
 from vehiclemor.errors import InputError
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
@@ -41,8 +42,9 @@ def run_studies(
         Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
         is `predictive-<protocol>`.
     """
-    if jobs < 1:
-        raise InputError(f"jobs is {jobs}; it must be at least 1")
+    count("jobs", jobs)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is {quoted(progress)}, not a function")
     definitions = load_studies(study)
     protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
     grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
