@@ -326,7 +326,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
         paths = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)
         contents.append({path.name: path.read_bytes() for path in paths})
-    assert len(contents[0]) == 2 * len(names) + 3 * 16
+    assert len(contents[0]) == 2 * len(names) + 3 * 19
     assert contents[0] == contents[1]
     assert all(contents[0].values())
 

@@ -57,7 +57,8 @@ def test_the_fastest_variant_of_pod_within_the_bounds_wins(tables):
     within = terms[terms["within_bounds"]]
     # Of two coordinates one is kept: a variant that is within 1 % would be luck.
     assert terms["winner"].sum() == min(1, len(within))
-    assert set(tables) == {"costs", "errors", "paper-terms", "operations", "quantities"}
+    others = {"errors", "paper-terms", "operations", "quantities", "spectrum"}
+    assert set(tables) == {"costs"} | others
 
 
 def test_comparison_names_every_method(folder, capsys, monkeypatch):
@@ -69,7 +70,7 @@ def test_comparison_names_every_method(folder, capsys, monkeypatch):
         assert words in printed
     assert main(["compare", CAR, "--json", "--out", str(folder)]) == 0
     rows = json.loads(capsys.readouterr().out)
-    kinds = {"nominal", "perturbed", "cost", "method", "outside", "paper"}
+    kinds = {"nominal", "perturbed", "cost", "spectrum", "method", "outside", "paper"}
     assert kinds <= {row["kind"] for row in rows}
     unseen = {row["method"]: row for row in rows if row["kind"] == "method"}
     assert {"replay", "pod", "fixed basis", "strongest 2e-3"} <= set(unseen)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component
 from vehiclemor.report.costs import LEGEND as COSTS
 from vehiclemor.report.costs import cost_table, costs_text
@@ -14,6 +15,8 @@ from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rows import predictive_comparison
 from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.report.printing import Footnotes, Line, power, table_text, wrapped
+from vehiclemor.report.spectrum import spectrum_table, spectrum_text
+from vehiclemor.simulation.build import build
 
 LEGEND = (
     "RMS errors, SI units; nom.: in the nominal run, on which the methods are trained (replay is "
@@ -29,12 +32,14 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     -------
     pandas.DataFrame
         `kind` tells what a row is.  `nominal`, `perturbed`: one run of a method, as in
-        `errors.study_tables`.  `cost`: as in `cost_table`.  The others are those of
-        `predictive_comparison`.
+        `errors.study_tables`.  `cost`, `spectrum`: as in `cost_table`, `spectrum_table`.  The
+        others are those of `predictive_comparison`.
     """
     studies = {"nominal": nominal(name, folder), "perturbed": perturbed(name, folder)}
     parts = [study_tables(name, [s], folder, jobs).assign(kind=k) for k, s in studies.items()]
     parts.append(cost_table(name, folder).assign(kind="cost"))
+    if pod.METHOD.accepts(build(name))[0]:
+        parts.append(spectrum_table(name).assign(kind="spectrum"))
     parts.append(predictive_comparison(folder, jobs, study=unseen(name, folder)))
     parts.append(pd.DataFrame(paper_terms_rows([name], folder)))
     return pd.concat(parts, ignore_index=True).assign(model=name)
@@ -61,6 +66,8 @@ def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
     heads = ["method", "rank"]
     heads += [f"{short} {kind}" for short in columns.values() for kind in ("nom.", "pert.")]
     title = "\n".join([name, wrapped(f"{LEGEND}."), table_text(heads, lines), notes.text()])
-    rest = rows.loc[~rows["kind"].isin(["nominal", "perturbed", "cost"])]
+    rest = rows.loc[~rows["kind"].isin(["nominal", "perturbed", "cost", "spectrum"])]
+    modes = [row for row in records if row["kind"] == "spectrum"]
     costs = f"{wrapped(f'{COSTS}.')}\n{costs_text(name, folder)}"
-    return "\n\n".join([title.rstrip(), costs, predictive_text(rest)])
+    found = [spectrum_text(modes)] if modes else []
+    return "\n\n".join([title.rstrip(), costs, *found, predictive_text(rest)])
