@@ -380,3 +380,18 @@ def test_table_of_settings_records_what_does_not_fit(tmp_path):
     # One vector cannot turn, pitch and run on: its error is that of the best approximation or more.
     assert (done["rms_yaw"] >= 0.5 * done["floor_yaw"]).all()
     assert np.isfinite(done["growth_rate"]).all()
+
+
+@pytest.mark.parametrize("what", ["paper", "predictive"])
+@pytest.mark.parametrize(
+    ("verdicts", "status"),
+    [(["met", "not_comparable", "ours"], 0), (["met", "missed", "not_comparable"], 1)],
+)
+def test_only_what_is_missed_counts_for_the_exit_status(monkeypatch, what, verdicts, status):
+    import pandas as pd
+
+    from vehiclemor import api
+
+    rows = pd.DataFrame({"verdict": verdicts})
+    monkeypatch.setattr(api, "compare", lambda *_: rows)
+    assert main(["compare", what, "--json"]) == status
