@@ -1,11 +1,20 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
+import errno
 from collections.abc import Iterable
+from typing import Any
+
+# What of the system's errors is the machine's doing, whoever has asked for it.
+MACHINE_ERRORS = {
+    getattr(errno, name)
+    for name in ("ENOSPC", "EDQUOT", "EIO", "ENOMEM", "EMFILE", "ENFILE")
+    if hasattr(errno, name)
+}
 
 
 class VehiclemorError(Exception):
-    """Base of all errors that reach a user as one line and exit status 2."""
+    """Base of all errors that reach a user as one line; exit status 2 if not said otherwise."""
 
 
 class InputError(VehiclemorError):
@@ -14,6 +23,13 @@ class InputError(VehiclemorError):
 
 class FileError(VehiclemorError):
     """A file is missing, unreadable, foreign or can't be written."""
+
+
+class MachineError(VehiclemorError):
+    """The machine has failed, not the input: no space, no memory, a killed process.
+
+    Never a result: what it has spoiled is computed again.  Exit status 1.
+    """
 
 
 class GeometryError(VehiclemorError):
@@ -25,7 +41,26 @@ class UnreachableError(VehiclemorError):
 
 
 class ConvergenceError(VehiclemorError):
-    """An iteration did not converge, or met a value that is not finite."""
+    """An iteration did not converge, or met a value that is not finite.
+
+    Attributes
+    ----------
+    trajectory
+        The run as far as it went, with its counts; None if there is none.
+    """
+
+    def __init__(self, message: str, trajectory: Any = None) -> None:
+        super().__init__(message)
+        self.trajectory = trajectory
+
+
+def machine_reason(error: BaseException) -> str:
+    """What has failed, if an exception is the machine's doing; else empty."""
+    if isinstance(error, MemoryError):
+        return " ".join(f"not enough memory {error}".split())
+    if isinstance(error, OSError) and error.errno in MACHINE_ERRORS:
+        return f"{error.strerror}"
+    return ""
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

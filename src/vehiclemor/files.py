@@ -1,12 +1,13 @@
 """Writing files whole: under a temporary name first, then moved into place."""
 
 import os
+import tempfile
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from vehiclemor.errors import FileError
+from vehiclemor.errors import FileError, MachineError, machine_reason
 
 TEMPORARY = ".partial-"
 
@@ -24,7 +25,22 @@ def make_folder(folder: Path) -> None:
     except (FileExistsError, NotADirectoryError):
         raise FileError(f"{folder}: not a folder") from None
     except OSError as error:
-        raise FileError(f"{folder}: can't be written ({error.strerror})") from None
+        raise _not_written(folder, error) from None
+
+
+def probe_folder(folder: Path) -> None:
+    """Raise `VehiclemorError` if a folder can't be written."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise _not_written(folder, error) from None
+
+
+def _not_written(path: Path, error: Exception) -> FileError | MachineError:
+    machine = machine_reason(error)
+    reason = machine or getattr(error, "strerror", None) or error
+    return (MachineError if machine else FileError)(f"{path}: can't be written ({reason})")
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
@@ -41,13 +57,15 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     ------
     FileError
         If the folder can't be written.
+    MachineError
+        If the disk is full or fails.
     """
     temporary = temporary_path(path)
     try:
         write(temporary)
         os.replace(temporary, path)
     except OSError as error:
-        raise FileError(f"{path}: can't be written ({error.strerror or error})") from None
+        raise _not_written(path, error) from None
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vehiclemor.errors import FileError
+from vehiclemor.errors import FileError, MachineError
 from vehiclemor.files import TEMPORARY, make_folder, remove_leftovers, write_text, write_whole
 
 # Above any process number of the kernel.
@@ -47,7 +47,8 @@ def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
     def full(_: Path) -> None:
         raise OSError(28, "No space left on device")
 
-    with pytest.raises(FileError, match=r"file\.txt: can't be written \(No space left on device\)"):
+    line = r"file\.txt: can't be written \(No space left on device\)"
+    with pytest.raises(MachineError, match=line):
         write_whole(tmp_path / "file.txt", full)
 
 

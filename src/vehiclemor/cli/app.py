@@ -3,23 +3,26 @@
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App
 
 from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
-from vehiclemor.cli.exit_status import INTERRUPTED, WRONG_INPUT
+from vehiclemor.cli.ending import ended
+from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
-from vehiclemor.errors import VehiclemorError
 
 app = App(
     name="vehiclemor",
     version=__version__,
     help="Benchmark suite for model order reduction of multibody vehicle models.",
+    help_epilogue=MEANING,
+    # It must reach `ended`, which tells how to resume.
+    suppress_keyboard_interrupt=False,
 )
 app.command(list_components, name="list")
 for command in (show, simulate, run, compare, figures, cite):
@@ -29,16 +32,6 @@ for command in (show, simulate, run, compare, figures, cite):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; wrong input is one line on standard error and exit status 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        status = app(given, exit_on_error=False, print_error=False, result_action="return_value")
-    except (CycloptsError, VehiclemorError) as error:
-        print("vehiclemor: " + " ".join(str(error).split()), file=sys.stderr)
-        return WRONG_INPUT
-    except KeyboardInterrupt:
-        text = "vehiclemor: interrupted; finished cells are stored, run again to resume"
-        print(text, file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 0
-    return int(status or 0)
+    return ended(
+        lambda: app(given, exit_on_error=False, print_error=False, result_action="return_value")
+    )

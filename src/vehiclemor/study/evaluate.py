@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.errors import ConvergenceError
+from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
+from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -19,6 +20,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import Experiment, Keep
 from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.method_settings import default_settings, for_method
 from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
 from vehiclemor.study.scenario import Scenario, start_of, training_run
@@ -47,6 +49,12 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
     """
     kept = model is None
     model = model or model_of(experiment)
+    with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
+        found = attempt(partial(_evaluated, experiment, model, kept))
+        return _failed(experiment, model, found) if isinstance(found, Failure) else found
+
+
+def _evaluated(experiment: Experiment, model: Model, kept: bool) -> xr.Dataset:
     refused = refusal(model, experiment)
     reduced = refused or (kept_fit if kept else fresh_fit)(model, experiment)
     solve = kept_reference if kept else reference_run
@@ -61,6 +69,14 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
     return metrics_dataset(model, experiment, outcomes[0], reduced)
 
 
+def _failed(experiment: Experiment, model: Model, failure: Failure) -> xr.Dataset:
+    """Result of an experiment that a bug has ended."""
+    outcomes = [failure] * len(experiment.test)
+    if experiment.keep == "errors":
+        return errors_dataset(model, experiment, outcomes, failure)
+    return metrics_dataset(model, experiment, failure, failure)
+
+
 def model_of(experiment: Experiment) -> Model:
     """The model of an experiment; kept, since all experiments of a study share it."""
     return _built(experiment.model, _text(experiment.parameters))
@@ -73,12 +89,12 @@ def _built(name: str, parameters: str) -> Model:
 
 def refusal(model: Model, experiment: Experiment) -> Failure | None:
     """Why the method can't reduce the model with these settings, if it can't."""
-    method: Method = component("method", experiment.method)
-    accepted, reason = method.accepts(model)
-    if not accepted:
-        return Failure("rejected", reason)
 
     def check() -> None:
+        method: Method = component("method", experiment.method)
+        accepted, reason = method.accepts(model)
+        if not accepted:
+            raise InputError(reason)
         method.check(model, for_method(model, experiment.method, experiment.settings))
 
     return attempt(check)
@@ -107,7 +123,10 @@ def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     online = {name: value for name, value in settings.items() if name in ONLINE}
     defaults = default_settings(model, experiment.method)
     common = _text(settings | {name: defaults[name] for name in online})
-    fitted: Any = _kept_fit(model, experiment.method, common, experiment.training)
+    try:
+        fitted: Any = _kept_fit(model, experiment.method, common, experiment.training)
+    except _FitError as bug:
+        return bug.args[0]
     if isinstance(fitted, Failure) or not online:
         return fitted
     if not all(hasattr(fitted, name) for name in online):
@@ -118,16 +137,30 @@ def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
 def _fit(
     model: Model, method_name: str, settings: str, training: tuple[Scenario, ...]
 ) -> ReducedModel | Failure:
+    """Fit a method; with the settings as text, since what is kept is found by it."""
     method: Method = component("method", method_name)
 
     def fit() -> ReducedModel:
         runs = [training_run(model, scenario) for scenario in training]
         return method.fit(model, runs, for_method(model, method_name, json.loads(settings)))
 
-    return attempt(fit)
+    with one_thread():
+        return attempt(fit)
 
 
-_kept_fit = lru_cache(maxsize=64)(_fit)
+@lru_cache(maxsize=64)
+def _kept_fit(
+    model: Model, method_name: str, settings: str, training: tuple[Scenario, ...]
+) -> ReducedModel | Failure:
+    fitted = _fit(model, method_name, settings, training)
+    if isinstance(fitted, Failure) and fitted.status == "error":
+        # What is raised is not kept: a bug may be mended before the next try.
+        raise _FitError(fitted)
+    return fitted
+
+
+class _FitError(Exception):
+    """Carries the failure of a fit that is not kept."""
 
 
 def _text(content: Mapping[str, object]) -> str:

@@ -1,10 +1,21 @@
-"""The rule for failures: a run that fails is a result with a status and a reason."""
+"""The rule for failures.
+
+What the equations do is a result: `diverged`, `unreachable`, `rejected`.  An exception of a method
+or model is a bug: `error`, tried again by the next run.  What the machine does is no result.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from vehiclemor.errors import ConvergenceError, InputError, UnreachableError, VehiclemorError
+from vehiclemor.errors import (
+    ConvergenceError,
+    InputError,
+    MachineError,
+    UnreachableError,
+    VehiclemorError,
+    machine_reason,
+)
 
 Result = TypeVar("Result")
 
@@ -20,12 +31,17 @@ class Failure:
 def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
     """Result of a call, or how it has failed.
 
-    What is wrong with the model or its files is raised: it would fail everywhere.
-
     Parameters
     ----------
     whose
         Put before the reason of a failure that is not due to what was asked for.
+
+    Raises
+    ------
+    MachineError
+        If the machine has failed.
+    VehiclemorError
+        If the model or a file of it is wrong: it would fail everywhere.
     """
     try:
         return run()
@@ -37,7 +53,9 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
         return Failure("rejected", _line(error))
     except VehiclemorError:
         raise
-    except Exception as error:  # noqa: BLE001 - a plug-in's bug spoils its own cell, not the study
+    except Exception as error:
+        if reason := machine_reason(error):
+            raise MachineError(reason) from error
         return Failure("error", f"{whose}{type(error).__name__}: {_line(error)}")
 
 

@@ -12,7 +12,7 @@ from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import load_studies
-from vehiclemor.study.store import cell_path, prepare_folder, stored
+from vehiclemor.study.store import result_path, stored
 from vehiclemor.study.workers import Progress, Workers
 
 if TYPE_CHECKING:
@@ -46,7 +46,6 @@ def run_studies(
     definitions = load_studies(study)
     protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
     grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
-    prepare_folder(folder)
     results = {p.study: run_protocol(p, folder, jobs, progress) for p in protocols}
     for grid in grids:
         workers = Workers(grid.name, folder, jobs, progress)
@@ -56,6 +55,6 @@ def run_studies(
             "cells",
             cells_digest(grid),
             partial(grid_dataset, grid, folder),
-            [cell_path(folder, key) for key in grid.unique],
+            [result_path(folder, key) for key in grid.unique],
         )
     return results

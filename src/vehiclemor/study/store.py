@@ -1,18 +1,27 @@
-"""Result files: one netCDF-4 file for each experiment, moved into place when complete."""
+"""Result files: one netCDF-4 file for each experiment, moved into place when complete.
+
+Each holds a hash of its content, which is checked whenever it is read.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.errors import FileError
-from vehiclemor.files import make_folder, remove_leftovers, temporary_path, write_whole
+from vehiclemor.errors import FileError, MachineError, machine_reason
+from vehiclemor.files import make_folder, probe_folder, remove_leftovers, write_whole
 
 if TYPE_CHECKING:
+    import netCDF4
     import numpy as np
     import xarray as xr
+
+# Group of a result file with the hash of all that stands outside of it, and the ending of results
+# that the next run tries again.
+INTEGRITY, BROKEN = "integrity", ".error.nc"
 
 
 def prepare_folder(folder: Path) -> None:
@@ -20,18 +29,19 @@ def prepare_folder(folder: Path) -> None:
 
     Raises
     ------
-    FileError
+    VehiclemorError
         If it is a file, or can't be made or written.
     """
     for part in (folder / "cells", folder / "studies"):
         make_folder(part)
-        probe = temporary_path(part / "probe")
-        try:
-            probe.touch()
-            probe.unlink()
-        except OSError as error:
-            raise FileError(f"{folder}: can't be written ({error.strerror})") from None
-        remove_leftovers(part)
+        probe_folder(part)
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove what processes that are no more have not finished to write."""
+    for part in (folder / "cells", folder / "studies"):
+        with suppress(OSError):
+            remove_leftovers(part)
 
 
 def cell_path(folder: Path, key: str) -> Path:
@@ -39,9 +49,44 @@ def cell_path(folder: Path, key: str) -> Path:
     return folder / "cells" / f"{key}.nc"
 
 
+def broken_path(folder: Path, key: str) -> Path:
+    """File of the experiment with this key, where a bug has ended it: the next run tries again."""
+    return folder / "cells" / f"{key}{BROKEN}"
+
+
+def result_path(folder: Path, key: str) -> Path:
+    """The one of the two that there is."""
+    path = cell_path(folder, key)
+    return path if path.exists() else broken_path(folder, key)
+
+
+def write_cell(dataset: xr.Dataset, folder: Path, key: str) -> None:
+    """Store the result of an experiment; one of a bug apart from those that are finished."""
+    broken = "error" in dataset["status"].values
+    write_dataset(dataset, (broken_path if broken else cell_path)(folder, key))
+    if not broken:
+        broken_path(folder, key).unlink(missing_ok=True)
+
+
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a whole file."""
-    write_whole(path, lambda temporary: dataset.to_netcdf(temporary, engine="netcdf4"))
+    import netCDF4
+    from xarray.backends import NetCDF4DataStore
+
+    def write(temporary: Path) -> None:
+        try:
+            with netCDF4.Dataset(temporary, "w") as file:
+                dataset.dump_to_store(NetCDF4DataStore(file))
+                file.createGroup(INTEGRITY).sha256 = _digest(file)
+        except (OSError, RuntimeError):
+            # The library hides the reason; plain writing of as much as there is tells it.
+            temporary.write_bytes(bytes(dataset.nbytes + (1 << 16)))
+            raise
+
+    try:
+        write_whole(path, write)
+    except RuntimeError as error:
+        raise FileError(f"{path}: can't be written ({error})") from None
 
 
 def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
@@ -59,10 +104,63 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     """
     import xarray as xr
 
-    with _readable(path), xr.open_dataset(path, engine="netcdf4") as opened:
-        dataset = opened.load()
-    _check_owner(path, dataset.attrs, attribute, expected)
-    return dataset
+    with _opened(path, attribute, expected) as file:
+        file.set_auto_maskandscale(True)
+        return xr.open_dataset(xr.backends.NetCDF4DataStore(file)).load()
+
+
+def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarray]:
+    """Arrays of a result file by name; as `read_dataset`, but three times faster."""
+    with _opened(path, attribute, expected) as file:
+        return {name: variable[...] for name, variable in file.variables.items()}
+
+
+@contextmanager
+def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Dataset]:
+    """A result file that is whole and the expected one."""
+    import netCDF4
+
+    if not path.is_file():
+        what = "is a folder, not a result file" if path.exists() else "no such result file"
+        raise FileError(f"{path}: {what}")
+    try:
+        with netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            if INTEGRITY in file.groups and file[INTEGRITY].sha256 != _digest(file):
+                raise ValueError("what it holds is not what was written")
+            found = getattr(file, attribute, None)
+            if found != expected:
+                raise FileError(
+                    f"{path}: not the result that belongs here ({attribute} is not {expected}); "
+                    f"move it away and run again"
+                )
+            yield file
+    except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
+        if machine := machine_reason(error):
+            raise MachineError(f"{path}: can't be read ({machine})") from None
+        reason = error.strerror if isinstance(error, OSError) else None
+        detail = reason or str(error).splitlines()[0][:80]
+        detail = "damaged, or no netCDF-4 file" if "NetCDF:" in detail else detail
+        raise FileError(
+            f"{path}: not a readable result file ({detail}); move it away and run again"
+        ) from None
+
+
+def _digest(file: netCDF4.Dataset) -> str:
+    """Hash of the variables and attributes of a file."""
+    import numpy as np
+
+    digest = hashlib.sha256()
+    for owner in (file, *file.variables.values()):
+        described = {name: str(owner.getncattr(name)) for name in sorted(owner.ncattrs())}
+        digest.update(repr(described).encode())
+    file.set_auto_maskandscale(False)
+    for name, variable in file.variables.items():
+        values = np.asarray(variable[...])
+        digest.update(f"{name} {variable.dimensions} {values.dtype} {values.shape}".encode())
+        text = values.dtype.kind in "OUS"
+        digest.update("\n".join(map(str, values.ravel())).encode() if text else values.tobytes())
+    return digest.hexdigest()
 
 
 def stored(
@@ -87,40 +185,7 @@ def stored(
         current = all(source.stat().st_mtime_ns < written for source in sources)
         if current and dataset.attrs.get(attribute) == key:
             return dataset
+    make_folder(path.parent)
     dataset = make().assign_attrs({attribute: key})
     write_dataset(dataset, path)
     return dataset
-
-
-def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarray]:
-    """Arrays of a result file by name; as `read_dataset`, but three times faster."""
-    import netCDF4
-
-    with _readable(path), netCDF4.Dataset(path) as file:
-        file.set_auto_maskandscale(False)
-        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-        arrays = {name: variable[...] for name, variable in file.variables.items()}
-    _check_owner(path, attributes, attribute, expected)
-    return arrays
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    if not path.is_file():
-        raise FileError(f"{path}: no such result file")
-    try:
-        yield
-    except (OSError, ValueError, RuntimeError, KeyError) as error:
-        reason = error.strerror if isinstance(error, OSError) else None
-        detail = reason or str(error).splitlines()[0][:80]
-        raise FileError(
-            f"{path}: not a readable result file ({detail}); move it away and run again"
-        ) from None
-
-
-def _check_owner(path: Path, attributes: dict, attribute: str, expected: str) -> None:
-    if attributes.get(attribute) != expected:
-        raise FileError(
-            f"{path}: not the result that belongs here ({attribute} is not {expected}); "
-            f"move it away and run again"
-        )

@@ -27,7 +27,7 @@ from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.scenario import Scenario, start_of
-from vehiclemor.study.store import prepare_folder, stored
+from vehiclemor.study.store import stored
 from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
@@ -70,7 +70,6 @@ def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: s
         parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    prepare_folder(folder)
     return stored_timing(folder, name, [content, CASE_ROUNDS], every_start)
 
 

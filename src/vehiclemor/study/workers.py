@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import logging
+import os
+import signal
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.store import cell_path, read_dataset, write_dataset
+from vehiclemor.study.store import (
+    cell_path,
+    prepare_folder,
+    read_dataset,
+    remove_partial,
+    result_path,
+    write_cell,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Progress = Callable[[str, int, int], None]
+Groups = Sequence[Sequence[Experiment]]
+# How often what the machine has spoiled is tried; and seconds between two looks at the driver.
+TRIES, LOOK = 3, 0.5
+# Groups sent for each worker, so that none is idle; more would not fit into its queue.
+WAITING = 2
+KILLED = "a worker process was killed, perhaps for lack of memory"
+_LOG = logging.getLogger("vehiclemor")
 
 
 @dataclass
@@ -28,55 +50,143 @@ class Workers:
     folder: Path
     jobs: int = 1
     progress: Progress | None = None
-    done: int = 0
-    total: int = 0
+    asked: set[str] = field(default_factory=set)
+    finished: set[str] = field(default_factory=set)
 
-    def __call__(self, groups: Sequence[Sequence[Experiment]]) -> None:
-        """Evaluate what is missing; a group stays in one process, where its fit is made once."""
-        self.total += sum(len(group) for group in groups)
-        missing = {e.key: e for group in groups for e in group if not self._path(e).exists()}
-        work: list[list[Experiment]] = []
-        for group in groups:
-            # Two candidates may be the same experiment: `pop` leaves it to the first.
-            part = [found for e in group if (found := missing.pop(e.key, None))]
-            work += [part] if part else []
-        self.done = self.total - sum(len(part) for part in work)
-        self._report(0)
-        for count in self._evaluated(work):
-            self._report(count)
+    def __call__(self, groups: Groups) -> None:
+        """Evaluate what is missing; a group stays in one process, where its fit is made once.
+
+        Raises
+        ------
+        MachineError
+            If the machine has failed again and again; what was finished is stored.
+        """
+        remove_partial(self.folder)
+        keys = {e.key for group in groups for e in group}
+        self.asked |= keys
+        self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        self._report()
+        for _ in range(TRIES):
+            work = self._missing(groups)
+            if not work:
+                return
+            prepare_folder(self.folder)
+            faults = [fault for fault in self._evaluated(work) if fault]
+            if faults:
+                _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
+        spoiled = sum(len(group) for group in self._missing(groups))
+        if spoiled:
+            raise MachineError(
+                f"{self.name}: {spoiled} of {len(self.asked)} cells can't be computed "
+                f"({faults[0]}); what is finished is stored: run again to resume"
+            )
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        return read_dataset(self._path(experiment), "cell", experiment.key)
+        path = result_path(self.folder, experiment.key)
+        return read_dataset(path, "cell", experiment.key)
 
-    def _path(self, experiment: Experiment) -> Path:
-        return cell_path(self.folder, experiment.key)
+    def _missing(self, groups: Groups) -> list[list[Experiment]]:
+        """What is not finished, each once."""
+        missing = {e.key: e for group in groups for e in group if e.key not in self.finished}
+        # Two candidates may be the same experiment: `pop` leaves it to the first.
+        parts = [[f for e in group if (f := missing.pop(e.key, None))] for group in groups]
+        return [part for part in parts if part]
 
-    def _report(self, count: int) -> None:
-        self.done += count
+    def _report(self) -> None:
         if self.progress:
-            self.progress(self.name, self.done, self.total)
+            self.progress(self.name, len(self.finished), len(self.asked))
 
-    def _evaluated(self, work: list[list[Experiment]]) -> Iterator[int]:
+    def _evaluated(self, work: list[list[Experiment]]) -> Iterator[str]:
+        """Evaluate groups; gives how the machine has failed in each, if it has."""
         # Starting processes costs seconds: a handful of groups is quicker without.
         if self.jobs == 1 or len(work) < 2 * self.jobs:
             for group in work:
-                yield evaluate_and_store(group, self.folder)
+                yield self._taken(*evaluate_and_store(group, self.folder))
             return
-        from joblib import Parallel, delayed
+        # One group of each method first, so that workers compile different loops at a time.
+        first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
+        work.sort(key=lambda group: id(group) not in first)
+        with closing(evaluated_by_workers(work, self.folder, self.jobs)) as pool:
+            for done in pool:
+                yield self._taken(*done)
 
-        # One group of each method first, so that its loops are compiled once.
-        first = {group[0].method: group for group in reversed(work)}.values()
-        for group in first:
-            yield evaluate_and_store(group, self.folder)
-        rest = [group for group in work if all(group is not other for other in first)]
-        pool = Parallel(n_jobs=self.jobs, return_as="generator_unordered")
-        for count in pool(delayed(evaluate_and_store)(group, self.folder) for group in rest):
-            yield count or 0
+    def _taken(self, finished: list[str], fault: str) -> str:
+        self.finished.update(finished)
+        self._report()
+        return fault
 
 
-def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> int:
-    """Evaluate some experiments, move each complete file into place, and count them."""
+def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> tuple[list[str], str]:
+    """Evaluate some experiments, and move each complete file into place.
+
+    Returns
+    -------
+    tuple
+        Keys of those that are stored, and how the machine has failed in others; empty if it has
+        not.
+
+    Raises
+    ------
+    MachineError
+        If a result can't be stored: no other could.
+    """
+    finished, fault = [], ""
     for experiment in experiments:
-        write_dataset(evaluate(experiment), cell_path(folder, experiment.key))
-    return len(experiments)
+        try:
+            dataset = evaluate(experiment)
+        except Exception as error:
+            fault = str(error) if isinstance(error, MachineError) else machine_reason(error)
+            if not fault:
+                raise
+            continue
+        write_cell(dataset, folder, experiment.key)
+        finished.append(experiment.key)
+    return finished, fault
+
+
+def evaluated_by_workers(
+    groups: Groups, folder: Path, jobs: int
+) -> Generator[tuple[list[str], str], None, None]:
+    """What `evaluate_and_store` gives for each group, in processes that end with this one."""
+    from concurrent.futures import FIRST_COMPLETED, Future, wait
+    from concurrent.futures.process import BrokenProcessPool
+
+    from joblib.externals.loky import get_reusable_executor
+
+    # A system without `pgrep` makes the pool say so, at length, when it ends workers.
+    warnings.filterwarnings("ignore", "Failed to kill subprocesses")
+    # Without the empty value a worker that crashes would print where each of its threads was.
+    pool = get_reusable_executor(
+        jobs, initializer=begin, initargs=(os.getpid(),), env={"PYTHONFAULTHANDLER": ""}
+    )
+    waiting: set[Future] = set()
+    left = iter(groups)
+    try:
+        while True:
+            while len(waiting) < WAITING * jobs and (group := next(left, None)):
+                waiting.add(pool.submit(evaluate_and_store, group, folder))
+            if not waiting:
+                return
+            done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield future.result()
+    except BrokenProcessPool:
+        yield [], KILLED
+    except BaseException:
+        pool.shutdown(kill_workers=True)
+        raise
+    finally:
+        remove_partial(folder)
+
+
+def begin(driver: int) -> None:
+    """Begin a worker: interrupts are the driver's to handle, and the worker ends with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == driver:
+            time.sleep(LOOK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

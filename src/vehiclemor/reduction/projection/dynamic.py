@@ -67,15 +67,15 @@ class DynamicProjection(ReducedSystem):
         """Largest real part of an eigenvalue of each window's reduced Jacobian (windows,), 1/s.
 
         At the mean of the window's snapshots, without steering.  One far above that of the full
-        model says that the projection has made the system unstable.
+        model says that the projection has made the system unstable.  NaN where the training was at
+        rest: a window of rank 0 has no eigenvalue.
         """
         model, spaces = self.model, self.spaces
-        rates = np.empty(len(self.bases))
-        for k, dim in enumerate(spaces.ranks):
-            y = self._at_mean(k)
-            rates[k] = np.linalg.eigvals(
-                linearisation.reduced_jacobian(model, spaces, k, y[:dim])
-            ).real.max()
+        rates = np.full(len(self.bases), np.nan)
+        for k in np.flatnonzero(spaces.ranks):
+            y = self._at_mean(k)[: spaces.ranks[k]]
+            jacobian = linearisation.reduced_jacobian(model, spaces, k, y)
+            rates[k] = np.linalg.eigvals(jacobian).real.max()
         return rates
 
     def _at_mean(self, window: int) -> np.ndarray:
@@ -96,8 +96,8 @@ class DynamicProjection(ReducedSystem):
 
     @property
     def spectral_abscissa(self) -> float:
-        """Largest spectral abscissa in any window, 1/s."""
-        return float(self.spectral_abscissas.max())
+        """Largest spectral abscissa in any window, 1/s; NaN if all windows are at rest."""
+        return float(np.fmax.reduce(self.spectral_abscissas))
 
 
 def fit_windows(

@@ -7,12 +7,13 @@ from typing import Any
 
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuvers import Maneuver
-from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
+from vehiclemor.study.evaluate import refusal
 from vehiclemor.study.experiment import Experiment, make_experiment
-from vehiclemor.study.method_settings import complete_settings, default_settings, for_method
+from vehiclemor.study.failure import Failure
+from vehiclemor.study.method_settings import complete_settings, default_settings
 from vehiclemor.study.plans.study_file import FACTORS, StudyFile, values
 from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
@@ -129,16 +130,12 @@ def _some_fits(model: Model, cells: list[Experiment]) -> None:
     Corners of a grid may not fit, such as a rank above the number of snapshots; if nothing does,
     the study is wrong.
     """
-    first: InputError | None = None
+    first: Failure | None = None
     for cell in cells:
-        method: Method = component("method", cell.method)
-        if not method.accepts(model)[0]:
+        found = refusal(model, cell)
+        # Of a method that refuses the model nothing is set; a bug is a result.
+        if found is None or found.status != "rejected" or not cell.settings:
             return
-        try:
-            method.check(model, for_method(model, cell.method, cell.settings))
-        except InputError as error:
-            first = first or error
-        else:
-            return
+        first = first or found
     if first is not None:
-        raise first
+        raise InputError(first.message)

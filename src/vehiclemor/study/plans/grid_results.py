@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.provenance import attributes, versions
-from vehiclemor.study.store import cell_path, read_arrays, read_dataset
+from vehiclemor.study.store import read_arrays, read_dataset, result_path
 from vehiclemor.study.variables import meaning_of
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
     arrays: dict[str, np.ndarray] = {}
     template: xr.Dataset | None = None
     for key, places in first_places.items():
-        path = cell_path(folder, key)
+        path = result_path(folder, key)
         if template is None:
             template = read_dataset(path, "cell", key)
             for name, variable in template.data_vars.items():

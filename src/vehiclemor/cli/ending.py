@@ -1,0 +1,55 @@
+"""How the command line ends: one line for whatever went wrong, and an exit status."""
+
+import io
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from cyclopts import CycloptsError
+
+from vehiclemor.cli.exit_status import FAILED, STOPPED, WRONG_INPUT
+from vehiclemor.errors import MachineError, VehiclemorError, machine_reason
+
+
+def ended(run: Callable[[], object]) -> int:
+    """Exit status of a call; why it has ended early is one line on standard error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that can't show a name must not end a study.
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        with _stopped_by_sigterm():
+            return int(run() or 0)
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except MachineError as error:
+        return _said(str(error), FAILED)
+    except (CycloptsError, VehiclemorError) as error:
+        return _said(str(error), WRONG_INPUT)
+    except (MemoryError, OSError) as error:
+        return _said(machine_reason(error) or str(error), FAILED)
+    except KeyboardInterrupt as stop:
+        number = stop.args[0] if stop.args else signal.SIGINT
+        text = "stopped; finished cells of a study are stored, run again to resume"
+        return _said(text, STOPPED + number)
+
+
+def _said(text: str, status: int) -> int:
+    print("vehiclemor: " + " ".join(text.split()), file=sys.stderr)
+    return status
+
+
+@contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end a command as Ctrl-C does: workers ended, partial files removed."""
+
+    def stop(number: int, _: object) -> None:
+        raise KeyboardInterrupt(number)
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
