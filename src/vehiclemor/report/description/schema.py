@@ -44,8 +44,8 @@ def words(part: Mapping[str, Any]) -> str:
         return part["$ref"].rpartition("/")[2]
     if "enum" in part:
         return ", ".join(map(str, part["enum"]))
-    if "anyOf" in part:
-        choices = [words(choice) for choice in part["anyOf"] if choice != {"type": "null"}]
+    if alternatives := part.get("anyOf", part.get("oneOf")):
+        choices = [words(choice) for choice in alternatives if choice != {"type": "null"}]
         # Every integer is a number.
         return " or ".join(c for c in choices if c != "integer" or "number" not in choices)
     if part["type"] == "array":
