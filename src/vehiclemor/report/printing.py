@@ -146,6 +146,8 @@ def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
             width(),
             initial_indent=" " * first,
             subsequent_indent=" " * rest,
+            # A path stays whole.
+            break_long_words=False,
             break_on_hyphens=False,
         )
     )
