@@ -61,7 +61,7 @@ class Workers:
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
         self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
-        if self._missing(groups):
+        if self.finished < self.asked:
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
         self._report()
