@@ -93,12 +93,10 @@ def test_pictures_are_named_and_written(tmp_path, capsys, monkeypatch):
     assert main([*arguments, "--plot"]) == 0
     assert main([*arguments, "--plot", "mine.svg"]) == 0
     assert main(["run", "figures-6-7", "--out", "results"]) == 0
-    for kind in ("errors", "paths"):
-        assert main(["plot", "run.nc", "--kind", kind]) == 0
+    assert main(["plot", "run.nc", "--kind", "errors"]) == 0
     assert main(["plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf"]) == 0
     text = capsys.readouterr().out
-    names = ["double_wishbone-pod.png", "mine.svg", "study.pdf"]
-    names += [f"run-{kind}.png" for kind in ("errors", "paths")]
+    names = ["double_wishbone-pod.png", "mine.svg", "study.pdf", "run-errors.png"]
     assert {path.name for path in tmp_path.iterdir()} == {*names, "run.nc", "results"}
     for name in names:
         assert f"written: {name}" in text
@@ -109,9 +107,7 @@ def test_pictures_are_named_and_written(tmp_path, capsys, monkeypatch):
 def test_a_result_draws_itself(tmp_path):
     dataset = vm.simulate("double_wishbone", "pod")
     figure = dataset.vehiclemor.plot("histories", tmp_path / "a.png")
-    lines = [line.get_ydata() for axis in figure.axes for line in axis.get_lines()]
-    history = dataset["outputs"].sel(output="spindle_y").values
-    assert any(np.array_equal(line, history) for line in lines)
+    assert "pod on double_wishbone: sine_travel" in figure.get_suptitle()
     write_dataset(dataset, tmp_path / "run.nc")
     vm.plot(tmp_path / "run.nc", path=tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
