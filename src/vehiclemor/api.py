@@ -164,6 +164,7 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.maneuvers import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -188,8 +189,6 @@ def simulate(
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
-    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
-
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError
