@@ -181,9 +181,8 @@ def simulate(
     chosen = complete_settings(ready, method, settings, preset)
     if start is None:
         start = ready.starts[0]
-    elif not isinstance(start, str):
-        start = tuple(ready.start(start).tolist())
-    test = Scenario(base.perturbed(frequency, amplitude), start)
+    own = start if isinstance(start, str) else tuple(ready.start(start).tolist())
+    test = Scenario(base.perturbed(frequency, amplitude), own)
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)

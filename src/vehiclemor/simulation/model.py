@@ -152,6 +152,7 @@ class Model(ShortRepr):
 
     def along(self, function: str, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Results (samples, size) of a function of the equations along a path."""
+        self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
         return along(self.kernels, function, self.constants, (states, inputs), sizes)
 
@@ -159,7 +160,8 @@ class Model(ShortRepr):
         """Raise `InputError` if the model's equations lack one of these functions."""
         for name in functions:
             if name not in self.equations.shapes:
-                raise InputError(f"{self.name} has no {name}: {NEEDED_FOR[name]}")
+                needed = NEEDED_FOR.get(name, f"it has {', '.join(self.equations.shapes)}")
+                raise InputError(f"{self.name} has no {name}: {needed}")
 
     def evaluated(self, function: str, state: Any, u: Any) -> np.ndarray:
         """Result of a function of the equations at a state (n,) and inputs.
@@ -169,8 +171,7 @@ class Model(ShortRepr):
         InputError
             If the model has no such function, or a value isn't finite.
         """
-        if function in NEEDED_FOR:
-            self.require(function)
+        self.require(function)
         result = np.empty(self.equations.shapes[function])
         state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
         self.kernels.call(function, state, u, self.constants, result)

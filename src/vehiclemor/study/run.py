@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.arguments import count, quoted
+from vehiclemor.arguments import count, quoted, within
 from vehiclemor.errors import InputError
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
@@ -18,6 +18,8 @@ from vehiclemor.study.workers import Progress, Workers
 
 if TYPE_CHECKING:
     import xarray as xr
+
+MOST_JOBS = 1024
 
 
 def run_studies(
@@ -42,7 +44,7 @@ def run_studies(
         Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
         is `predictive-<protocol>`.
     """
-    count("jobs", jobs)
+    within("jobs", count("jobs", jobs), (1, MOST_JOBS))
     if progress is not None and not callable(progress):
         raise InputError(f"progress is {quoted(progress)}, not a function")
     definitions = load_studies(study)
