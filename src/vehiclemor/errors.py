@@ -4,6 +4,7 @@ import difflib
 import errno
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
@@ -41,7 +42,17 @@ class UnreachableError(VehiclemorError):
 
 
 class ConvergenceError(VehiclemorError):
-    """An iteration did not converge, or met a value that is not finite."""
+    """An iteration did not converge, or met a value that is not finite.
+
+    Attributes
+    ----------
+    trajectory
+        The run as far as it went, with its counts; None if there is none.
+    """
+
+    def __init__(self, message: str, trajectory: Any = None) -> None:
+        super().__init__(message)
+        self.trajectory = trajectory
 
 
 def machine_reason(error: BaseException) -> str:

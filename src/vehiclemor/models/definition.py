@@ -77,6 +77,8 @@ class ModelDefinition(ShortRepr):
         Parameters -> coordinates (n,) at which all inputs are zero (kind `ae`).
     travel_limit
         Wheel travel in m up to which the limits of reach are looked for (kind `ae`).
+    stops
+        Coordinate -> largest magnitude in its unit that the mechanism may reach (kind `ae`).
     starts
         Parameters and what was solved -> initial states (2 n,) by name, the default first (`ode`
         and `dae`).
@@ -139,6 +141,7 @@ class ModelDefinition(ShortRepr):
     check: Callable[[Values], None] = _anything
     design_coordinates: Callable[[Values], np.ndarray] = _unset
     travel_limit: float = 0.5
+    stops: Mapping[str, float] = field(default_factory=dict)
     starts: Callable[[Values], dict[str, np.ndarray]] = _unset
     solved: tuple[str, ...] = ()
     solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = _nothing
@@ -194,6 +197,7 @@ class ModelDefinition(ShortRepr):
             raise InputError(f"model {self.name!r} has heading_pairs, but no heading in planar")
         outputs = {q.name for q in self.outputs}
         report = self.report
+        self._known("stops", self.stops, (q.name for q in self.coordinates))
         self._known("cyclic", self.cyclic, self.states)
         self._known("planar", self.planar, self.states)
         self._known("heading_pairs", (n for pair in self.heading_pairs for n in pair), self.states)

@@ -31,6 +31,46 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
     return array
 
 
+def checked_path(
+    value: Any, size: int, name: str, samples: int | None = None, finite: bool = True
+) -> np.ndarray:
+    """A path (samples, size) of floats, as compiled functions want it; finite unless told.
+
+    Raises
+    ------
+    InputError
+        If it has another shape, or holds what is no finite number.
+    """
+    try:
+        path = loop_array(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be arrays of numbers: {error}") from None
+    wanted = f"({'samples' if samples is None else samples}, {size})"
+    if path.ndim != 2 or path.shape[1] != size or samples not in (None, len(path)):
+        raise InputError(f"{name} have shape {path.shape}, not {wanted}")
+    if finite and not np.isfinite(path).all():
+        row, column = np.argwhere(~np.isfinite(path))[0]
+        raise InputError(f"{name}[{row}, {column}] is not finite")
+    return path
+
+
+def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Inputs (samples, inputs) at given times, as compiled functions want them.
+
+    Raises
+    ------
+    InputError
+        If there are none, they have another shape or one isn't finite; its time is named.
+    """
+    if not len(times):
+        raise InputError("inputs are needed at one time at least")
+    inputs = checked_path(value, len(names), "inputs", len(times), finite=False)
+    if not np.isfinite(inputs).all():
+        sample, column = np.argwhere(~np.isfinite(inputs))[0]
+        raise InputError(f"input {names[column]} is not finite at t = {times[sample]:.6g} s")
+    return inputs
+
+
 def check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
     """Raise `InputError` if a maneuver is none, or gives other inputs than a model has.
 

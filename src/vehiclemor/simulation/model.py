@@ -148,13 +148,21 @@ class Model(ShortRepr):
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
-        return self.along("outputs", states, inputs)
+        return self.along("outputs", states, inputs, finite=True)
 
-    def along(self, function: str, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Results (samples, size) of a function of the equations along a path."""
+    def along(
+        self, function: str, states: np.ndarray, inputs: np.ndarray, finite: bool = False
+    ) -> np.ndarray:
+        """Results (samples, size) of a function of the equations along a path.
+
+        Parameters
+        ----------
+        finite
+            Whether to refuse what is no number, as a trajectory is after it has failed.
+        """
         self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
-        return along(self.kernels, function, self.constants, (states, inputs), sizes)
+        return along(self.kernels, function, self.constants, (states, inputs), sizes, finite)
 
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""

@@ -71,9 +71,9 @@ def metrics_dataset(
     if model.speeds:
         found["rms_speed_error"] = rms(run.speeds - full.speeds)
         found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
-    residual_at = getattr(model, "residual_at", None)
-    if residual_at is not None:
-        found["largest_residual"] = float(np.abs(residual_at(run.coordinates, run.inputs)).max())
+    if model.kind == "ae":
+        residuals = model.along("residual", run.coordinates, run.inputs)
+        found["largest_residual"] = float(np.abs(residuals).max())
     histories = variables({"reference_outputs": full.outputs}, "time")
     dataset = trajectory_dataset(model, run, variables(found | _of_fit(reduced)) | histories)
     if experiment.keep == "metrics":

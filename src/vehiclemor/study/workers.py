@@ -103,17 +103,16 @@ class Workers:
     def _evaluated(self, work: list[list[Experiment]]) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
         # Starting processes costs seconds: a handful of groups is quicker without.
-        alone = self.jobs == 1 or len(work) < 2 * self.jobs
-        # One group of each method first, so that its loops are compiled once.
-        first = list({group[0].method: group for group in reversed(work)}.values())
-        here = work if alone else first
-        for group in here:
-            yield self._taken(*evaluate_and_store(group, self.folder))
-        if not alone:
-            rest = [group for group in work if all(group is not other for other in first)]
-            with closing(evaluated_by_workers(rest, self.folder, self.jobs)) as pool:
-                for done in pool:
-                    yield self._taken(*done)
+        if self.jobs == 1 or len(work) < 2 * self.jobs:
+            for group in work:
+                yield self._taken(*evaluate_and_store(group, self.folder))
+            return
+        # One group of each method first, so that workers compile different loops at a time.
+        first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
+        work.sort(key=lambda group: id(group) not in first)
+        with closing(evaluated_by_workers(work, self.folder, self.jobs)) as pool:
+            for done in pool:
+                yield self._taken(*done)
 
     def _taken(self, finished: list[str], fault: str) -> str:
         self.finished.update(finished)

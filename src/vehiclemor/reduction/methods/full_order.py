@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.errors import ConvergenceError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
 from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
@@ -59,8 +60,14 @@ class FullOrderModel(ShortRepr):
         return len(self.model.coordinates)
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Full-order trajectory at the maneuver's output times."""
-        return self.model.simulate(maneuver, start, solver=self.solver, tolerance=self.tolerance)
+        """Full-order trajectory at the maneuver's output times; it may have diverged."""
+        how = {"solver": self.solver, "tolerance": self.tolerance}
+        try:
+            return self.model.simulate(maneuver, start, **how)
+        except ConvergenceError as error:
+            if error.trajectory is None:
+                raise
+            return error.trajectory
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""

@@ -16,7 +16,7 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_loop
+from vehiclemor.reduction.polynomials.kernels import map_loop
 from vehiclemor.reduction.polynomials.map_loops import BLOCK
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.solved_path import solved_path
@@ -78,7 +78,7 @@ class PathMapModel(ShortRepr):
         """Polynomials at the maneuver's output times."""
         model, times = self.model, maneuver.times
         model.start(start)
-        inputs = checked_inputs(model, maneuver)
+        inputs = model.inputs_of(maneuver, times)
         degree, n = len(self.coefficients) - 1, len(model.coordinates)
         (low, high), slack = self.travel, SLACK * (self.travel[1] - self.travel[0])
         limits = np.array([low - slack, high + slack, self.rack - slack, self.rack + slack])

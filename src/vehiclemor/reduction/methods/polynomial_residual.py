@@ -19,7 +19,6 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import (
-    checked_inputs,
     derivatives,
     monomials,
     residual_loop,
@@ -107,7 +106,7 @@ class PolynomialResidualModel(ShortRepr):
         """Solve the polynomial equations at the maneuver's output times."""
         model, times = self.model, maneuver.times
         began_at = self.reduced(model.start(start)[None, :])[0]
-        inputs = checked_inputs(model, maneuver)
+        inputs = model.inputs_of(maneuver, times)
         rank = self.basis.rank
         polynomials = Polynomials(
             np.concatenate([self.mean_inputs, self.basis.mean]),
