@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
 
@@ -163,7 +163,7 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment

@@ -19,9 +19,9 @@ GROUPS = {
 }
 # Class of the components of a kind, named as in an entry point: most stand in a layer above.
 CLASSES = {
-    "model": "vehiclemor.models.definition:ModelDefinition",
+    "model": "vehiclemor.multibody.definition:ModelDefinition",
     "method": "vehiclemor.reduction.interface:Method",
-    "maneuver": "vehiclemor.maneuvers:Maneuver",
+    "maneuver": "vehiclemor.maneuver:Maneuver",
 }
 
 

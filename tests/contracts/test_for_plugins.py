@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor import contracts
-from vehiclemor.models.quantities import Quantity
-from vehiclemor.models.report import ModelReport, TimingCase
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.report import ModelReport, TimingCase
 from vehiclemor.registry import component, names
 
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]

@@ -7,7 +7,7 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.errors import VehiclemorError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import StudyFile

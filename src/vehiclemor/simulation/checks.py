@@ -7,8 +7,8 @@ import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:

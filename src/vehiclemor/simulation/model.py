@@ -12,8 +12,8 @@ import numpy as np
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
