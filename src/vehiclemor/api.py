@@ -15,6 +15,7 @@ from vehiclemor.registry import component, names
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
@@ -186,6 +187,8 @@ def simulate(
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
+
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError
@@ -231,11 +234,53 @@ def run_study(
         cell of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.study.plans.grid_results import flattened
+    from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
-    results = run_studies(str(file_path("study", study)), file_path("out", out), jobs, progress)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is {quoted(progress)}, not a function")
+    with listening(progress):
+        results = run_studies(str(file_path("study", study)), file_path("out", out), jobs)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
+
+
+def plot(
+    result: xr.Dataset | str | Path,
+    kind: str = "histories",
+    path: str | Path | None = None,
+    *,
+    results: str | Path = RESULTS,
+    **at: object,
+) -> Figure:
+    """Draw a result; a dataset draws itself by `dataset.vehiclemor.plot(...)`.
+
+    Parameters
+    ----------
+    result
+        Dataset of `simulate` or `run_study`, a netCDF file, or the name of a study that was run.
+    kind
+        `histories` of outputs, `paths`, or `errors`.
+    path
+        Picture to write (PNG, SVG or PDF).
+    results
+        Results folder in which studies are looked for.
+    **at
+        Point of a study's grid, such as `rank=3`; else factors are 1 and the others first.  All
+        methods are drawn where none is chosen.
+
+    Raises
+    ------
+    VehiclemorError
+        If there is no such result, kind or point, or the result holds no histories.
+    """
+    from vehiclemor.report.accessor import ResultAccessor
+    from vehiclemor.report.result_selection import stored_result
+
+    if isinstance(result, str | Path):
+        result = stored_result(str(result), Path(results))
+    return ResultAccessor(result).plot(kind, path, **at)
 
 
 def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:

@@ -125,7 +125,6 @@ def test_parameters(name, value, words):
         (lambda: vm.run_study("paper", jobs=True), ["jobs is True", "whole number"]),
         (lambda: vm.run_study("paper", out=""), ["out: '' is not a path"]),
         (lambda: vm.run_study("paper", out=None), ["out: None is not a path"]),
-        (lambda: vm.run_study("paper", progress=3), ["progress is 3, not a function"]),
         (lambda: vm.compare(["paper"]), ["unknown comparison ['paper']"]),
         (lambda: vm.compare(jobs="2"), ["jobs is '2'"]),
         (lambda: vm.figures(3), ["only is 3, not a list"]),

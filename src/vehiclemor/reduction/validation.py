@@ -92,16 +92,6 @@ def checked_run(model: Model, maneuver: Maneuver, reduced: Any, run: Any) -> Tra
     return run
 
 
-def parsed(text: str) -> object:
-    """A value from the command line: an integer, a number or text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
-
-
 def _wrong(error: Any) -> str:
     """What is wrong with a value, in the words of this package."""
     value, limits = error["input"], error.get("ctx", {})
