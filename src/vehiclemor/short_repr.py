@@ -37,7 +37,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
-LONGEST = 80
+LONGEST = 60
 _CUT = reprlib.Repr()
 _CUT.maxtuple = _CUT.maxlist = 4
 _CUT.maxstring = _CUT.maxother = LONGEST

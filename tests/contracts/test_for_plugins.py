@@ -69,7 +69,7 @@ def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message:
     ("change", "message"),
     [
         ({"inputs": (Quantity("s0", "m", "one"), Quantity("z", "m", "two"))}, "other inputs"),
-        ({"coordinates": (Quantity("one", "m", "one"),)}, "residual has shape"),
+        ({"coordinates": (Quantity("one", "m", "one"),), "stops": {}}, "residual has shape"),
         ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
         (
             {

@@ -44,12 +44,7 @@ def car():
         ({"maneuver": ""}, ["unknown maneuver ''"]),
         ({"maneuver": "lane_change"}, ["gives inputs delta", "needs z, s0"]),
         ({"start": ""}, ["unknown start ''"]),
-        ({"start": 3}, ["start has shape (1,)", "needs (8,)"]),
-        ({"start": [1.0, [2.0]]}, ["start is [1.0, [2.0]]", "needs 8 numbers"]),
-        ({"start": {}}, ["start is {}"]),
-        ({"start": np.zeros(8, complex)}, ["start is", "needs 8 numbers"]),
-        ({"start": MASKED}, ["start is masked_array", "needs 8 numbers"]),
-        ({"start": ["0.0"] * 8}, ["start is", "needs 8 numbers"]),
+        ({"start": [0.0] * 8}, ["double_wishbone starts from 'equilibrium' alone"]),
         ({"preset": ["literal"]}, ["unknown preset", "['literal']"]),
         ({"preset": None}, ["unknown preset", "None"]),
         ({"training": 3}, ["unknown training policy", "3"]),
@@ -220,8 +215,12 @@ def test_inputs_are_shown_by_their_output_times(frequency, fine):
 
 
 def test_states_that_are_none(car):
-    for state in ([1.0, 2.0], {}, 3, "nothing", np.full(28, np.nan), car.start() + 0j, MASKED):
+    none = ([1.0, [2.0]], {}, ["0.0"] * 28, car.start() + 0j, MASKED)
+    for state in (*none, [1.0, 2.0], 3, "nothing", np.full(28, np.nan)):
         refused(lambda state=state: car.start(state), "start")
+        refused(lambda state=state: vm.simulate(car, start=state), "start")
+    for state in none:
+        refused(lambda state=state: car.start(state), "start is", "needs 28 numbers")
     for u in ("1", None, 1j, np.datetime64("2020-01-01"), np.ma.masked):
         refused(lambda u=u: car.derivative(car.start(), u), "u is")
 

@@ -44,15 +44,16 @@ def words(part: Mapping[str, Any]) -> str:
         return part["$ref"].rpartition("/")[2]
     if "enum" in part:
         return ", ".join(map(str, part["enum"]))
-    if "anyOf" in part:
-        choices = [words(choice) for choice in part["anyOf"] if choice != {"type": "null"}]
+    if either := part.get("anyOf") or part.get("oneOf"):
+        choices = [words(choice) for choice in either if choice != {"type": "null"}]
         # Every integer is a number.
         return " or ".join(c for c in choices if c != "integer" or "number" not in choices)
     if part["type"] == "array":
         return f"list of {words(part['items'])}"
     if part["type"] == "object":
         return f"table of {words(part['additionalProperties'])}"
-    limits = bounds(part.get("exclusiveMinimum"), part.get("minimum"), part.get("maximum"))
+    largest = part.get("maximum", part.get("exclusiveMaximum"))
+    limits = bounds(part.get("exclusiveMinimum"), part.get("minimum"), largest)
     return f"{WORDS.get(part['type'], part['type'])} {limits}".rstrip()
 
 
