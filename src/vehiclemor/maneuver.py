@@ -70,7 +70,7 @@ class Maneuver(ShortRepr):
         if number(f"{self}: duration", self.duration) <= 0.0:
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
-        within(f"{self}: samples", count(f"{self}: samples", self.samples, 2), (2, MOST_SAMPLES))
+        within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
         for name, bounds in FACTORS.items():
             factor = number(f"{name} factor", getattr(self, f"{name}_factor"))
             if name == "frequency" and factor <= 0.0:

@@ -153,7 +153,7 @@ GOOD = {
         ({"duration": -1.0}, ["duration is -1 s, not positive"]),
         ({"duration": "5"}, ["duration: '5' is not a number"]),
         ({"duration": 1e300}, ["duration: 1e+300 s is above 100000 s"]),
-        ({"samples": 1}, ["samples is 1; it must be a whole number, at least 2"]),
+        ({"samples": 0}, ["samples is 0; it must be a whole number, at least 1"]),
         ({"samples": 2.5}, ["samples is 2.5; it must be a whole number"]),
         ({"samples": 10**12}, ["samples: 1e+12 is above 1e+07"]),
         ({"signal": None}, ["signal is not a function"]),

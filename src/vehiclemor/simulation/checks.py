@@ -109,6 +109,8 @@ def check_resolved(maneuver: Maneuver) -> None:
     straight line, as a sine of three samples a period does; it may leave it once.
     """
     times, between = maneuver.times, 0.38
+    if len(times) == 1:
+        return
     step = times[1]
     values = maneuver.at(times)
     inside = maneuver.at(times[:-1] + between * step)

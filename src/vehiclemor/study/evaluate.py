@@ -98,7 +98,7 @@ def refusal(model: Model, experiment: Experiment) -> Failure | None:
             raise InputError(reason)
         method.check(model, for_method(model, experiment.method, experiment.settings))
 
-    return attempt(check, f"method {experiment.method!r}: ")
+    return attempt(check)
 
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:
@@ -147,7 +147,7 @@ def _fit(
         return checked_fit(method_name, method.fit(model, runs, complete))
 
     with one_thread():
-        return attempt(fit, f"method {method_name!r}: ")
+        return attempt(fit)
 
 
 @lru_cache(maxsize=64)
