@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
 
@@ -165,7 +165,7 @@ def simulate(
         diverges is a result: its status says so.
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
-    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
@@ -183,9 +183,8 @@ def simulate(
     chosen = complete_settings(ready, method, settings, preset)
     if start is None:
         start = ready.starts[0]
-    elif not isinstance(start, str):
-        start = tuple(ready.start(start).tolist())
-    test = Scenario(base.perturbed(frequency, amplitude), start)
+    own = start if isinstance(start, str) else tuple(ready.start(start).tolist())
+    test = Scenario(base.perturbed(frequency, amplitude), own)
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)

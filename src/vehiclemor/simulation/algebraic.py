@@ -10,8 +10,8 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import DESIGN_START
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (

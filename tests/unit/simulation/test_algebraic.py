@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import InputError, UnreachableError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory

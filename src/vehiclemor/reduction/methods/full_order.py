@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.errors import ConvergenceError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
 from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
 from vehiclemor.reduction.training import Training

@@ -53,7 +53,8 @@ def words(part: Mapping[str, Any]) -> str:
         if kind == container:
             inside = part.get(key)
             return f"{WORDS[kind]} of {words(inside)}" if isinstance(inside, dict) else WORDS[kind]
-    limits = bounds(part.get("exclusiveMinimum"), part.get("minimum"), part.get("maximum"))
+    largest = part.get("maximum", part.get("exclusiveMaximum"))
+    limits = bounds(part.get("exclusiveMinimum"), part.get("minimum"), largest)
     return f"{WORDS.get(kind, kind)} {limits}".rstrip()
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.tape import Tape

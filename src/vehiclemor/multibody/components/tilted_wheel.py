@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.components.tires import TireForces, fiala, maximum, minimum
+from vehiclemor.multibody.components.tires import TireForces, fiala, maximum, minimum
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.tape import Tape

@@ -11,9 +11,9 @@ from typing import Any
 
 import sympy as sp
 
-from vehiclemor.models.components import body
-from vehiclemor.models.double_wishbone import linkage
-from vehiclemor.models.high_fidelity import assembly, corners, linkage_motions, parts, quantities
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.double_wishbone import linkage
+from vehiclemor.multibody.high_fidelity import assembly, corners, linkage_motions, parts, quantities
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate

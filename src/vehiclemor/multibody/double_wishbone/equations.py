@@ -4,8 +4,8 @@ from typing import cast
 
 import sympy as sp
 
-from vehiclemor.models.double_wishbone import linkage, quantities
-from vehiclemor.models.double_wishbone.points import POINTS
+from vehiclemor.multibody.double_wishbone import linkage, quantities
+from vehiclemor.multibody.double_wishbone.points import POINTS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.program import Program, assemble

@@ -14,10 +14,10 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from vehiclemor.models.components import body
-from vehiclemor.models.high_fidelity import frozen_quantities as frozen
-from vehiclemor.models.high_fidelity import frozen_wheels, independent, parts, quantities
-from vehiclemor.models.quantities import WHEELS
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
+from vehiclemor.multibody.high_fidelity import frozen_wheels, independent, parts, quantities
+from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import ZERO

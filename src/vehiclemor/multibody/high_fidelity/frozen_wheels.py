@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.components import tilted_wheel
-from vehiclemor.models.components.tires import fiala, maximum
-from vehiclemor.models.high_fidelity import frozen_quantities as frozen
+from vehiclemor.multibody.components import tilted_wheel
+from vehiclemor.multibody.components.tires import fiala, maximum
+from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import UNIT, ZERO

@@ -11,7 +11,7 @@ MASS = Declared("kg", above=0.0, at_most=1e5)
 INERTIA = Declared("kg m^2", above=0.0, at_most=1e6)
 STIFFNESS = Declared("N/m", above=0.0, at_most=1e9)
 DAMPING = Declared("N s/m", at_least=0.0, at_most=1e8)
-LOAD = Declared("N", above=0.0, at_most=1e7)
+LOAD = Declared("N", at_least=1.0, at_most=1e7)
 # Those of measured tires are below 100.
 TIRE_COEFFICIENT = Declared("1", at_least=-1e3, at_most=1e3)
 # Below it slip is regularised.

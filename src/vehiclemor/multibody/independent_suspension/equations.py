@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from vehiclemor.models.components import body
-from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
-from vehiclemor.models.components.tires import TireForces, magic_formula, tire_outputs
-from vehiclemor.models.independent_suspension import quantities
-from vehiclemor.models.independent_suspension.equilibrium import Derived, derived
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.components.tire_coefficients import MAGIC_FORMULA
+from vehiclemor.multibody.components.tires import TireForces, magic_formula, tire_outputs
+from vehiclemor.multibody.independent_suspension import quantities
+from vehiclemor.multibody.independent_suspension.equilibrium import Derived, derived
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import joints, mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric

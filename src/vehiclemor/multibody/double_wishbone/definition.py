@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.double_wishbone import quantities
-from vehiclemor.models.double_wishbone.points import POINTS, design_coordinates
-from vehiclemor.models.report import ALGEBRAIC_BASELINES, ModelReport, reduced_case
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.double_wishbone import quantities
+from vehiclemor.multibody.double_wishbone.points import POINTS, design_coordinates
+from vehiclemor.multibody.report import ALGEBRAIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def derive() -> Program:
     """Derive residual, analytic Jacobian and outputs; the hard points stay symbols."""
-    from vehiclemor.models.double_wishbone import equations
+    from vehiclemor.multibody.double_wishbone import equations
 
     return equations.derive()
 

@@ -1,7 +1,10 @@
 """Coordinates, speeds and constants of the high-fidelity vehicle with frozen inertia by name."""
 
-from vehiclemor.models.high_fidelity.quantities import INDEPENDENT_COORDINATES, INDEPENDENT_SPEEDS
-from vehiclemor.models.quantities import CHASSIS_SPEEDS, per_wheel
+from vehiclemor.multibody.high_fidelity.quantities import (
+    INDEPENDENT_COORDINATES,
+    INDEPENDENT_SPEEDS,
+)
+from vehiclemor.multibody.quantities import CHASSIS_SPEEDS, per_wheel
 
 COORDINATES = INDEPENDENT_COORDINATES
 SPEEDS = (

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.independent_suspension import quantities
-from vehiclemor.models.independent_suspension.equilibrium import check, starts
-from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, reduced_case
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.independent_suspension import quantities
+from vehiclemor.multibody.independent_suspension.equilibrium import check, starts
+from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
+from vehiclemor.multibody.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def derive() -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
-    from vehiclemor.models.independent_suspension import equations
+    from vehiclemor.multibody.independent_suspension import equations
 
     return equations.derive()
 

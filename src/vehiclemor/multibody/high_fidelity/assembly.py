@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from vehiclemor.models.components import body
-from vehiclemor.models.components.tires import tire_outputs
-from vehiclemor.models.high_fidelity.corners import Corner, diagonal
-from vehiclemor.models.high_fidelity.parts import Vehicle
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.components.tires import tire_outputs
+from vehiclemor.multibody.high_fidelity.corners import Corner, diagonal
+from vehiclemor.multibody.high_fidelity.parts import Vehicle
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric

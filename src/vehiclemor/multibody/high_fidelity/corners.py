@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from vehiclemor.models.components import tilted_wheel
-from vehiclemor.models.components.tires import TireForces
-from vehiclemor.models.double_wishbone.linkage import Arm, Linkage
-from vehiclemor.models.high_fidelity.linkage_motions import LinkageMotions
-from vehiclemor.models.high_fidelity.parts import SIDES, Vehicle
+from vehiclemor.multibody.components import tilted_wheel
+from vehiclemor.multibody.components.tires import TireForces
+from vehiclemor.multibody.double_wishbone.linkage import Arm, Linkage
+from vehiclemor.multibody.high_fidelity.linkage_motions import LinkageMotions
+from vehiclemor.multibody.high_fidelity.parts import SIDES, Vehicle
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector

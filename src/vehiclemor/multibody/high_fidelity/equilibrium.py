@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.models.definition import Derivative
-from vehiclemor.models.double_wishbone.points import POINTS, check_linkage, tie_rod_angles
-from vehiclemor.models.vehicle_parameters import check_moments
+from vehiclemor.multibody.definition import Derivative
+from vehiclemor.multibody.double_wishbone.points import POINTS, check_linkage, tie_rod_angles
+from vehiclemor.multibody.vehicle_parameters import check_moments
 
 # Places of z, theta, the left lower arm and the left rear arm among the coordinates.
 HEIGHT, PITCH, LOWER_ARM, REAR_ARM = 2, 4, 10, 20

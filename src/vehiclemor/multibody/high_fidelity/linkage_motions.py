@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.double_wishbone.linkage import Linkage
+from vehiclemor.multibody.double_wishbone.linkage import Linkage
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector

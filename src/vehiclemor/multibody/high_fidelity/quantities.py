@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from vehiclemor.models import vehicle_parameters as shared
-from vehiclemor.models.double_wishbone.points import POINTS
-from vehiclemor.models.quantities import (
+from vehiclemor.multibody import vehicle_parameters as shared
+from vehiclemor.multibody.double_wishbone.points import POINTS
+from vehiclemor.multibody.quantities import (
     CHASSIS_COORDINATES,
     CHASSIS_OUTPUTS,
     TIRE_OUTPUTS,

@@ -14,6 +14,7 @@ from vehiclemor.short_repr import ShortRepr
 FACTORS = {"frequency": (1e-3, 1e3), "amplitude": (-1e6, 1e6)}
 LONGEST_DURATION = 1e5
 MOST_SAMPLES = 10_000_000
+MOST_CORNERS = 10_000
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Maneuver(ShortRepr):
         if number(f"{self}: duration", self.duration) <= 0.0:
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
-        within(f"{self}: samples", count(f"{self}: samples", self.samples, 2), (2, MOST_SAMPLES))
+        within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
         for name, bounds in FACTORS.items():
             factor = number(f"{name} factor", getattr(self, f"{name}_factor"))
             if name == "frequency" and factor <= 0.0:
@@ -91,6 +92,7 @@ class Maneuver(ShortRepr):
             times = real_array([*self.corners(self.frequency_factor)] or np.zeros(0))
         if times.ndim != 1 or not np.isfinite(times).all():
             raise InputError(f"{self}: corners are {quoted(times)}, not a list of times in s")
+        within(f"{self}: number of corners", len(times), (0, MOST_CORNERS))
         return tuple(times.tolist())
 
     def at(self, times: np.ndarray) -> np.ndarray:

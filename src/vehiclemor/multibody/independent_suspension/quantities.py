@@ -1,8 +1,8 @@
 """Coordinates, speeds, inputs, outputs and parameters of the 14-DOF vehicle by name."""
 
-from vehiclemor.models import vehicle_parameters as shared
-from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
-from vehiclemor.models.quantities import (
+from vehiclemor.multibody import vehicle_parameters as shared
+from vehiclemor.multibody.components.tire_coefficients import MAGIC_FORMULA
+from vehiclemor.multibody.quantities import (
     CHASSIS_COORDINATES,
     CHASSIS_OUTPUTS,
     CHASSIS_SPEEDS,

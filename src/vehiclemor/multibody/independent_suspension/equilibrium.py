@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.models.independent_suspension.quantities import COORDINATES, FRONT, SPEEDS
-from vehiclemor.models.vehicle_parameters import check_moments
+from vehiclemor.multibody.independent_suspension.quantities import COORDINATES, FRONT, SPEEDS
+from vehiclemor.multibody.vehicle_parameters import check_moments
 
 
 @dataclass(frozen=True)

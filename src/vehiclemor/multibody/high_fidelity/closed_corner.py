@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.double_wishbone.linkage import Arm, Linkage
-from vehiclemor.models.high_fidelity.linkage_motions import LinkageMotions, relative
+from vehiclemor.multibody.double_wishbone.linkage import Arm, Linkage
+from vehiclemor.multibody.high_fidelity.linkage_motions import LinkageMotions, relative
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.joints import STILL, Rate, along, carried, free_rate

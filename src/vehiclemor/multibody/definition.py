@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.errors import InputError, did_you_mean
-from vehiclemor.models.quantities import Quantity
-from vehiclemor.models.report import ModelReport, completed
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.report import ModelReport, completed
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 

@@ -1,6 +1,6 @@
 """Coordinates, inputs, outputs and equations of the double-wishbone suspension by name."""
 
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.multibody.quantities import Quantity
 
 COORDINATES = (
     Quantity("zeta", "rad", "first 3-2-1 Euler angle of the wheel carrier (about z)"),

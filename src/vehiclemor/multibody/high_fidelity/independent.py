@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
-from vehiclemor.models.components import body
-from vehiclemor.models.high_fidelity import assembly, closed_corner, parts
-from vehiclemor.models.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
-from vehiclemor.models.high_fidelity.corners import front_corner, rear_corner
-from vehiclemor.models.high_fidelity.quantities import (
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.high_fidelity import assembly, closed_corner, parts
+from vehiclemor.multibody.high_fidelity.closed_corner import ClosedCorner, ClosedMotions
+from vehiclemor.multibody.high_fidelity.corners import front_corner, rear_corner
+from vehiclemor.multibody.high_fidelity.quantities import (
     COORDINATES,
     INDEPENDENT_COORDINATES,
     INDEPENDENT_SPEEDS,

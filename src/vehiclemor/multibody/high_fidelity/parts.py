@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.models.components import body
-from vehiclemor.models.double_wishbone.points import POINTS
-from vehiclemor.models.high_fidelity.quantities import PARAMETERS, SOLVED
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.double_wishbone.points import POINTS
+from vehiclemor.multibody.high_fidelity.quantities import PARAMETERS, SOLVED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.tape import Tape

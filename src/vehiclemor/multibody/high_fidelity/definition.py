@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.high_fidelity import quantities
-from vehiclemor.models.high_fidelity.equilibrium import check, solve_equilibrium, starts
-from vehiclemor.models.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.models.report import DYNAMIC_BASELINES, ModelReport, reduced_case
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.high_fidelity import quantities
+from vehiclemor.multibody.high_fidelity.equilibrium import check, solve_equilibrium, starts
+from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
+from vehiclemor.multibody.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def derive() -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
-    from vehiclemor.models.high_fidelity import equations
+    from vehiclemor.multibody.high_fidelity import equations
 
     return equations.derive()
 
