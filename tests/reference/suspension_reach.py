@@ -4,6 +4,8 @@
 the design position, and says how many have failed or lie on another branch.
 """
 
+import sys
+
 import numpy as np
 
 from vehiclemor.errors import VehiclemorError
@@ -57,12 +59,13 @@ def main() -> None:
     model = build("double_wishbone")
     grid = points(model, RACKS, HEIGHTS)
     failed, wrong, largest = failures(model, grid)
-    print(f"{grid[..., 0].size} points: {failed} failed, {wrong} on another branch")
-    print(f"largest coordinate: {largest:.3f} rad")
     racks = np.linspace(-0.1, 0.1, 20001)
     limits = np.array([model.reach(rack) for rack in racks])
-    slopes = np.abs(np.diff(limits, axis=0)) / np.diff(racks)[:, None]
-    print(f"largest change of the limits, m for 1 m of rack: {slopes.max(axis=0)}")
+    slopes = np.abs(np.diff(limits, axis=0)).max(axis=0) / (racks[1] - racks[0])
+    sys.stdout.write(
+        f"{grid[..., 0].size} points: {failed} failed, {wrong} on another branch; largest "
+        f"coordinate {largest:.3f} rad; limits change by {slopes.max():.2f} m for 1 m of rack\n"
+    )
 
 
 if __name__ == "__main__":

@@ -125,7 +125,7 @@ def test_a_run_that_diverges_tells_its_counts(
     run = error.value.trajectory
     assert run.status == "diverged"
     assert run.counts["iterations"] > 100
-    assert (run.counts["jacobian_evaluations"] > 0) and run.counts["linear_solves"] > 100
+    assert run.counts["linear_solves"] == run.counts["iterations"]
     diverged = FullOrderModel(model, solver, 1e-30).simulate(nominal, "equilibrium")
     assert (diverged.status, diverged.counts) == (run.status, run.counts)
 
