@@ -2,7 +2,8 @@
 
 import difflib
 import errno
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 # What of the system's errors is the machine's doing, whoever has asked for it.
@@ -61,6 +62,27 @@ def machine_reason(error: BaseException) -> str:
     if isinstance(error, OSError) and error.errno in MACHINE_ERRORS:
         return f"{error.strerror}"
     return ""
+
+
+def one_line(error: BaseException) -> str:
+    """Kind and text of an error in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+
+
+@contextmanager
+def blamed(whose: str) -> Iterator[None]:
+    """Turn what the code of a plug-in raises into one line that names it.
+
+    What the user can mend and what the machine does passes.
+    """
+    try:
+        yield
+    except VehiclemorError:
+        raise
+    except Exception as error:
+        if machine_reason(error):
+            raise
+        raise InputError(f"{whose}: {one_line(error)}") from error
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

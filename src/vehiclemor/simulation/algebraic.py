@@ -192,7 +192,7 @@ class AlgebraicModel(Model):
         InputError
             If they are not the model's, or one isn't finite.
         """
-        check_inputs(maneuver, self.name, self.inputs)
+        check_inputs(maneuver, self.definition)
         return checked_inputs(maneuver.at(times), times, self.inputs)
 
     def solve_path(

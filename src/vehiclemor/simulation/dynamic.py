@@ -181,7 +181,7 @@ class DynamicModel(Model):
         windows
             Formulation of the system and its subspaces by window.
         """
-        check_inputs(maneuver, self.name, self.inputs)
+        check_inputs(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step)

@@ -13,7 +13,7 @@ from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import Offline, ReducedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset, with_units
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.provenance import attributes
@@ -139,7 +139,7 @@ def errors_dataset(
         "output": [quantity.name for quantity in outputs],
         "output_unit": ("output", [quantity.unit for quantity in outputs]),
     }
-    return xr.Dataset(described, coordinates, _attributes(experiment))
+    return with_units(xr.Dataset(described, coordinates, _attributes(experiment)))
 
 
 def _errors(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

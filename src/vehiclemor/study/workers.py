@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
     cell_path,
     prepare_folder,
@@ -29,7 +30,6 @@ from vehiclemor.study.store import (
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[str, int, int], None]
 Groups = Sequence[Sequence[Experiment]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
@@ -41,15 +41,11 @@ _LOG = logging.getLogger("vehiclemor")
 
 @dataclass
 class Workers:
-    """Evaluates what is missing of some experiments, in so many jobs, and stores it.
-
-    `progress` is called with (name, finished experiments, all experiments).
-    """
+    """Evaluates what is missing of some experiments, in so many jobs, and stores it."""
 
     name: str
     folder: Path
     jobs: int = 1
-    progress: Progress | None = None
     asked: set[str] = field(default_factory=set)
     finished: set[str] = field(default_factory=set)
 
@@ -65,12 +61,14 @@ class Workers:
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
         self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        if self.finished < self.asked:
+            # A folder that can't be is told before anything is announced.
+            prepare_folder(self.folder)
         self._report()
         for _ in range(TRIES):
             work = self._missing(groups)
             if not work:
                 return
-            prepare_folder(self.folder)
             faults = [fault for fault in self._evaluated(work) if fault]
             if faults:
                 _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
@@ -94,23 +92,21 @@ class Workers:
         return [part for part in parts if part]
 
     def _report(self) -> None:
-        if self.progress:
-            self.progress(self.name, len(self.finished), len(self.asked))
+        tell(self.name, len(self.finished), len(self.asked))
 
     def _evaluated(self, work: list[list[Experiment]]) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
         # Starting processes costs seconds: a handful of groups is quicker without.
-        alone = self.jobs == 1 or len(work) < 2 * self.jobs
-        # One group of each method first, so that its loops are compiled once.
-        first = list({group[0].method: group for group in reversed(work)}.values())
-        here = work if alone else first
-        for group in here:
-            yield self._taken(*evaluate_and_store(group, self.folder))
-        if not alone:
-            rest = [group for group in work if all(group is not other for other in first)]
-            with closing(evaluated_by_workers(rest, self.folder, self.jobs)) as pool:
-                for done in pool:
-                    yield self._taken(*done)
+        if self.jobs == 1 or len(work) < 2 * self.jobs:
+            for group in work:
+                yield self._taken(*evaluate_and_store(group, self.folder))
+            return
+        # One group of each method first, so that workers compile different loops at a time.
+        first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
+        work.sort(key=lambda group: id(group) not in first)
+        with closing(evaluated_by_workers(work, self.folder, self.jobs)) as pool:
+            for done in pool:
+                yield self._taken(*done)
 
     def _taken(self, finished: list[str], fault: str) -> str:
         self.finished.update(finished)

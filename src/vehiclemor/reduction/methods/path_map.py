@@ -21,6 +21,7 @@ from vehiclemor.reduction.polynomials.map_loops import BLOCK
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.model import Model
@@ -44,7 +45,7 @@ class PathMapSettings(Settings):
 
 
 @dataclass(frozen=True)
-class PathMapModel:
+class PathMapModel(ShortRepr):
     """Coordinates as polynomials of the travel.
 
     Attributes

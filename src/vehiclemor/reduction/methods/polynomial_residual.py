@@ -26,9 +26,10 @@ from vehiclemor.reduction.polynomials.kernels import (
 from vehiclemor.reduction.polynomials.residual_loops import Polynomials
 from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
-from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -56,14 +57,12 @@ class PolynomialResidualSettings(Settings):
         "chord",
         description="chord: constant reduced Jacobian; newton: a fresh one in each iteration",
     )
-    tolerance: float = Field(
-        1e-6, gt=0.0, description="largest step of the last iteration (reduced coordinates)"
-    )
+    tolerance: StepTolerance = 1e-6
     seed: int = Field(0, ge=0, description="seed of the points beside the training path")
 
 
 @dataclass(frozen=True)
-class PolynomialResidualModel:
+class PolynomialResidualModel(ShortRepr):
     """Polynomial reduced equations g(x) = response^T (u - u_mean).
 
     Attributes
