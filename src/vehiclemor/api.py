@@ -276,11 +276,15 @@ def plot(
     VehiclemorError
         If there is no such result, kind or point, or the result holds no histories.
     """
+    import xarray as xr
+
     from vehiclemor.report.accessor import ResultAccessor
     from vehiclemor.report.result_selection import stored_result
 
     if isinstance(result, str | Path):
-        result = stored_result(str(result), Path(results))
+        result = stored_result(str(result), file_path("results", results))
+    if not isinstance(result, xr.Dataset):
+        raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
     return ResultAccessor(result).plot(kind, path, **at)
 
 
