@@ -204,6 +204,7 @@ class AlgebraicModel(Model):
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
         check_positive("tolerance", tolerance)
+        times = checked_array(times, np.size(times), "times", self.name)
         inputs = checked_inputs(inputs, times, self.inputs)
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())

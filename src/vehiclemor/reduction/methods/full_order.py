@@ -61,9 +61,8 @@ class FullOrderModel(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Full-order trajectory at the maneuver's output times; it may have diverged."""
-        how = {"solver": self.solver, "tolerance": self.tolerance}
         try:
-            return self.model.simulate(maneuver, start, **how)
+            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance)
         except ConvergenceError as error:
             if error.trajectory is None:
                 raise
