@@ -63,7 +63,7 @@ def test_a_simulation_is_a_table_with_aligned_columns():
     found["seconds"] = ((), 1e-3, {"clock": "CPU time of the thread"})
     units = {"output": outputs, "output_unit": ("output", ["rad", "m"])}
     dataset = xr.Dataset(found, units, {"title": "pod on a car"})
-    lines = simulation_text(dataset, ["steps"]).splitlines()
+    lines = simulation_text(dataset, outputs, ["steps"]).splitlines()
     assert lines[0] == "pod on a car: ok"
     rows = {line.split()[0]: line for line in lines if line.split()[0] in outputs}
     assert rows["yaw"].split() == ["yaw", "1.0e-03", "-", "2.0e-03", "1.0e-01", "rad"]
