@@ -15,8 +15,9 @@ from vehiclemor.registry import component, names
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
-    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
 
@@ -163,7 +164,8 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    from vehiclemor.maneuvers import Maneuver
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
@@ -181,9 +183,8 @@ def simulate(
     chosen = complete_settings(ready, method, settings, preset)
     if start is None:
         start = ready.starts[0]
-    elif not isinstance(start, str):
-        start = tuple(ready.start(start).tolist())
-    test = Scenario(base.perturbed(frequency, amplitude), start)
+    own = start if isinstance(start, str) else tuple(ready.start(start).tolist())
+    test = Scenario(base.perturbed(frequency, amplitude), own)
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
@@ -232,11 +233,57 @@ def run_study(
         cell of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.study.plans.grid_results import flattened
+    from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
-    results = run_studies(str(file_path("study", study)), file_path("out", out), jobs, progress)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is {quoted(progress)}, not a function")
+    with listening(progress):
+        results = run_studies(str(file_path("study", study)), file_path("out", out), jobs)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
+
+
+def plot(
+    result: xr.Dataset | str | Path,
+    kind: str = "histories",
+    path: str | Path | None = None,
+    *,
+    results: str | Path = RESULTS,
+    **at: object,
+) -> Figure:
+    """Draw a result; a dataset draws itself by `dataset.vehiclemor.plot(...)`.
+
+    Parameters
+    ----------
+    result
+        Dataset of `simulate` or `run_study`, a netCDF file, or the name of a study that was run.
+    kind
+        `histories` of outputs, `paths`, or `errors`.
+    path
+        Picture to write (PNG, SVG or PDF).
+    results
+        Results folder in which studies are looked for.
+    **at
+        Point of a study's grid, such as `rank=3`; else factors are 1 and the others first.  All
+        methods are drawn where none is chosen.
+
+    Raises
+    ------
+    VehiclemorError
+        If there is no such result, kind or point, or the result holds no histories.
+    """
+    import xarray as xr
+
+    from vehiclemor.report.accessor import ResultAccessor
+    from vehiclemor.report.result_selection import stored_result
+
+    if isinstance(result, str | Path):
+        result = stored_result(str(result), file_path("results", results))
+    if not isinstance(result, xr.Dataset):
+        raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
+    return ResultAccessor(result).plot(kind, path, **at)
 
 
 def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.registry import unknown
@@ -90,16 +90,6 @@ def checked_run(model: Model, maneuver: Maneuver, reduced: Any, run: Any) -> Tra
     if not isinstance(run.counts, Mapping):
         raise TypeError(f"{whose} counts {quoted(run.counts)}, not numbers by name")
     return run
-
-
-def parsed(text: str) -> object:
-    """A value from the command line: an integer, a number or text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
 
 
 def _wrong(error: Any) -> str:

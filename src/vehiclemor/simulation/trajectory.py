@@ -9,7 +9,7 @@ import numpy as np
 from vehiclemor.short_repr import ShortRepr
 
 # A named initial condition of a model, or a state (n,).
-Start = str | np.ndarray
+Start = str | tuple[float, ...] | np.ndarray
 STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {

@@ -6,23 +6,22 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.arguments import count, quoted
-from vehiclemor.errors import InputError
+from vehiclemor.arguments import count, within
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.store import result_path, stored
-from vehiclemor.study.workers import Progress, Workers
+from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
 
+MOST_JOBS = 1024
 
-def run_studies(
-    study: str, folder: Path, jobs: int = 1, progress: Progress | None = None
-) -> dict[str, xr.Dataset]:
+
+def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
     """Run a study, or all studies of a collection, and combine the results.
 
     Parameters
@@ -33,8 +32,6 @@ def run_studies(
         Results folder; cells that it holds already are not computed again.
     jobs
         Number of processes.
-    progress
-        Called with (study, finished cells, all cells).
 
     Returns
     -------
@@ -42,15 +39,13 @@ def run_studies(
         Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
         is `predictive-<protocol>`.
     """
-    count("jobs", jobs)
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress is {quoted(progress)}, not a function")
+    within("jobs", count("jobs", jobs), (1, MOST_JOBS))
     definitions = load_studies(study)
     protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
     grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
-    results = {p.study: run_protocol(p, folder, jobs, progress) for p in protocols}
+    results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
     for grid in grids:
-        workers = Workers(grid.name, folder, jobs, progress)
+        workers = Workers(grid.name, folder, jobs)
         workers([[cell] for cell in grid.unique.values()])
         results[grid.name] = stored(
             folder / "studies" / f"{grid.name}.nc",

@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
     cell_path,
     prepare_folder,
@@ -29,7 +30,6 @@ from vehiclemor.study.store import (
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[str, int, int], None]
 Groups = Sequence[Sequence[Experiment]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
@@ -41,15 +41,11 @@ _LOG = logging.getLogger("vehiclemor")
 
 @dataclass
 class Workers:
-    """Evaluates what is missing of some experiments, in so many jobs, and stores it.
-
-    `progress` is called with (name, finished experiments, all experiments).
-    """
+    """Evaluates what is missing of some experiments, in so many jobs, and stores it."""
 
     name: str
     folder: Path
     jobs: int = 1
-    progress: Progress | None = None
     asked: set[str] = field(default_factory=set)
     finished: set[str] = field(default_factory=set)
 
@@ -65,7 +61,7 @@ class Workers:
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
         self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
-        if self._missing(groups):
+        if self.finished < self.asked:
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
         self._report()
@@ -73,7 +69,6 @@ class Workers:
             work = self._missing(groups)
             if not work:
                 return
-            prepare_folder(self.folder)
             faults = [fault for fault in self._evaluated(work) if fault]
             if faults:
                 _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
@@ -97,8 +92,7 @@ class Workers:
         return [part for part in parts if part]
 
     def _report(self) -> None:
-        if self.progress:
-            self.progress(self.name, len(self.finished), len(self.asked))
+        tell(self.name, len(self.finished), len(self.asked))
 
     def _evaluated(self, work: list[list[Experiment]]) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""

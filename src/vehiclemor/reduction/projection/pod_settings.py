@@ -53,8 +53,9 @@ class AlgebraicPodSettings(Settings):
 class DynamicPodSettings(ProjectedSettings):
     """POD subspaces of equations of motion.
 
-    The defaults are chosen by measurement: they alone keep the published errors from both starts,
-    and the projected equations keep the model's energy.
+    The defaults are chosen by measurement, on the nominal runs that are then compared with the
+    paper: they keep the published errors from both starts, as states weighed by energy do too, and
+    the projected equations keep the model's energy.
     """
 
     rank: Rank = 3

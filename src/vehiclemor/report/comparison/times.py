@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from vehiclemor.models.report import TimingCase
+from vehiclemor.multibody.report import TimingCase
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.rows import Row, claim_row, number_row
 from vehiclemor.report.criteria.finding import IN_WORDS, PRINTED, Finding
@@ -75,6 +75,8 @@ def _missed_errors(model: str, row: dict[str, Any]) -> str:
 
 def _beside_integrators(table: pd.DataFrame, case: str) -> str:
     row, baseline, strongest = table.loc[case], table.loc["baseline"], table.loc["strongest"]
+    if row["status"] != "ok":
+        return ""
     return (
         f"{1.0 / float(row['speed_up']):.2f} times the time of the same integrator, "
         f"{row['rhs_calls']} evaluations against {baseline['rhs_calls']}; "

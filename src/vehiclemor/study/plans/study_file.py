@@ -13,8 +13,8 @@ from vehiclemor.resources import data_folder, data_names
 from vehiclemor.toml_files import FileSchema, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
-# A grid of more cells than this is a mistake in a file, not a study.
-MOST_CELLS = 1_000_000
+# A grid of more points than this is a mistake in a file, not a study.
+MOST_POINTS = 1_000_000
 
 
 class Span(FileSchema):
@@ -87,8 +87,8 @@ class StudyFile(FileSchema):
         return {entry.label or entry.method: entry for entry in self.methods}
 
     @property
-    def cells(self) -> int:
-        """Number of points of the grid, times starts and methods."""
+    def points(self) -> int:
+        """Number of points of the grid; one cell may stand at several of them."""
         sizes = (len(values(entry)) for entry in self.grid.values())
         return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
 
@@ -131,8 +131,8 @@ class StudyFile(FileSchema):
                 raise ValueError(
                     f"{name} is set twice: in the grid and in the settings of {method}"
                 )
-        if self.cells > MOST_CELLS:
-            raise ValueError(f"the grid has {self.cells} cells, more than {MOST_CELLS}")
+        if self.points > MOST_POINTS:
+            raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
         return self
 
 
