@@ -283,7 +283,7 @@ def test_pareto_figures_are_drawn_where_their_study_is_stored(tmp_path, capsys, 
     assert main(["figures", *folders]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 5
-    assert "pareto-suspension; vehiclemor run predictive" in printed[-1]
+    assert "left out: pareto-suspension (vehiclemor run predictive" in printed[-1]
     (tmp_path / "studies").mkdir(exist_ok=True)
     study = "predictive-double_wishbone"
     write_dataset(protocol_results(study), tmp_path / "studies" / f"{study}.nc")

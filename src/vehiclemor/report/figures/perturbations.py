@@ -1,8 +1,8 @@
 """Errors of any model over the axes of a study's grid: curves and maps."""
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ def figure_error_curves(
     outputs: Sequence[str],
     methods: Mapping[str, str],
     axis: str = "",
-    legend: str = "upper",
+    legend: Literal["upper", "lower"] = "upper",
 ) -> Figure:
     """RMS errors against one axis of the grid: panels for each study and output.
 
@@ -80,7 +80,7 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
             axis.plot(
                 none,
                 np.zeros(none.size),
-                label=f"{methods[method]}: no error, no place on the axis",
+                label=f"{methods[method]}: error 0, off the log axis",
                 **below,
                 **NOTHING,
             )
@@ -121,7 +121,6 @@ def figure_error_map(
         errors, shown = factor * errors, factor * shown
         limits = float(np.nanmin(shown[shown > 0.0])), float(np.nanmax(shown))
         norm = LogNorm(*limits)
-        mesh = None
         for axis, found in zip(axes[row], errors, strict=True):
             cells = np.maximum(found, limits[0])
             style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
@@ -133,7 +132,12 @@ def figure_error_map(
             axis.grid(visible=False)
         axes[row, 0].set_ylabel("amplitude perturbation (%)")
         label = error_label(dataset, "RMS error", output, unit)
-        bar = figure.colorbar(mesh, ax=axes[row, :], label=label, extend="min" if values else None)
+        bar = figure.colorbar(
+            axes[row, 0].collections[0],
+            ax=axes[row, :],
+            label=label,
+            extend="min" if values else None,
+        )
         tick_decades(bar.ax.yaxis, *limits)
     for number, axis in enumerate(axes.flat):
         axis.set_title(f"{letter(number)} {list(methods.values())[number % len(methods)]}")
@@ -198,6 +202,6 @@ def _write(
 
 def luminance(color: Sequence[float]) -> float:
     """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
-    parts = np.asarray(matplotlib.colors.to_rgb(tuple(color)))
+    parts = np.asarray(color, dtype=float)
     linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
