@@ -5,7 +5,7 @@ import pytest
 
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
