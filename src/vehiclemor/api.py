@@ -319,6 +319,9 @@ def figures(
     out: str | Path = RESULTS,
     results: str | Path = RESULTS,
     jobs: int = 1,
+    *,
+    style: str = "",
+    dpi: int | None = None,
 ) -> list[Path]:
     """Regenerate figures of the paper from stored results; studies that are missing are run first.
 
@@ -333,6 +336,8 @@ def figures(
         Results folder.
     jobs
         Number of processes for missing studies.
+    style, dpi
+        Name or file of a Matplotlib style on top of the package's, and dots an inch of PNG files.
 
     Returns
     -------
@@ -345,4 +350,4 @@ def figures(
     chosen = [only] if isinstance(only, str) else only
     if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
         raise InputError(f"only is {quoted(only)}, not a list of names of figures")
-    return regenerate_figures(*folders, chosen, count("jobs", jobs))
+    return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)

@@ -85,7 +85,9 @@ def test_figures_are_those_of_every_model(folder, tmp_path, capsys):
     arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", ",".join(names)]
     assert main(["figures", *arguments]) == 0
     written = capsys.readouterr().out.split()
-    assert written == [str(tmp_path / f"figure-{n}.{s}") for n in names for s in ("svg", "png")]
+    assert written == [
+        str(tmp_path / f"figure-{n}.{s}") for n in names for s in ("pdf", "svg", "png")
+    ]
     assert all(np.fromfile(path, dtype=np.uint8).size > 10_000 for path in written)
 
 

@@ -198,7 +198,7 @@ def test_every_shipped_study_expands():
     for name, study in load_studies("paper").items():
         assert expand(name, study).unique
     grid = expand("perturbation-grid", load_studies("perturbation-grid")["perturbation-grid"])
-    assert len(grid.cells) == 21 * 21 * 4
+    assert len(grid.cells) == 31 * 11 * 4
 
 
 def test_wrong_study_names_the_study():

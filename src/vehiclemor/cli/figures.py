@@ -13,6 +13,8 @@ def figures(
     out: Path = api.RESULTS / "figures",
     results: Path = api.RESULTS,
     jobs: int = 1,
+    style: str = "",
+    dpi: int | None = None,
 ) -> int:
     """Regenerate the paper's figures from stored results.
 
@@ -27,12 +29,22 @@ def figures(
         Results folder; studies that are missing are run first.
     jobs
         Number of processes for missing studies.
+    style
+        Name or file of a Matplotlib style on top of the package's.
+    dpi
+        Dots an inch of PNG files; 200 by default.
     """
     chosen = [name.strip() for name in only.split(",") if name.strip()]
     if only and not chosen:
         raise InputError(f"--only {only!r} names no figure")
     with shown_progress():
-        written = api.figures(chosen, out, results, jobs)
+        written = api.figures(chosen, out, results, jobs, style=style, dpi=dpi)
     for path in written:
         print(path)
+    from vehiclemor.report.regenerate import left_out
+
+    missing = {} if chosen else left_out(results)
+    if missing:
+        print(f"left out, for their studies are not stored: {', '.join(missing)}", end="; ")
+        print("vehiclemor run predictive makes them")
     return 0

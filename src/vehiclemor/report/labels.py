@@ -34,6 +34,8 @@ LABELS = {
     "vertical_speed": Label("vertical speed", "$v_z$", "v_z"),
 }
 
+# Words of an axis that leave no room for more beside them.
+LONG = 16
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
@@ -65,6 +67,8 @@ def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
     """Words, symbol and unit (the output's own by default) of an output."""
     label = label_of(output)
     symbol = "" if label.symbol == label.words else f" {label.symbol}"
+    if len(label.words) > LONG:
+        symbol = f"\n{symbol.strip()}"
     return f"{label.words}{symbol} ({unit or unit_of(dataset, output)})"
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.study.run import run_studies
+from vehiclemor.study.store import read_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,9 +23,14 @@ def regenerate_figures(
     style: str = "",
     dpi: int | None = None,
 ) -> list[Path]:
-    """Draw figures, by default those of the paper and an index of their captions; files written.
+    """Draw figures, by default all but those `left_out`, and an index of captions; files written.
 
-    Studies that the results folder lacks are run.
+    Studies that the results folder lacks are run, but for those of minutes: see `left_out`.
+
+    Parameters
+    ----------
+    style, dpi
+        Name or file of a Matplotlib style on top of the package's, and dots an inch of pictures.
 
     Raises
     ------
@@ -34,12 +40,16 @@ def regenerate_figures(
     from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
     from vehiclemor.report.figures.saving import FORMATS, save_figure, styled
 
-    defaults = [name for name, entry in FIGURES.items() if entry.default]
-    chosen = {name: find(name, results) for name in only or defaults}
+    missing = left_out(results)
+    chosen = {name: find(name, results) for name in only or FIGURES if only or name not in missing}
     make_folder(out)
     data: dict[str, xr.Dataset] = {}
-    for study in dict.fromkeys(study for entry in chosen.values() for study in entry.studies):
-        data |= run_studies(study, results, jobs)
+    for entry in chosen.values():
+        for study in entry.studies:
+            if not only and not entry.default:
+                data[study] = read_dataset(_stored(results, study), "study", study)
+            elif study not in data:
+                data |= run_studies(study, results, jobs)
     written: list[Path] = []
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
@@ -55,6 +65,22 @@ def regenerate_figures(
     if not only:
         written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
     return written
+
+
+def left_out(results: Path) -> dict[str, str]:
+    """Figures that are drawn only where their study is stored, and which study isn't."""
+    from vehiclemor.report.figures.catalogue import FIGURES
+
+    return {
+        name: study
+        for name, entry in FIGURES.items()
+        for study in entry.names
+        if not entry.default and not _stored(results, study).exists()
+    }
+
+
+def _stored(results: Path, study: str) -> Path:
+    return results / "studies" / f"{study}.nc"
 
 
 def regenerate_all(results: Path, out: Path, jobs: int = 1) -> list[Path]:

@@ -15,8 +15,10 @@ from vehiclemor.report.figures import (
     pareto,
     paths,
     perturbations,
+    spectrum,
     spread,
     suspension_schematic,
+    unseen,
     vehicle_schematic,
 )
 from vehiclemor.report.figures.lines import Results
@@ -34,6 +36,8 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "error curves": perturbations.figure_error_curves,
     "error map": perturbations.figure_error_map,
     "spread": spread.figure_spread,
+    "spectrum": spectrum.figure_spectrum,
+    "unseen inputs": unseen.figure_unseen,
     "equation order": equation_order.figure_equation_order,
     "pareto": pareto.figure_pareto,
 }

@@ -11,8 +11,8 @@ from vehiclemor.report.figures.lines import CROSS, FULL, Style
 from vehiclemor.report.labels import axis_label, error_label, readable_unit, unit_of
 
 LARGEST = "largest error in each {period:.2g} s"
-RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none", "clip_on": False}
-BREAK: Style = {"color": "#777777", "linewidth": 1.0, "linestyle": (0, (1, 2))}
+RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
+BREAK: Style = {"color": "#777777", "linewidth": 0.8}
 
 
 class Curve(NamedTuple):
@@ -122,7 +122,7 @@ def draw_largest_errors(
 ) -> dict[str, str]:
     """Largest error in each period (s), the RMS error at the right edge; the meaning of crosses."""
     ended: dict[str, str] = {}
-    for curve in panel.curves:
+    for number, curve in enumerate(panel.curves):
         edges, largest = _largest(abs(errors(panel, curve)), period)
         largest[largest == 0.0] = np.nan
         shown = {"label": curve.text, "drawstyle": "steps-post", **curve.style}
@@ -131,7 +131,8 @@ def draw_largest_errors(
         if str(curve.run["status"].item()) == "ok":
             rms = curve.run["rms_error"].sel(output=panel.output).item()
             edge = axis.get_yaxis_transform()
-            axis.plot(1.0, rms or np.nan, color=color, transform=edge, **RMS_MARK)
+            place = 1.0 + 0.03 * number
+            axis.plot(place, rms or np.nan, color=color, transform=edge, clip_on=False, **RMS_MARK)
         else:
             last = int(np.flatnonzero(np.isfinite(largest))[-1])
             ended["has diverged"] = color

@@ -20,8 +20,8 @@ from vehiclemor.report.figures.space import (
     draw_frame,
     draw_size,
     draw_spring_damper,
-    draw_tire,
     frame_space,
+    rim,
     space_and_graph,
     symbol,
 )
@@ -92,7 +92,7 @@ def _draw_vehicle(axis: Any, p: Mapping[str, Any], height: float) -> None:
         for centre in (mirror * front, mirror * rear):
             label = "wheel" if named and centre[0] > 0.0 else None
             style = {"color": COLORS["front wheel"], "linewidth": 1.8, "label": label}
-            draw_tire(axis, centre, np.array([0.0, 1.0, 0.0]), p["tire_radius"], **style)
+            axis.plot(*rim(centre, np.array([0.0, 1.0, 0.0]), p["tire_radius"]).T, **style)
     inner = p["tie_rod_inner"] - p["wheel_centre"] + front
     ends = np.array([inner, inner * [1.0, -1.0, 1.0]])
     axis.plot(*ends.T, color=COLORS["rack"], linewidth=2.4, label="rack")
@@ -145,12 +145,12 @@ def _mount(axis: Any, place: Point, named: bool) -> None:
 def _draw_sizes(axis: Any, p: Mapping[str, Any], height: float) -> None:
     """Dimensions on the road, each label beside its line."""
     front, rear = wheel_places(p)
-    aside, ahead = np.array([0.0, -0.45, 0.0]), np.array([0.65, 0.0, 0.0])
     right, left = (front * [1.0, side, 0.0] for side in (-1.0, 1.0))
-    draw_size(axis, right + aside, rear * [1.0, -1.0, 0.0] + aside, (-0.15, -0.30, 0.0), "l")
-    draw_size(axis, left + ahead, right + ahead, (0.35, -0.15, 0.0), "T")
+    along = right, rear * [1.0, -1.0, 0.0]
+    draw_size(axis, along, [0.0, -0.45, 0.0], [-0.15, -0.30, 0.0], "$l$ = {}")
+    draw_size(axis, (left, right), [0.65, 0.0, 0.0], [0.35, -0.15, 0.0], "$T$ = {}")
     top = np.array([0.0, 0.0, height])
-    draw_size(axis, 0.0 * top, top, (-0.45, 0.0, -height), "h")
+    draw_size(axis, (0.0 * top, top), [0.0, 0.0, 0.0], [-0.45, 0.0, -height], "$h$ = {}")
 
 
 def _count() -> str:

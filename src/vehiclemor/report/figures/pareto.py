@@ -33,6 +33,8 @@ def figure_pareto(results: Results) -> Figure:
             _draw_reduced(axis, row, next(styles), top)
     axis.axhline(1.0, color="black", linewidth=0.8)
     axis.text(0.99, 1.08, "bounds", fontsize=7, ha="right", transform=axis.get_yaxis_transform())
+    axis.set_yscale("log")
+    axis.set_xscale("log")
     axis.set_ylim(top=top)
     axis.set_xlabel("mean online time of a test run in µs")
     axis.set_ylabel("worst error / bound, test set")
@@ -42,15 +44,16 @@ def figure_pareto(results: Results) -> Figure:
 
 def _draw_full_order(axis: Axes, rows: Sequence[Row]) -> None:
     """A line for each integrator, through its tolerances."""
-    families: dict[str, list[tuple[float, float]]] = {}
+    families: dict[str, list[tuple[float, float, float]]] = {}
     for row in rows:
         points = families.setdefault(str(row["method"]).rsplit(" ", 1)[0], [])
         if np.isfinite(row["score"]) and row["score"] > 0.0:
-            points.append((row["seconds"] * 1e6, row["score"]))
+            points.append((row["seconds"] * 1e6, row["score"], row["spread"]))
     for (family, points), (color, line) in zip(families.items(), cycle(GREYS), strict=False):
         style: Style = {"marker": "o", "markersize": 4, "linewidth": 0.8, "linestyle": line}
-        times, scores = np.array(sorted(points)).reshape(-1, 2).T
-        axis.loglog(times, scores, color=color, label=f"full order, {family}", **style)
+        times, scores, spreads = np.array(sorted(points)).reshape(-1, 3).T
+        bars = {"xerr": 0.5 * spreads * times, "elinewidth": 0.8, "capsize": 1.5}
+        axis.errorbar(times, scores, color=color, label=f"full order, {family}", **style, **bars)
 
 
 def _draw_reduced(axis: Axes, row: Row, look: tuple[str, str], top: float) -> None:
@@ -59,14 +62,19 @@ def _draw_reduced(axis: Axes, row: Row, look: tuple[str, str], top: float) -> No
     failed = not np.isfinite(row["score"])
     if not np.isfinite(row["seconds"]):
         return
-    words = f"{row['method']}, r = {row['rank']}{' (fails)' if failed else ''}"
-    axis.loglog(
-        row["seconds"] * 1e6,
-        top / 1.5 if failed else row["score"],
+    words = f"{row['method']}{' (fails)' if failed else ''}{' (winner)' if winner else ''}"
+    place = row["seconds"] * 1e6, top / 1.5 if failed else row["score"]
+    # Hollow, so that one shows through the other; bars: between the quartiles of the rounds.
+    axis.errorbar(
+        *place,
+        xerr=0.5 * row["spread"] * place[0],
         color=color,
         marker="x" if failed else marker,
         markersize=11 if winner else 7,
-        markeredgecolor="black" if winner else color,
+        markerfacecolor="none",
+        markeredgewidth=2.4 if winner else 1.4,
+        elinewidth=1.0,
+        capsize=2,
         linestyle="none",
-        label=words + (" (winner)" if winner else ""),
+        label=words,
     )

@@ -19,8 +19,9 @@ MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
 UNITS = {"control_period": " (s)"}
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
 NOTHING: Style = {"marker": 7, "markersize": 7, "linestyle": "none", "clip_on": False}
-# Decades up to which a colour bar has 1, 2 and 5 of each; smallest step of a contour in a cell.
-FEW_DECADES, FINE = 2.5, 8
+# Decades up to which a colour bar has 1, 2 and 5 of each; points of a contour in a cell, and cells
+# that it must enclose.
+FEW_DECADES, FINE, ENCLOSED = 2.5, 8, 4
 
 
 def figure_error_curves(
@@ -76,7 +77,11 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
         if none.size:
             below = {"color": style["color"], "transform": axis.get_xaxis_transform()}
             axis.plot(
-                none, np.zeros(none.size), label="no error: below a log axis", **below, **NOTHING
+                none,
+                np.zeros(none.size),
+                label=f"{methods[method]}: no error, not on a log axis",
+                **below,
+                **NOTHING,
             )
     if "pod" in methods:
         floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
@@ -147,11 +152,11 @@ def _outline(
     """Where the error has a value: its logarithm is interpolated between the cells."""
     from scipy.interpolate import RectBivariateSpline
 
-    if not values.min() < bound < values.max():
+    if np.sum(values < bound) < ENCLOSED:
         return
     fine = [np.linspace(a[0], a[-1], FINE * len(a)) for a in (amplitude, frequency)]
     smooth = RectBivariateSpline(amplitude, frequency, np.log(values), kx=2, ky=2)(*fine)
-    lines: Style = {"colors": "white", "linewidths": 1.2}
+    lines: Style = {"colors": "white", "linewidths": 1.2, "linestyles": "solid"}
     axis.contour(fine[1], fine[0], smooth, levels=[np.log(bound)], **lines)
 
 
@@ -166,10 +171,12 @@ def _tick(axis: Axes, norm: LogNorm) -> None:
 
 
 def two_digits(value: float) -> str:
-    """A number with two significant digits, without an exponent."""
+    """A number with two significant digits, below a hundredth with one, without an exponent."""
     if value == 0.0:
         return "0"
-    return f"{value:.{max(0, 1 - int(np.floor(np.log10(abs(value)))))}f}"
+    rounded = float(f"{value:.1e}")
+    decimals = (1 if rounded >= 0.01 else 0) - int(np.floor(np.log10(abs(rounded))))
+    return f"{value:.{max(0, decimals)}f}"
 
 
 def _write(

@@ -41,6 +41,8 @@ def frame_space(
         getattr(axis, f"set_{name}lim")(start, end)
     axis.set_box_aspect(tuple(np.subtract(high, low)), zoom=zoom)
     axis.view_init(elev=view[0], azim=view[1])
+    for artist in axis.get_children():
+        artist.set_clip_on(False)
 
 
 def draw_box(
@@ -61,16 +63,8 @@ def rim(centre: np.ndarray, spin: np.ndarray, radius: float) -> np.ndarray:
     up = np.cross([1.0, 0.0, 0.0], spin)
     up /= np.linalg.norm(up)
     forward = np.cross(spin, up)
-    angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
     return centre + radius * (np.cos(angle) * forward + np.sin(angle) * up)
-
-
-def draw_tire(axis: Any, centre: np.ndarray, spin: np.ndarray, radius: float, **style: Any) -> None:
-    """Wheel about its spin axis (3,), a unit vector, on the road."""
-    circle = rim(centre, spin, radius)
-    # The road presses the tire flat by its static deflection.
-    circle[:, 2] = np.maximum(circle[:, 2], 0.0)
-    axis.plot(*circle.T, **style)
 
 
 def draw_spring_damper(
@@ -112,15 +106,31 @@ def draw_spring_damper(
 def draw_frame(axis: Any, origin: np.ndarray, color: str, label: str) -> None:
     """Centre of mass (3,) and the axes x, y, z through it."""
     axis.plot(*origin, color="black", label=label, **DOT)
-    for direction, name in zip(np.eye(3), "xyz", strict=True):
+    beside = ((0.4, -0.12), (0.62, 0.09), (0.62, 0.09))
+    for direction, name, (along, aside) in zip(np.eye(3), "xyz", beside, strict=True):
         axis.quiver(*origin, *(0.6 * direction), color=color, linewidth=1.4, arrow_length_ratio=0.2)
-        axis.text(*(origin + 0.62 * direction + [0.0, 0.0, 0.09]), name, color=color, **CAPTIONS)
+        axis.text(*(origin + along * direction + [0.0, 0.0, aside]), name, color=color, **CAPTIONS)
 
 
 def draw_size(
-    axis: Any, start: np.ndarray, end: np.ndarray, label_at: ArrayLike, name: str
+    axis: Any, ends: Sequence[np.ndarray], away: ArrayLike, label_at: ArrayLike, label: str
 ) -> None:
-    """Distance between two points (3,) in m; its label `label_at` (3,) from their middle."""
-    axis.plot(*np.array([start, end]).T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
-    text = f"${name}$ = {np.linalg.norm(end - start):.3f} m"
-    axis.text(*((start + end) / 2.0 + np.array(label_at)), text, color=SIZES, **CAPTIONS)
+    """Distance between two `ends` (3,) in m, drawn beside them with extension lines.
+
+    Parameters
+    ----------
+    away
+        From the ends to the line, (3,) in m.
+    label_at
+        From the middle of the line to its label, (3,) in m.
+    label
+        With a place for the distance.
+    """
+    away, (start, end) = np.asarray(away), ends
+    line = np.array([start + away, end + away])
+    for place in (start, end):
+        extension = np.array([place, place + 1.08 * away])
+        axis.plot(*extension.T, color=SIZES, linewidth=0.5)
+    axis.plot(*line.T, color=SIZES, linewidth=0.9, marker="|", markersize=5)
+    text = label.format(f"{np.linalg.norm(end - start):.3f} m")
+    axis.text(*(line.mean(axis=0) + np.asarray(label_at)), text, color=SIZES, **CAPTIONS)

@@ -58,7 +58,7 @@ def figure_spread(results: Results) -> Figure:
     margin = 0.35 * (high - low)
     lower.set_ylim(low - margin, high + margin)
     for axis, columns in ((upper, 3), (lower, 2)):
-        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns)
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)
     upper.tick_params(labelbottom=True)
     for axis in (upper, lower):
         axis.set_xlabel("time (s)", loc="right")

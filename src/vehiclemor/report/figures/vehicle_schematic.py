@@ -19,8 +19,8 @@ from vehiclemor.report.figures.space import (
     draw_frame,
     draw_size,
     draw_spring_damper,
-    draw_tire,
     frame_space,
+    rim,
     space_and_graph,
     symbol,
 )
@@ -36,19 +36,19 @@ def figure_vehicle() -> Figure:
     """Vehicle at rest in equilibrium, in the chassis frame moved to the road, and the graph."""
     parameters = load_parameters(DEFINITION.name, DEFINITION.parameters)
     p = {name: float(parameters[name]) for name in vehicle.PARAMETERS}
-    places = (-0.02, 0.05, 0.68, 0.95), (0.65, 0.10, 0.35, 0.83)
-    figure, space, graph = space_and_graph(4.1, *places)
+    places = (-0.02, 0.03, 0.68, 1.0), (0.65, 0.10, 0.35, 0.85)
+    figure, space, graph = space_and_graph(3.2, *places)
     _draw_vehicle(space, p)
     _draw_sizes(space, p)
-    frame_space(space, (-2.2, -1.3, 0.0), (2.4, 1.0, 1.2), view=(24.0, -50.0), zoom=1.2)
+    frame_space(space, (-2.4, -1.3, 0.0), (2.4, 1.0, 1.2), view=(24.0, -50.0), zoom=1.55)
     _draw_vehicle_graph(graph)
     handles, labels = space.get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower left", ncols=5, fontsize=7.5)
-    figure.text(0.02, 0.95, "(a)")
+    figure.text(0.02, 0.94, "(a)")
     whole = 1e3 * (p["front_axle_distance"] - derived(p).sprung_distance[0])
     note = f"a, b: to the CG of the whole car, {whole:.0f} mm behind that of the sprung body"
-    figure.text(0.07, 0.953, note, fontsize=6.5, color=SIZES)
-    figure.text(0.65, 0.95, "(b)")
+    figure.text(0.07, 0.945, note, fontsize=6.5, color=SIZES)
+    figure.text(0.65, 0.94, "(b)")
     return figure
 
 
@@ -77,7 +77,7 @@ def _draw_vehicle(axis: Any, p: dict[str, float]) -> None:
         first = number == 0
         spin = np.array([-np.sin(steer), np.cos(steer), 0.0])
         style = {"color": COLORS["wheel"], "linewidth": 1.8, "label": "wheel" if first else None}
-        draw_tire(axis, centre, spin, p["tire_radius"], **style)
+        axis.plot(*rim(centre, spin, p["tire_radius"]).T, **style)
         inner = np.sign(y) * HALF_WIDTH
         axis.plot([x, x], [inner, y], [TOP, TOP], color="black", linewidth=1.4)
         # Prismatic joint along the chassis z axis.
@@ -108,19 +108,17 @@ def _steering(axis: Any, centre: np.ndarray) -> None:
 def _draw_sizes(axis: Any, p: dict[str, float]) -> None:
     """Dimensions on the road with their values, each label beside its line."""
     front_left, front_right, rear_left, rear_right = wheel_centres(p) * [1.0, 1.0, 0.0]
-    side, ahead, behind = [0.0, -0.5, 0.0], [0.7, 0.0, 0.0], [-0.55, 0.0, 0.0]
-    below = [-0.35, -0.75, 0.0]
     whole = front_right - [p["front_axle_distance"], 0.0, 0.0]
     rear = np.array([rear_right[0], front_right[1], 0.0])
-    top = np.array([0.0, 0.0, p["sprung_height"]])
-    for start, end, label_at, name in (
-        (front_right + side, whole + side, below, "a"),
-        (whole + side, rear + side, below, "b"),
-        (front_left + ahead, front_right + ahead, [0.9, -0.5, 0.0], "T_f"),
-        (rear_left + behind, rear_right + behind, [-0.05, -1.5, -0.5], "T_r"),
-        (0.0 * top, top, [-1.1, 0.0, -2.0 * top[2]], "h_s"),
+    side, above = [0.0, -0.55, 0.0], np.array([0.0, 0.0, p["sprung_height"]])
+    for ends, away, label_at, label in (
+        ((front_right, whole), side, [-0.1, -0.35, 0.0], "$a$ = {}"),
+        ((whole, rear), side, [-0.1, -0.35, 0.0], "$b$ = {}"),
+        ((front_left, front_right), [0.75, 0.0, 0.0], [0.35, -0.15, 0.0], "$T_f$ = {}"),
+        ((rear_left, rear_right), [0.35, 0.0, 0.0], [0.31, 0.0, -0.09], "$T_r$ = {}"),
+        ((0.0 * above, above), [0.0, 0.0, 0.0], [-0.48, 0.0, -0.50], "$h_s$ = {}"),
     ):
-        draw_size(axis, start, end, 0.45 * np.array(label_at), name)
+        draw_size(axis, ends, away, label_at, label)
 
 
 def _draw_vehicle_graph(axis: Axes) -> None:
