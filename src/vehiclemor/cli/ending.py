@@ -19,7 +19,7 @@ def ended(run: Callable[[], object]) -> int:
             # A terminal that can't show a name must not end a study.
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _stopped_by_sigterm():
+        with _stopped_by_signals():
             return int(run() or 0)
     except BrokenPipeError:
         sys.stderr.close()
@@ -30,10 +30,9 @@ def ended(run: Callable[[], object]) -> int:
         return _said(str(error), WRONG_INPUT)
     except (MemoryError, OSError) as error:
         return _said(machine_reason(error) or str(error), FAILED)
-    except KeyboardInterrupt as stop:
-        number = stop.args[0] if stop.args else signal.SIGINT
+    except _StopError as stop:
         text = "stopped; finished cells of a study are stored, run again to resume"
-        return _said(text, STOPPED + number)
+        return _said(text, STOPPED + stop.args[0])
 
 
 def _said(text: str, status: int) -> int:
@@ -41,15 +40,20 @@ def _said(text: str, status: int) -> int:
     return status
 
 
+class _StopError(KeyboardInterrupt):
+    """A signal, with its number: a class of its own, since Python ends otherwise after Ctrl-C."""
+
+
 @contextmanager
-def _stopped_by_sigterm() -> Iterator[None]:
+def _stopped_by_signals() -> Iterator[None]:
     """Let SIGTERM end a command as Ctrl-C does: workers ended, partial files removed."""
 
     def stop(number: int, _: object) -> None:
-        raise KeyboardInterrupt(number)
+        raise _StopError(number)
 
-    before = signal.signal(signal.SIGTERM, stop)
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -13,11 +13,12 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from vehiclemor.errors import FileError
+from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
@@ -43,14 +44,15 @@ def kernel_hash(source: str) -> str:
 def cache_folder() -> Path:
     """Folder of the cache: $VEHICLEMOR_CACHE, or the user's cache folder.
 
-    Where it can't be written, or others could write it, a temporary folder of this process: then
-    every process compiles for itself.
+    Where it can't be written, or others could write it, a temporary folder: then every process
+    compiles for itself, with its workers.
     """
-    return _folder(os.environ.get("VEHICLEMOR_CACHE"))
+    return _folders(os.environ.get("VEHICLEMOR_CACHE"))[0]
 
 
 @cache
-def _folder(chosen: str | None) -> Path:
+def _folders(chosen: str | None) -> list[Path]:
+    """Where files are looked for; new ones are kept in the last."""
     import platformdirs
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
@@ -64,11 +66,16 @@ def _folder(chosen: str | None) -> Path:
     except OSError as error:
         reason = error.strerror or "it can't be written"
     if not reason:
-        return folder
+        return [folder]
     _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
-    temporary = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
-    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
-    return temporary
+    return [_temporary()]
+
+
+def _temporary() -> Path:
+    """Folder that is removed when this process ends."""
+    folder = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _distrust(status: os.stat_result) -> str:
@@ -92,11 +99,20 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     make
         Gives the content.
     """
-    path = cache_folder() / name
-    content = _checked(path, name)
-    if content is None:
-        content = make()
-        _keep(path, _digest(name, content) + b"\n" + content)
+    folders = _folders(os.environ.get("VEHICLEMOR_CACHE"))
+    for folder in folders:
+        if (content := _checked(folder / name, name)) is not None:
+            return content
+    content = make()
+    checked = _digest(name, content) + b"\n" + content
+    try:
+        _keep(folders[-1] / name, checked)
+    except MachineError as error:
+        if len(folders) == 1:
+            _LOG.warning("%s: what is compiled is kept until this process ends", error)
+            with suppress(MachineError, OSError):
+                folders.append(_temporary())
+                _keep(folders[-1] / name, checked)
     return content
 
 
@@ -122,7 +138,13 @@ def _checked(path: Path, name: str) -> bytes | None:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache that nobody else can write; without room for it, go on."""
+    """Write a file of the cache that nobody else can write; where that can't be, go on.
+
+    Raises
+    ------
+    MachineError
+        If there is no space.
+    """
 
     def write(temporary: Path) -> None:
         temporary.touch(0o600)
@@ -132,4 +154,6 @@ def _keep(path: Path, content: bytes) -> None:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, write)
     except (OSError, FileError) as error:
+        if reason := machine_reason(error):
+            raise MachineError(f"cache {path.parent}: {reason}") from None
         _LOG.warning("%s is not kept: %s", path, error)

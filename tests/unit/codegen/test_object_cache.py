@@ -205,9 +205,9 @@ def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
 
     monkeypatch.delenv("VEHICLEMOR_CACHE", raising=False)
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
-    object_cache._folder.cache_clear()
+    object_cache._folders.cache_clear()
     assert cache_folder() == tmp_path / "own" / "vehiclemor"
-    object_cache._folder.cache_clear()
+    object_cache._folders.cache_clear()
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "chosen"))
     assert cache_folder() == tmp_path / "chosen"
 
