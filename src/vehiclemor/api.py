@@ -235,9 +235,11 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     Returns
     -------
     pandas.DataFrame
-        Of `paper` the columns model, item, published, reproduced, unit, floor, replay, verdict
-        (`met`, `missed` or `not_comparable`), reason; those of the others are described at
-        `predictive_comparison` and `model_comparison` in `vehiclemor.report`.
+        Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
+        floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
+        that the paper doesn't have), measure, reason, threshold_source; described at
+        `comparison.rows.Row`, those of the others at `predictive_comparison` and
+        `model_comparison` in `vehiclemor.report`.
     """
     from vehiclemor.report.comparison.kinds import comparison
 

@@ -48,7 +48,9 @@ def files(folder, name=""):
     for path in sorted((folder / "cells").glob("*.nc")):
         with xr.open_dataset(path) as dataset:
             if not name or list(dataset["scenario"].values) == labels:
-                found[path.name] = dataset.load().drop_vars(["seconds", "offline_seconds"])
+                found[path.name] = dataset.load().drop_vars(
+                    [*SECONDS, "offline_seconds"], errors="ignore"
+                )
     assert found
     return found
 
@@ -132,13 +134,14 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
 
 
 TIMES = np.linspace(0.0, 10.0, 101)
+SECONDS = ("seconds", "seconds_lower", "seconds_upper")
 
 
 def no_timing(protocol, rows, *_):
     shape = len(rows), len(protocol.sets["test"])
     return xr.Dataset(
         {
-            "seconds": (("row", "scenario"), np.ones(shape)),
+            **{name: (("row", "scenario"), np.ones(shape)) for name in SECONDS},
             "offline_seconds": ("row", np.ones(shape[0])),
         }
     )
@@ -176,7 +179,9 @@ def test_the_comparison_marks_the_winner_and_judges_it(done):
     won = methods.loc["fixed basis"]
     assert won["ratio_within"] == full["seconds"].min() / won["seconds"]
     targets = rows[rows["kind"] == "target"]
-    assert set(targets["verdict"]) <= {"met", "missed"}
+    # The times are real ones: this machine may be too busy to compare them.
+    assert set(targets["verdict"]) <= {"met", "missed", "not_comparable"}
+    assert set(targets["threshold_source"]) <= {"published", "ours"}
     assert "worst largest error of second_euler_angle" in set(targets["item"])
     text = predictive_text(rows)
     assert "* fixed basis" in text

@@ -92,15 +92,15 @@ def test_a_second_process_compiles_and_imports_nothing_heavy(name):
     maneuver = RUNS[name]
     script = SIMULATION.format(name=name, maneuver=maneuver)
 
-    def process() -> tuple[list[str], list[float]]:
+    def process() -> tuple[list[str], list[float], str]:
         command = [sys.executable, "-c", script]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
-        assert not done.stderr
-        return tuple(json.loads(done.stdout))
+        return (*json.loads(done.stdout), done.stderr)
 
-    _, first = process()
+    _, first, _ = process()
     before = {path: path.stat().st_mtime_ns for path in cache_folder().rglob("*.o")}
-    modules, again = process()
+    modules, again, told = process()
+    assert not told
     assert {p: p.stat().st_mtime_ns for p in cache_folder().rglob("*.o") if p in before} == before
     assert again == first
     assert {"llvmlite", "numpy"} <= set(modules)

@@ -18,7 +18,8 @@ def compare(
 ) -> int:
     """Set published numbers beside reproduced ones, or reduced models beside full order.
 
-    Exit status 1 if a bound is missed.
+    Exit status 1 if a bound is missed; what can't be compared, since the machine was too busy or
+    the start is ours, counts neither way.
 
     Parameters
     ----------

@@ -1,19 +1,13 @@
 """`vehiclemor simulate`: one run of a model with a method, and its errors."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.errors import InputError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def simulate(
@@ -88,7 +82,11 @@ def simulate(
         from vehiclemor.study.store import write_dataset
 
         write_dataset(dataset, out)
-    _print_simulation(dataset, ready.counts, out)
+    from vehiclemor.report.simulation import simulation_text
+
+    print(simulation_text(dataset, ready.counts))
+    if out is not None:
+        print(f"written: {out}")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
@@ -101,20 +99,3 @@ def _check_writable(out: Path) -> None:
         raise InputError(f"--out {out}: the folder {out.parent} does not exist")
     if out.exists():
         read_dataset(out, "source", "vehiclemor")
-
-
-def _print_simulation(dataset: xr.Dataset, counts: Iterable[str], out: Path | None) -> None:
-    status = dataset["status"].item()
-    print(f"{dataset.attrs['title']}: {status} {dataset['message'].item()}".rstrip())
-    if dataset["remark"].item():
-        print(dataset["remark"].item())
-    print(f"{'output':<20} {'RMS error':>12} {'floor':>12} {'largest':>12} {'range':>12}")
-    for output in dataset["output"].values:
-        row = dataset.sel(output=output)
-        columns = ("rms_error", "floor_rms_error", "max_error", "signal_range")
-        numbers = " ".join(f"{row[name].item():12.3e}" for name in columns)
-        print(f"{output:<20} {numbers} {row['output_unit'].item()}")
-    print(", ".join(f"{name.replace('_', ' ')} {dataset[name].item()}" for name in counts))
-    print(f"seconds in the compiled loop {dataset['seconds'].item():.3e}")
-    if out is not None:
-        print(f"written: {out}")

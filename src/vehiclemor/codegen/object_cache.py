@@ -18,8 +18,10 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+from vehiclemor.codegen.process_lock import locked
 from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
+from vehiclemor.progress import making
 
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -92,6 +94,8 @@ def _distrust(status: os.stat_result) -> str:
 def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     """Content of a file of the cache; made and written if it is missing, damaged or not ours.
 
+    One process makes it, while others that want it wait.
+
     Parameters
     ----------
     name
@@ -101,18 +105,18 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     """
     folders = _folders(os.environ.get("VEHICLEMOR_CACHE"))
     for folder in folders:
-        if (content := _checked(folder / name, name)) is not None:
+        content, reason = _checked(folder / name, name)
+        if content is not None:
             return content
-    content = make()
-    checked = _digest(name, content) + b"\n" + content
-    try:
-        _keep(folders[-1] / name, checked)
-    except MachineError as error:
-        if len(folders) == 1:
-            _LOG.warning("%s: what is compiled is kept until this process ends", error)
-            with suppress(MachineError, OSError):
-                folders.append(_temporary())
-                _keep(folders[-1] / name, checked)
+        if reason:
+            _LOG.warning("%s is made again: %s", folder / name, reason)
+    path = folders[-1] / name
+    what = path.stem.partition("-")[0]
+    with making(what, derived=name.startswith("derivations")), locked(path):
+        content, _ = _checked(path, name)
+        if content is None:
+            content = make()
+            _keep(folders, name, _digest(name, content) + b"\n" + content)
     return content
 
 
@@ -121,30 +125,27 @@ def _digest(name: str, content: bytes) -> bytes:
     return hashlib.sha256(name.encode() + b"\n" + content).hexdigest().encode()
 
 
-def _checked(path: Path, name: str) -> bytes | None:
-    """Content of a file, if it can be trusted."""
+def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
+    """Content of a file, or why it can't be trusted; neither where there is none."""
     try:
         with path.open("rb") as file:
             reason = _distrust(os.fstat(file.fileno()))
             digest, _, content = file.read().partition(b"\n")
     except FileNotFoundError:
-        return None
+        return None, ""
     except OSError as error:
         digest, content, reason = b"", b"", error.strerror or "it can't be read"
     if not reason and _digest(name, content) == digest:
-        return content
-    _LOG.warning("%s is made again: %s", path, reason or "the file is damaged")
-    return None
+        return content, ""
+    return None, reason or "the file is damaged"
 
 
-def _keep(path: Path, content: bytes) -> None:
+def _keep(folders: list[Path], name: str, content: bytes) -> None:
     """Write a file of the cache that nobody else can write; where that can't be, go on.
 
-    Raises
-    ------
-    MachineError
-        If there is no space.
+    Without space, a temporary folder is added to those where files are looked for.
     """
+    path = folders[-1] / name
 
     def write(temporary: Path) -> None:
         temporary.touch(0o600)
@@ -153,7 +154,12 @@ def _keep(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, write)
-    except (OSError, FileError) as error:
-        if reason := machine_reason(error):
-            raise MachineError(f"cache {path.parent}: {reason}") from None
-        _LOG.warning("%s is not kept: %s", path, error)
+    except (OSError, FileError, MachineError) as error:
+        full = isinstance(error, MachineError) or machine_reason(error)
+        if not full:
+            _LOG.warning("%s is not kept: %s", path, error)
+        elif len(folders) == 1:
+            _LOG.warning("what is compiled is kept until this process ends: %s", error)
+            with suppress(OSError):
+                folders.append(_temporary())
+                _keep(folders, name, content)

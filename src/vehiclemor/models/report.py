@@ -114,16 +114,16 @@ DYNAMIC_OPEN: Mapping[str, tuple[Value, ...]] = {
 }
 _ALGEBRAIC = ModelReport(
     counts={
-        "iterations": "iterations",
-        "residual_evaluations": "residuals",
-        "jacobian_evaluations": "Jacobians",
+        "iterations": "iter.",
+        "residual_evaluations": "resid.",
+        "jacobian_evaluations": "Jac.",
     },
     timing=ALGEBRAIC_BASELINES,
     baselines=("Newton with fresh Jacobians at 1e-12", "the strongest full-order solver"),
     paper_open=ALGEBRAIC_OPEN,
 )
 _DYNAMIC = ModelReport(
-    counts={"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rejected"},
+    counts={"rhs_calls": "RHS calls", "steps": "steps", "rejected_steps": "rej."},
     timing=DYNAMIC_BASELINES,
     baselines=("the explicit pair at 1e-6", "the W-method with one Jacobian"),
     paper_open=DYNAMIC_OPEN,

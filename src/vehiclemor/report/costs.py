@@ -1,5 +1,6 @@
 """Cost table: seconds, counts, speed-up against both baselines, offline cost, break-even."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
@@ -7,9 +8,15 @@ import xarray as xr
 
 from vehiclemor.registry import component
 from vehiclemor.report.labels import label_of
-from vehiclemor.report.printing import Row, fixed, power, table_text, wrapped
+from vehiclemor.report.printing import Line, fixed, number, power, table_text, wrapped
 from vehiclemor.simulation.build import build
 from vehiclemor.study.timing import timed_model
+
+LEGEND = (
+    "Costs.  us: CPU time of the thread, median of interleaved rounds; +-%: half their "
+    "interquartile range; offline: training and fit; even: break-even, the runs after which that "
+    "is earned, against either baseline; errors: RMS"
+)
 
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
@@ -65,48 +72,49 @@ def _row(data: xr.Dataset, counts: list[str]) -> dict[str, object]:
     }
 
 
-def costs_text(model: str, folder: Path) -> str:
-    """The cost table of a model as text: times and counts, then errors and training."""
+def costs_text(model: str, folder: Path, brief: bool = False) -> str:
+    """Cost table of a model as text: times; then settings, counts and errors if not `brief`.
+
+    A brief one is of the published start alone.
+    """
     data, table = _timing(model, folder), cost_table(model, folder)
     definition = component("model", model)
     counts, outputs = definition.shown.counts, definition.shown.printed_outputs
     baseline, strongest = definition.shown.baselines
-    title = f"Cost on {model}, nominal input ({data.attrs['title']}; {data.attrs['machine']})"
-    legend = (
-        f"speed-up x1: against {baseline}; x2: against {strongest}; break-even in runs; "
-        f"+-%: half the quartile spread; errors are RMS"
-    )
-    times: list[Row] = []
-    errors: list[Row] = []
+    first, *_ = counts.items()
     starts = list(dict.fromkeys(table["start"]))
-    for start in starts:
-        if len(starts) > 1:
-            times.append(Row([f"start {start}"]))
-            errors.append(Row([f"start {start}"]))
-        for row in table.to_dict(orient="records"):
+    times: list[Line] = []
+    details: list[Line] = []
+    for start in starts[:1] if brief else starts:
+        heading = f"start {start}" if len(starts) > 1 else ""
+        for row in table.to_dict("records"):
             if row["start"] == start:
-                times.append(Row(_times(row, list(counts))))
-                errors.append(Row(_errors(row, outputs)))
-    heads = ["", "rank", "tol.", "us/run", "+-%", "ns/ point", *counts.values(), "x1", "x2"]
+                times.append(Line(_times(row, first[0]), heading=heading))
+                details.append(Line(_details(row, counts, outputs), heading=heading))
+                heading = ""
+    heads = ["", "us", "+-%", first[1], "x1", "x2", "offline us", "even x1", "even x2"]
     found = [f"{label_of(output).short} error" for output in outputs]
-    tails = ["", *found, "offline us", "break-even x1", "break-even x2"]
-    tables = table_text(heads, times), table_text(tails, errors)
-    return "\n".join([wrapped(title), wrapped(legend), "\n\n".join(tables)])
+    tables = [table_text(heads, times)]
+    if not brief:
+        tables.append(table_text(["", "rank", "tol.", *counts.values(), *found], details))
+    title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
+    against = f"x1: speed-up against {baseline}; x2: against {strongest}"
+    return "\n".join([wrapped(title), wrapped(against), "\n\n".join(tables)])
 
 
-def _times(row: dict, counts: list[str]) -> list[str]:
-    cells = [row["label"], str(row["rank"]), power(row["tolerance"]), fixed(row["us_per_run"], 1)]
-    cells += [fixed(50.0 * row["quartile_spread"], 0), fixed(row["ns_per_sample"], 1)]
-    cells += [str(row[name]) for name in counts]
-    return [*cells, fixed(row["speed_up"]), fixed(row["speed_up_strongest"])]
-
-
-def _errors(row: dict, outputs: tuple[str, ...]) -> list[str]:
-    if row["status"] != "ok":
-        return [row["label"], row["status"]]
-    cells = [row["label"], *(f"{row[f'rms_{output}']:.1e}" for output in outputs)]
-    if row["offline_us"] == 0.0:
-        return [*cells, fixed(0.0, 1), "-", "-"]
+def _times(row: dict, count: str) -> list[str]:
+    cells = [row["label"], fixed(row["us_per_run"], 1), fixed(50.0 * row["quartile_spread"], 0)]
+    cells += [str(row[count]), fixed(row["speed_up"]), fixed(row["speed_up_strongest"])]
+    if row["offline_us"] == 0.0 or row["status"] != "ok":
+        return cells
     even = [row["break_even"], row["break_even_strongest"]]
     runs = ["never" if count != count else fixed(count, 1) for count in even]
-    return [*cells, fixed(row["offline_us"], 1), *runs]
+    return [*cells, fixed(row["offline_us"], 0), *runs]
+
+
+def _details(row: dict, counts: Iterable[str], outputs: Iterable[str]) -> list[str]:
+    cells = [row["label"], str(row["rank"]), number(row["tolerance"])]
+    cells += [str(row[name]) for name in counts]
+    if row["status"] != "ok":
+        return [*cells, row["status"]]
+    return [*cells, *(power(row[f"rms_{output}"]) for output in outputs)]

@@ -1,32 +1,69 @@
 """Tables as text: one printer for all tables that are shown in a terminal."""
 
-from collections.abc import Iterable, Sequence
+import shutil
+import string
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from typing import NamedTuple
 
-WIDTH = 100
+# Columns of a line where there is no terminal, and the most that a wide one is given.
+WIDTH, WIDEST = 80, 120
 # The first column, which may be wrapped, is never narrower.
-NARROWEST = 24
+NARROWEST = 12
 # Indents of a table and of the notes in it.
 TABLE, NOTE = 2, 6
 
 
-class Row(NamedTuple):
-    """Cells of one row, and a remark over the whole width below them."""
+class Line(NamedTuple):
+    """Cells of one row of a table, a heading above and a remark below, over the whole width."""
 
     cells: Sequence[str]
     note: str = ""
+    heading: str = ""
 
 
-def table_text(headings: Sequence[str], rows: Iterable[Row], last_left: bool = False) -> str:
-    """A table of at most `WIDTH` columns, its first column wrapped where needed.
+class Footnotes:
+    """Letters for phrases that stand in several rows, explained once below them."""
+
+    def __init__(self) -> None:
+        self._letters: dict[str, str] = {}
+
+    def marks(self, *phrases: str) -> str:
+        """The letters of phrases, such as `[a][c]`; an empty one has none."""
+        for phrase in phrases:
+            if phrase:
+                self._letters.setdefault(phrase, _letter(len(self._letters)))
+        return "".join(f"[{self._letters[phrase]}]" for phrase in phrases if phrase)
+
+    def text(self) -> str:
+        """All phrases with their letters."""
+        return "\n".join(
+            wrapped(f"[{letter}] {phrase}", TABLE, NOTE) for phrase, letter in self._letters.items()
+        )
+
+
+def _letter(index: int) -> str:
+    """A, b ... z, aa, ab ..."""
+    alphabet = string.ascii_lowercase
+    head = _letter(index // len(alphabet) - 1) if index >= len(alphabet) else ""
+    return head + alphabet[index % len(alphabet)]
+
+
+def width() -> int:
+    """Columns of a printed line: the terminal's, but neither below 80 nor too wide to read."""
+    return min(max(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH), WIDEST)
+
+
+def table_text(headings: Sequence[str], rows: Iterable[Line], left: Sequence[int] = (0,)) -> str:
+    """A table that fits the terminal, its first column wrapped where needed.
 
     Parameters
     ----------
     headings
-        Of the columns, the first of which is aligned left and all others right.
-    last_left
-        Align the last column left, as text.
+        Of the columns.
+    left
+        Columns that are aligned left; all others are aligned right.
     """
     from rich.console import Console, Group
     from rich.padding import Padding
@@ -38,31 +75,32 @@ def table_text(headings: Sequence[str], rows: Iterable[Row], last_left: bool = F
 
     def started(header: bool) -> Table:
         table = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0))
-        last = len(headings) - 1
-        for index, (heading, width) in enumerate(zip(headings, widths, strict=True)):
-            left = index == 0 or (last_left and index == last)
-            justify = "left" if left else "right"
-            table.add_column(Text(heading), justify=justify, width=width, vertical="top")
+        for index, (heading, columns) in enumerate(zip(headings, widths, strict=True)):
+            justify = "left" if index in left else "right"
+            table.add_column(Text(heading), justify=justify, width=columns, vertical="top")
         return table
 
-    # Tables of equal widths with notes between them look like one.
+    # Tables of equal widths with text between them look like one.
     parts: list[Table | Padding] = [started(header=True)]
     for row in rows:
-        table = parts[-1]
-        if not isinstance(table, Table):
-            table = started(header=False)
-            parts.append(table)
-        filled = [*row.cells, *[""] * (len(headings) - len(row.cells))]
-        table.add_row(*(Text(cell) for cell in filled))
+        if row.heading:
+            parts.append(Padding(Text(row.heading), 0))
+        if row.cells:
+            table = parts[-1]
+            if not isinstance(table, Table):
+                table = started(header=False)
+                parts.append(table)
+            filled = [*row.cells, *[""] * (len(headings) - len(row.cells))]
+            table.add_row(*(Text(cell) for cell in filled))
         if row.note:
             parts.append(Padding(Text(row.note), (0, 0, 0, NOTE - TABLE)))
     target = StringIO()
-    console = Console(file=target, width=WIDTH, color_system=None, highlight=False)
+    console = Console(file=target, width=width(), color_system=None, highlight=False)
     console.print(Padding(Group(*parts), (0, 0, 0, TABLE)))
     return "\n".join(line.rstrip() for line in target.getvalue().splitlines())
 
 
-def _widths(headings: Sequence[str], rows: Sequence[Row]) -> list[int]:
+def _widths(headings: Sequence[str], rows: Sequence[Line]) -> list[int]:
     """Widths of the columns: headings are wrapped by words, cells are not but in the first."""
     widths = [max(map(len, heading.split()), default=0) for heading in headings]
     widths[0] = len(headings[0])
@@ -70,7 +108,7 @@ def _widths(headings: Sequence[str], rows: Sequence[Row]) -> list[int]:
         for index, cell in enumerate(row.cells):
             widths[index] = max(widths[index], len(cell))
     # One space follows each column.
-    room = WIDTH - TABLE - sum(widths[1:]) - len(widths)
+    room = width() - TABLE - sum(widths[1:]) - len(widths)
     widths[0] = max(min(widths[0], room), NARROWEST)
     return widths
 
@@ -81,8 +119,11 @@ def fixed(value: float, digits: int = 2) -> str:
 
 
 def power(value: float) -> str:
-    """A number as 1.2e-5, for columns in which orders of magnitude are compared."""
-    return "-" if value != value else f"{value:.1e}".replace(".0e", "e")
+    """A number as 1.2e-5, for columns in which orders of magnitude are compared.
+
+    A dash for one that is missing, or exactly zero.
+    """
+    return "-" if value != value or value == 0.0 else f"{value:.1e}"
 
 
 def short(value: float) -> str:
@@ -92,8 +133,24 @@ def short(value: float) -> str:
     return f"{value:.2g}" if 0.01 <= abs(value) < 1e4 or value == 0.0 else f"{value:.1e}"
 
 
-def wrapped(text: str) -> str:
-    """A paragraph in lines of the width of a table."""
-    import textwrap
+def number(value: float) -> str:
+    """A number with three digits; a dash for one that is missing."""
+    return "-" if value != value else f"{value:.3g}"
 
-    return "\n".join(textwrap.wrap(text, WIDTH))
+
+def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
+    """A paragraph in lines of the width of a table, indented."""
+    return "\n".join(
+        textwrap.wrap(
+            text,
+            width(),
+            initial_indent=" " * first,
+            subsequent_indent=" " * rest,
+            break_on_hyphens=False,
+        )
+    )
+
+
+def terms(meanings: Mapping[str, str]) -> str:
+    """A legend: each term with its meaning, later lines indented."""
+    return "\n".join(wrapped(f"{term}: {text}.", 0, 4) for term, text in meanings.items())

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.reduction.methods import pod
+from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -65,7 +67,7 @@ def spectrum_table(model: str) -> pd.DataFrame:
         "largest_left_out": data["left_out"].max("window"),
     }
     table = data[[]].assign(found).to_dataframe(["preset", "mode"]).reset_index()
-    return table[["preset", "mode", *found]].dropna(ignore_index=True)
+    return table.reindex(columns=["preset", "mode", *found]).dropna(ignore_index=True)
 
 
 def _of_model(name: str) -> xr.Dataset:
@@ -73,13 +75,14 @@ def _of_model(name: str) -> xr.Dataset:
     definition = component("model", name)
     maneuver = component("maneuver", definition.maneuver)
     training = training_runs(model, maneuver, model.starts[0], "matched")
-    parts = []
+    parts, chosen = [], {}
     for preset in PRESETS:
         settings = validated(pod.METHOD, model.kind, definition.shown.paper_fixed, preset)
+        chosen = {key: getattr(settings, key) for key in ("rank", "control_period", "snapshots")}
         fitted = pod.fit(model, training, settings)
+        assert isinstance(fitted, AlgebraicProjection | DynamicProjection)
         values = np.array([basis.singular_values for basis in fitted.bases])
         parts.append(_shares(values).assign_coords(preset=preset))
-    chosen = {key: getattr(settings, key) for key in ("rank", "control_period", "snapshots")}
     return _side_by_side(parts, "preset").assign_coords(model=name, **chosen)
 
 

@@ -14,6 +14,7 @@ from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError
 from vehiclemor.models.definition import DESIGN_START, ModelDefinition, Values
 from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
@@ -57,7 +58,8 @@ def build(
     path = parameter_file or definition.parameter_file
     parameters = load_parameters(name, definition.parameters, path, overrides)
     make = _algebraic if definition.kind == "ae" else _dynamic
-    return make(definition, parameters)
+    with first_use(name):
+        return make(definition, parameters)
 
 
 def build_derived(name: str) -> Model | None:

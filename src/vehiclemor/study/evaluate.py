@@ -12,6 +12,7 @@ import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
+from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -46,6 +47,11 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
         As the experiment keeps it, see `study/result.py`.  Where nothing could be computed the
         values are missing, and `status` and `message` tell why.
     """
+    with first_use(f"{experiment.model} with {experiment.method}"):
+        return _evaluated(experiment, model)
+
+
+def _evaluated(experiment: Experiment, model: Model | None) -> xr.Dataset:
     kept = model is None
     model = model or model_of(experiment)
     with one_thread():

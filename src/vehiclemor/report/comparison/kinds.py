@@ -42,7 +42,7 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
 def comparison_text(what: str, rows: pd.DataFrame, folder: Path) -> str:
     """A comparison as text, with the costs of its models."""
     if what == "paper":
-        from vehiclemor.report.comparison.paper import paper_text
+        from vehiclemor.report.comparison.text import paper_text
 
         return paper_text(rows, folder)
     if what == "predictive":

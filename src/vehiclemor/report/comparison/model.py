@@ -12,7 +12,7 @@ from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rows import predictive_comparison
 from vehiclemor.report.predictive.text import predictive_text
-from vehiclemor.report.printing import Row, power, table_text, wrapped
+from vehiclemor.report.printing import Line, power, table_text, wrapped
 
 LEGEND = (
     "RMS errors in the nominal run, on which the methods are trained (replay is exact there), and "
@@ -45,7 +45,7 @@ def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
         f"rms_{o}": label_of(o).short for o in component("model", name).shown.printed_outputs
     }
     records = rows.to_dict("records")
-    printed: list[Row] = []
+    printed: list[Line] = []
     for row in records:
         if row["kind"] != "nominal":
             continue
@@ -54,7 +54,7 @@ def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
         moved = {c: max((r[c] for r in same), key=lambda e: (e != e, e)) for c in columns}
         cells = [f"{row['method']}, {row['start']}", str(int(row["effective_rank"]))]
         cells += [power(errors[column]) for column in columns for errors in (row, moved)]
-        printed.append(Row(cells, "" if row["status"] == "ok" else row["message"]))
+        printed.append(Line(cells, "" if row["status"] == "ok" else row["message"]))
     heads = ["method, start", "rank"]
     heads += [f"{short} {kind}" for short in columns.values() for kind in ("nominal", "perturbed")]
     title = f"{name}\n{wrapped(LEGEND)}\n{table_text(heads, printed)}"

@@ -1,19 +1,20 @@
 """Rows of the comparison with the paper: its numbers and claims beside what is reproduced."""
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import xarray as xr
 
-from vehiclemor.registry import names
-from vehiclemor.report.criteria import CRITERIA, WITHOUT_REPLAY, Results
-from vehiclemor.report.criteria.finding import Finding
+from vehiclemor.report.criteria import CRITERIA, VARIANTS, WITHOUT_REPLAY, variants
+from vehiclemor.report.criteria.finding import PRINTED, Finding
 from vehiclemor.report.published import Claim, Number
+from vehiclemor.report.verdicts import NOT_COMPARABLE, PUBLISHED_START, judged
 
-# Label of a method in the paper's studies, and preset -> what its rows are called.
-VARIANTS = {"pod": "default", "pod_literal": "literal"}
-PRESETS = {"recommended": "default", "literal": "literal"}
 PARAMETERS = "the paper's parameters were never published; ours are public data"
+ALL_MODELS = "all three models"
+NOMINAL_ERROR = "nominal-only: trained on the run that it is tested on, where replay is exact"
+Results = Mapping[str, xr.Dataset]
 
 
 class Row(NamedTuple):
@@ -21,76 +22,112 @@ class Row(NamedTuple):
 
     Attributes
     ----------
+    id
+        Of the number or claim in `data/published`.
+    variant
+        Settings of the method: `default`, `literal` (the paper's words), or what differs from them.
+    start
+        Initial condition.
     published
-        The number, or the bound of the criterion of a claim.
+        The printed number; none for a claim.
+    bound
+        What the reproduced number is compared with, and in `threshold_source` whose it is:
+        `published`, `the claim's words` or `ours`.
     floor, replay
         The same quantity of the best approximation in the subspaces, and of replay.
+    within
+        Whether the claim holds, or the number is within the published one; None if unknown.
     verdict
-        `met`, `missed` or `not_comparable`.
+        `met`, `missed`, `not_comparable`, or `ours`: from a start that the paper doesn't have.
+    measure
+        What the number is.
+    reason
+        Why the verdict, and what else was seen.
     """
 
-    model: str | None
+    id: str
+    model: str
     item: str
+    variant: str
+    start: str
     published: float
+    bound: float
     reproduced: float
     unit: str
     floor: float
     replay: float
+    within: bool | None
     verdict: str
+    measure: str
     reason: str
+    threshold_source: str
 
 
 COLUMNS = Row._fields
+_UNKNOWN = Row(
+    *("", ALL_MODELS, "", "", PUBLISHED_START, math.nan, math.nan, math.nan, "-"),
+    *(math.nan, math.nan, None, NOT_COMPARABLE, "", "", ""),
+)
 
 
-def not_comparable(
-    model: str | None, item: str, reason: str, published: float = math.nan, unit: str = "-"
-) -> Row:
+def number_row(number: Number, variant: str, start: str, reproduced: float, within: bool) -> Row:
+    """Row of a printed number, judged by it."""
+    return _UNKNOWN._replace(
+        id=number.id,
+        model=number.model,
+        item=f"{number.item} (figure {number.figure})" if number.figure else number.item,
+        variant=variant,
+        start=start,
+        published=number.value,
+        bound=number.value,
+        reproduced=reproduced,
+        unit=number.unit,
+        within=within,
+        verdict=judged(within, start),
+        threshold_source=PRINTED,
+    )
+
+
+def not_comparable(entry: Number | Claim, reason: str) -> Row:
     """Row of something that can't be reproduced."""
-    missing = math.nan
-    return Row(model, item, published, missing, unit, missing, missing, "not_comparable", reason)
+    if isinstance(entry, Number):
+        row = number_row(entry, "", PUBLISHED_START, math.nan, False)
+        return row._replace(within=None, verdict=NOT_COMPARABLE, reason=reason)
+    return _of_claim(entry)._replace(reason=reason)
 
 
-def number_row(
-    number: Number,
-    words: str,
-    reproduced: float,
-    met: bool,
-    reason: str,
-    floor: float = math.nan,
-    replay: float = math.nan,
-) -> Row:
-    """Row of a printed number; `words` tell the variant of the method."""
-    known = number.model, f"{number.item}, {words}", number.value, reproduced, number.unit
-    return Row(*known, floor, replay, "met" if met else "missed", reason)
+def _of_claim(claim: Claim) -> Row:
+    statement = f"figure {claim.figure}: {claim.statement}" if claim.figure else claim.statement
+    return _UNKNOWN._replace(id=claim.id, model=claim.model or ALL_MODELS, item=statement)
 
 
-def claim_row(claim: Claim, words: str, finding: Finding, replay: float = math.nan) -> Row:
-    """Row of a claim by its criterion; `words` tell the variant of the method."""
-    known = claim.model, f"{item_of(claim)}, {words}", finding.bound, finding.measured, "1"
-    verdict = "met" if finding.met else "missed"
-    return Row(*known, math.nan, replay, verdict, finding.explanation)
-
-
-def item_of(claim: Claim) -> str:
-    """What a claim says, and the figure that it is about."""
-    return f"figure {claim.figure}: {claim.statement}" if claim.figure else claim.statement
+def claim_row(claim: Claim, variant: str, finding: Finding, start: str = PUBLISHED_START) -> Row:
+    """Row of a claim by its criterion."""
+    return _of_claim(claim)._replace(
+        variant=variant,
+        start=start,
+        bound=finding.bound,
+        reproduced=finding.measured,
+        unit="1",
+        within=finding.met,
+        verdict=judged(finding.met, start),
+        measure=finding.measure,
+        reason=finding.seen,
+        threshold_source=finding.threshold,
+    )
 
 
 def error_rows(number: Number, nominal: xr.Dataset) -> list[Row]:
-    """One row for each variant of the method and start of the model."""
+    """One row for each start of the model and variant of the method."""
     study = nominal.sel(rank=number.states, output=number.quantity)
-    starts = [str(start) for start in study["start"].values]
-    rows: list[Row] = []
-    for label, variant in VARIANTS.items():
-        for start in starts:
-            origin = f", {start}" if len(starts) > 1 else ""
-            place = study.sel(start=start).squeeze(drop=True)
-            rows.append(_error_row(number, place, label, variant + origin))
-    return rows
+    return [
+        _error_row(number, study.sel(start=start).squeeze(drop=True), label, variant, str(start))
+        for start in study["start"].values
+        for label, variant in VARIANTS.items()
+    ]
 
 
-def _error_row(number: Number, nominal: xr.Dataset, label: str, words: str) -> Row:
+def _error_row(number: Number, nominal: xr.Dataset, label: str, variant: str, start: str) -> Row:
     point = nominal.sel({"method": label})
     reproduced, status = float(point["rms_error"]), str(point["status"].item())
     if "iterations" in nominal:
@@ -99,28 +136,50 @@ def _error_row(number: Number, nominal: xr.Dataset, label: str, words: str) -> R
         full = nominal["rhs_calls"].sel({"method": "full_order"})
         counts = f"{int(point['rhs_calls'])} evaluations against {int(full)} of the full model"
     failed = "" if status == "ok" else f"{status}: {point['message'].item()}; "
-    reason = (
-        f"{failed}nominal-only error: trained on the run that it is tested on, where replay is "
-        f"exact; {counts}; {PARAMETERS}"
-    )
-    met = status == "ok" and reproduced <= number.value
-    replay = float(nominal["rms_error"].sel({"method": "replay"}))
-    return number_row(
-        number, words, reproduced, met, reason, float(point["floor_rms_error"]), replay
+    within = status == "ok" and reproduced <= number.value
+    return number_row(number, variant, start, reproduced, within)._replace(
+        floor=float(point["floor_rms_error"]),
+        replay=float(nominal["rms_error"].sel({"method": "replay"})),
+        measure=NOMINAL_ERROR,
+        reason=f"{failed}{PARAMETERS}; {counts}",
     )
 
 
-def claim_rows(name: str, claim: Claim, results: Results) -> list[Row]:
-    """A row for each variant of the method; one without a number for what can't be measured."""
-    if name not in CRITERIA:
-        if claim.model not in names("model") or claim.kind == "setup":
-            return []
+def claim_rows(claim: Claim, results: Results) -> list[Row]:
+    """A row for each start and variant; one without a number for what can't be measured.
+
+    A claim on all models is judged by the paper's start alone.
+    """
+    if claim.kind == "setup":
+        return []
+    if claim.id not in CRITERIA:
         reason = "an explanation or a judgement; the paper prints nothing that could be measured"
-        return [not_comparable(claim.model, item_of(claim), reason)]
-    criterion, replay = CRITERIA[name], math.nan
-    if name not in WITHOUT_REPLAY:
+        return [not_comparable(claim, reason)]
+    rows: list[Row] = []
+    for start in _starts(claim, results):
+        part = {name: _from_start(dataset, start) for name, dataset in results.items()}
+        rows += _rows_of_start(claim, part, start)
+    return rows
+
+
+def _rows_of_start(claim: Claim, results: Results, start: str) -> list[Row]:
+    criterion, replay = CRITERIA[claim.id], math.nan
+    if claim.id not in WITHOUT_REPLAY:
         replay = criterion(results, "replay").measured
     return [
-        claim_row(claim, variant, criterion(results, label), replay)
-        for label, variant in VARIANTS.items()
+        claim_row(claim, variant, criterion(results, label), start)._replace(replay=replay)
+        for label, variant in variants(claim.id).items()
     ]
+
+
+def _starts(claim: Claim, results: Results) -> list[str]:
+    """Starts that the studies of a claim's model have."""
+    own = [d for d in results.values() if claim.model and d.attrs["model"] == claim.model]
+    found = [str(s) for d in own for s in d["start"].values.ravel()]
+    return list(dict.fromkeys(found)) or [PUBLISHED_START]
+
+
+def _from_start(dataset: xr.Dataset, start: str) -> xr.Dataset:
+    if "start" in dataset.dims and start in dataset["start"].values:
+        return dataset.sel(start=start)
+    return dataset

@@ -14,7 +14,7 @@ from vehiclemor.models.report import paper_cases
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import bounds
 from vehiclemor.report.predictive.targets import Row
-from vehiclemor.report.printing import Row as Printed
+from vehiclemor.report.printing import Line as Printed
 from vehiclemor.report.printing import fixed, table_text
 from vehiclemor.simulation.build import build
 from vehiclemor.study.timing import timed_model
@@ -77,7 +77,8 @@ def paper_terms_text(rows: list[Row]) -> str:
     for model in dict.fromkeys(row["model"] for row in rows):
         part = [row for row in rows if row["model"] == model]
         within = sum(bool(row["within_bounds"]) for row in part)
-        printed.append(Printed([f"{model}: {within} of {len(part)} variants within"]))
+        heading = f"{model}: {within} of {len(part)} variants within"
+        printed.append(Printed([], heading=heading))
         for row in part:
             if row["winner"]:
                 errors = ", ".join(

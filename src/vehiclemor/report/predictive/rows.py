@@ -25,9 +25,10 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
     pandas.DataFrame
         `kind` tells what a row is.  `method`: one contestant on the test set, with the columns of
         `method_rows`.  `outside`: its errors in one scenario outside of the training range.
-        `target`: what the winner must reach, with `bound`, `measured`, `unit`, `verdict` (`met`
-        or `missed`) and `reason`.  `paper`: POD at the paper's rank and control period, see
-        `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
+        `target`: what the winner must reach, with `id`, `bound`, `measured`, `unit`, `verdict`
+        (`met`, `missed` or `not_comparable`), `reason` and `threshold_source`.  `paper`: POD at the
+        paper's rank and control period, see `paper_terms`.  Errors
+        `worst_<measure>_<output>` are in SI units.
     """
     rows: list[Row] = []
     models: list[str] = []
@@ -51,7 +52,8 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     """One row for each contestant, fastest full-order integrators as measures.
 
     `score` is the largest error of a bounded output as a multiple of its bound (infinite if a run
-    has failed), `seconds` the mean of the test scenarios that are ok.  `ratio_equal_accuracy` is
+    has failed), `seconds` the mean of the test scenarios that are ok, with the `spread` of their
+    rounds (interquartile range over median).  `ratio_equal_accuracy` is
     against the fastest full-order row whose score is not larger (`equal_accuracy`; if there is
     none, against the most accurate one and `equal_accuracy_reached` is false), `ratio_within`
     against the fastest full-order row within the bounds.  `break_even`: runs after which the
@@ -81,6 +83,7 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
             "candidates": str(part["validation"].item()),
             "evaluations": _mean(part[dataset.attrs["evaluations"]].values, ok),
             "seconds": _mean(part["seconds"].values, ok),
+            "spread": _spread(part, ok),
             "offline_seconds": float(part["offline_seconds"]),
             "offline_evaluations": int(part["offline_evaluations"]),
         }
@@ -96,6 +99,13 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
 
 def _mean(values: np.ndarray, ok: np.ndarray) -> float:
     return float(np.mean(values[ok])) if ok.any() else math.nan
+
+
+def _spread(part: xr.Dataset, ok: np.ndarray) -> float:
+    """Interquartile range of the rounds over their median, of all scenarios together."""
+    seconds = _mean(part["seconds"].values, ok)
+    width = _mean((part["seconds_upper"] - part["seconds_lower"]).values, ok)
+    return width / seconds if seconds > 0.0 else 0.0
 
 
 def _failure(part: xr.Dataset) -> str:

@@ -5,7 +5,10 @@ from typing import Any
 
 import xarray as xr
 
+from vehiclemor.report.criteria.finding import OWN, PRINTED
 from vehiclemor.report.labels import unit_of
+from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.verdicts import NOT_COMPARABLE, judged, scatter
 from vehiclemor.study.plans.protocol_file import ProtocolFile, SpeedTarget, Straight
 
 Row = dict[str, Any]
@@ -37,29 +40,32 @@ def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row])
         rows.append(_straight_row(dataset, protocol.straight, winner))
     rows += [_ratio_row(target, winner, methods) for target in protocol.targets]
     name = {"kind": "target", "model": protocol.model, "method": winner["method"]}
-    return [name | row for row in rows]
+    return [name | {"id": row["item"].replace(" ", "_")} | row for row in rows]
 
 
 def _at_least(item: str, bound: float, measured: float, reason: str) -> Row:
     row = {"item": item, "bound": bound, "measured": measured, "unit": "1", "reason": reason}
-    return row | {"verdict": "met" if measured >= bound else "missed"}
+    return row | {"verdict": judged(measured >= bound), "threshold_source": OWN}
 
 
 def _at_most(item: str, bound: float, measured: float, unit: str, reason: str) -> Row:
     row = _at_least(item, bound, measured, reason)
-    return row | {"unit": unit, "verdict": "met" if measured <= bound else "missed"}
+    return row | {"unit": unit, "verdict": judged(measured <= bound)}
 
 
 def _bound_row(dataset: xr.Dataset, protocol: ProtocolFile, winner: Row, output: str) -> Row:
     bound = protocol.bounds[output]
     word = {"rms": "RMS", "max": "largest"}[bound.measure]
-    return _at_most(
+    row = _at_most(
         f"worst {word} error of {output}",
         bound.bound,
         winner[f"worst_{bound.measure}_{output}"],
         unit_of(dataset, output),
         f"test set; settings chosen on validation: {winner['settings']}",
     )
+    printed = rms_numbers(protocol.model).get(output)
+    published = printed is not None and bound.measure == "rms" and printed.value == bound.bound
+    return row | {"threshold_source": PRINTED if published else OWN}
 
 
 def _straight_row(dataset: xr.Dataset, straight: Straight, winner: Row) -> Row:
@@ -77,16 +83,17 @@ def _straight_row(dataset: xr.Dataset, straight: Straight, winner: Row) -> Row:
 
 
 def _ratio_row(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:
-    """Speed-up of the winner against a full-order row."""
+    """Speed-up of the winner against a full-order row, unless one of their times scatters."""
     aim = f"; the aim is {target.aim:g}" if target.aim else ""
-    if target.against == "equal accuracy":
-        other, factor = winner["equal_accuracy"], winner["ratio_equal_accuracy"]
-        if not winner["equal_accuracy_reached"]:
-            other += ", the most accurate; none is as accurate"
-    elif target.against == "within bounds":
-        other, factor = winner["within"], winner["ratio_within"]
-    else:
-        row = next(row for row in methods if row["method"] == target.against)
-        other, factor = target.against, ratio(row, winner)
-    reason = f"against {other}" if other else "no full-order row to compare with"
-    return _at_least(f"speed-up, {target.against}", target.ratio, factor, reason + aim)
+    against = {"equal accuracy": winner["equal_accuracy"], "within bounds": winner["within"]}
+    name = against.get(target.against, target.against)
+    other = next((row for row in methods if row["method"] == name), None)
+    reason = f"against {name}" if name else "no full-order row to compare with"
+    if target.against == "equal accuracy" and not winner["equal_accuracy_reached"]:
+        reason += ", the most accurate; none is as accurate"
+    factor = ratio(other, winner)
+    row = _at_least(f"speed-up, {target.against}", target.ratio, factor, reason + aim)
+    scattered = scatter({r["method"]: r["spread"] for r in (winner, other) if r})
+    if scattered:
+        row |= {"verdict": NOT_COMPARABLE, "reason": f"{scattered}; {reason}{aim}"}
+    return row

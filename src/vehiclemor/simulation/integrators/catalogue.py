@@ -11,6 +11,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
+from vehiclemor.progress import first_use
 from vehiclemor.registry import unknown
 from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
 from vehiclemor.simulation.integrators.loop import scratch_end
@@ -273,7 +274,8 @@ def time_loop(chosen: Integrator, formulation: str, fused: bool) -> Loop:
         *(f"simulation.integrators.{name}" for name in own),
         "simulation.integrators.loop",
     )
-    return loops(modules, ("integrate",))["integrate"]
+    with first_use(f"the time loop of {own[-1]}"):
+        return loops(modules, ("integrate",))["integrate"]
 
 
 def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, fused: bool) -> int:

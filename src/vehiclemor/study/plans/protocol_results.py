@@ -42,8 +42,6 @@ def protocol_dataset(
     # How the files store text holds for their own longest words only.
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
     dataset = dataset.assign_coords(row=labels)
-    online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
-    online[:, : timed.sizes["scenario"]] = timed["seconds"].values
     per_row: dict[str, list[Any]] = {
         "role": [row.contestant.role for row in rows],
         "method": [row.contestant.method for row in rows],
@@ -53,7 +51,10 @@ def protocol_dataset(
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
     dataset = dataset.assign(variables(per_row, "row"))
-    dataset["seconds"] = (("row", "scenario"), online, dict(timed["seconds"].attrs))
+    for name in ("seconds", "seconds_lower", "seconds_upper"):
+        online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
+        online[:, : timed.sizes["scenario"]] = timed[name].values
+        dataset[name] = (("row", "scenario"), online, dict(timed[name].attrs))
     return dataset.assign_attrs(
         attributes(
             protocol.definition.title,

@@ -1,0 +1,37 @@
+"""Writes the handbook's page of the keys of study, protocol and parameter files.
+
+Usage: python paper/schemas.py
+"""
+
+from pathlib import Path
+
+import pandas as pd
+
+from vehiclemor.files import write_text
+from vehiclemor.report.description.schema import SCHEMAS, schema_description
+from vehiclemor.report.tables import markdown
+
+PAGE = Path(__file__).resolve().parent / "handbook" / "study-schema.md"
+HEAD = """# Schema of the files
+
+Written by `python paper/schemas.py` from the classes that read the files;
+`vehiclemor show study-schema` prints the same. How to use them: [study files](study-files.md).
+"""
+
+
+def page() -> str:
+    """The page, from the classes that parse the files."""
+    parts = [HEAD]
+    for name in SCHEMAS:
+        described = schema_description(name)
+        parts.append(f"## {name}\n\n{described.pop('summary')}\n")
+        described.pop("schema")
+        for title, rows in described.items():
+            heading = "" if title == "keys" else f"### {title}\n\n"
+            table = pd.DataFrame(rows).map(lambda value: "" if value is None else value)
+            parts.append(heading + markdown(table))
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    write_text(PAGE, page())

@@ -1,0 +1,111 @@
+"""A word on standard error about what takes long: lines of the logger `vehiclemor`.
+
+They appear where the application has no handlers of its own, and are silenced as usual:
+`logging.getLogger("vehiclemor").setLevel(logging.WARNING)`.
+"""
+
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from threading import Timer
+from time import perf_counter
+
+# What is done within this time (s) is not worth a word.
+QUIET = 1.0
+_LOG = logging.getLogger("vehiclemor")
+
+
+class StandardError(logging.Handler):
+    """Prints to what standard error is at that time; silent beside an application's handlers."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a line."""
+        if not logging.getLogger().handlers and sys.stderr is not None:
+            sys.stderr.write(f"{self.format(record)}\n")
+            sys.stderr.flush()
+
+
+if not _LOG.handlers:
+    _LOG.addHandler(StandardError())
+    if _LOG.level == logging.NOTSET:
+        _LOG.setLevel(logging.INFO)
+
+
+class _Task:
+    """What is told of as one: that it has begun, once it has taken long, and then its end.
+
+    `began` and `ended` are the words for it; where they are empty there is nothing to tell of yet.
+    """
+
+    def __init__(self, what: str, began: str = "", ended: str = "") -> None:
+        self.what, self.began, self.ended = what, began, ended
+        self.seconds, self.told = 0.0, False
+
+    def tell(self) -> None:
+        self.told = True
+        _LOG.info(self.began)
+
+    def tell_end(self) -> None:
+        if self.told:
+            _LOG.info("%s in %.1f s", self.ended, self.seconds)
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """A part of it; the seconds of all parts count."""
+        timer = Timer(max(QUIET - self.seconds, 0.0), self.tell)
+        timer.daemon = True
+        begun = perf_counter()
+        if not self.told:
+            timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            if timer.is_alive():
+                timer.join()
+            self.seconds += perf_counter() - begun
+
+
+_CURRENT: ContextVar[_Task | None] = ContextVar("first use", default=None)
+
+
+@contextmanager
+def first_use(what: str) -> Iterator[None]:
+    """All that is derived and compiled inside is told of as one; within another, part of that."""
+    if _CURRENT.get():
+        yield
+        return
+    task = _Task(what)
+    token = _CURRENT.set(task)
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
+    task.tell_end()
+
+
+@contextmanager
+def making(what: str, *, derived: bool = False) -> Iterator[None]:
+    """Deriving or compiling something that is kept for later runs."""
+    with first_use(what):
+        task = _CURRENT.get()
+        assert task is not None
+        if not task.began:
+            verb, past = "compiling", "compiled"
+            if derived:
+                verb, past = "deriving and compiling", "derived and compiled"
+            task.began = f"first use of {task.what}: {verb}; kept for later runs"
+            task.ended = f"{task.what}: {past}"
+        with task.running():
+            yield
+
+
+@contextmanager
+def telling(what: str) -> Iterator[None]:
+    """Anything else that may take long."""
+    task = _Task(what, what, f"{what}: done")
+    with task.running():
+        yield
+    task.tell_end()

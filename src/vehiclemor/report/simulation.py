@@ -1,0 +1,42 @@
+"""What one simulation has given, as text: errors by output, counts, seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from vehiclemor.report.printing import Line, power, table_text, terms, wrapped
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+COLUMNS = {
+    "rms_error": "RMS error",
+    "floor_rms_error": "floor",
+    "max_error": "largest",
+    "signal_range": "range",
+}
+LEGEND = {
+    "errors": "against the full-order solution; largest: the largest absolute error; range: of the "
+    "full-order output",
+    "floor": "RMS error of the best approximation of the coordinates in the subspaces of the "
+    "reduced model; an output can undercut it",
+    "-": "exactly zero, or there is none",
+}
+
+
+def simulation_text(dataset: xr.Dataset, counts: Iterable[str]) -> str:
+    """Status, a table of errors, solver counts and seconds of a simulation."""
+    title = f"{dataset.attrs['title']}: {dataset['status'].item()} {dataset['message'].item()}"
+    parts = [wrapped(title), wrapped(str(dataset["remark"].item()))]
+    lines = []
+    for output in dataset["output"].values:
+        row = dataset.sel(output=output)
+        numbers = [power(float(row[name])) for name in COLUMNS]
+        lines.append(Line([str(output), *numbers, str(row["output_unit"].item())]))
+    parts.append(table_text(["output", *COLUMNS.values(), "unit"], lines, (0, len(COLUMNS) + 1)))
+    parts.append(terms(LEGEND))
+    parts.append(wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)))
+    seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
+    parts.append(f"seconds in the compiled loop {seconds:.3e} ({clock})")
+    return "\n".join(part for part in parts if part)

@@ -1,0 +1,135 @@
+"""Numbers in README and handbook are those of the facts, and none stands outside of a fragment."""
+
+import json
+
+import facts
+import fragments
+import numpy as np
+import pytest
+import xarray as xr
+from fragments import Fragments, Manifest, Verbatim
+
+from tests.texts.markdown import NAMES
+from vehiclemor import VehiclemorError
+
+DECLARED = fragments.manifest()
+# What is generated, or shows code and no measurements.
+UNMEASURED = {"study-schema.md"}
+
+
+def test_every_number_in_a_text_is_its_fact():
+    known = facts.stored_facts()["facts"]
+    wrong = [
+        f"{number.file}: {number.text}, not {expected}: {number.expression}"
+        for number in fragments.printed_numbers(DECLARED)
+        if (expected := fragments.rendered(known[number.expression]["value"], number.form))
+        != number.text
+    ]
+    assert wrong == []
+
+
+def test_every_fact_is_used_and_has_an_origin():
+    stored = facts.stored_facts()
+    used = {number.expression for number in fragments.printed_numbers(DECLARED)}
+    assert used == set(stored["facts"])
+    sources = {source for expression in used for source in facts.sources_of(expression)}
+    assert sources == set(stored["sources"]) == set(DECLARED.sources)
+    assert set(DECLARED.varying) <= sources
+    for source, origin in stored["sources"].items():
+        assert origin["results"] == DECLARED.sources[source]
+        assert origin["date"]
+        assert origin["commit"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_measured_number_stands_outside_of_a_fragment(name):
+    if not any(name.endswith(other) for other in UNMEASURED):
+        assert fragments.uncovered(DECLARED, name) == []
+
+
+def test_what_is_verbatim_stands_in_its_text():
+    for part in DECLARED.verbatim:
+        text = (fragments.ROOT / part.file).read_text(encoding="utf-8")
+        assert part.source
+        for words in part.texts:
+            assert fragments.matches(text, words), f"{part.file}: {words}"
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    """A small project: one text, one fragment, results of one study."""
+    monkeypatch.setattr(fragments, "ROOT", tmp_path)
+    monkeypatch.setattr(facts, "ROOT", tmp_path)
+    monkeypatch.setattr(facts, "FACTS", tmp_path / "facts.json")
+    (tmp_path / "page.md").write_text("pitch 9.9e-9\nrad at r = 3 over 7 ways\n")
+    texts = [
+        "pitch {[s: rms_error; pod; rank=3] | .1e} rad at r = 3",
+        "over {count([s: status] == 'ok') | d} ways",
+    ]
+    part = Fragments(file="page.md", texts=texts)
+    declared = Manifest(sources={"s": "study"}, varying=[], fragments=[part], verbatim=[])
+    data = xr.Dataset(
+        {
+            "rms_error": (("rank", "method"), [[0.1, 0.2], [4.26e-5, 0.3]], {"units": "rad"}),
+            "status": (("rank", "method"), [["ok", "ok"], ["ok", "diverged"]]),
+        },
+        {"rank": [2, 3], "method": ["pod", "replay"]},
+    )
+    monkeypatch.setattr(facts, "manifest", lambda: declared)
+    monkeypatch.setattr(facts, "load", lambda *_: data)
+    monkeypatch.setattr(facts, "stored_files", lambda *_: [tmp_path / "page.md"])
+    return tmp_path, declared
+
+
+def test_the_script_writes_numbers_and_leaves_words_and_line_ends(page):
+    folder, _ = page
+    assert facts.measure(folder, 1, stored_only=False) == []
+    assert (folder / "page.md").read_text() == "pitch 4.3e-5\nrad at r = 3 over 3 ways\n"
+    known = json.loads((folder / "facts.json").read_text())["facts"]
+    assert known["[s: rms_error; pod; rank=3]"] == {"value": 4.26e-5, "unit": "rad"}
+
+
+def test_what_is_not_stored_stays_and_is_named(page, monkeypatch):
+    folder, _ = page
+    facts.measure(folder, 1, stored_only=False)
+    monkeypatch.setattr(facts, "stored_files", lambda *_: [folder / "absent.nc"])
+    before = (folder / "page.md").read_text(), (folder / "facts.json").read_text()
+    (line,) = facts.measure(folder, 1, stored_only=True)
+    assert "study" in line
+    assert ((folder / "page.md").read_text(), (folder / "facts.json").read_text()) == before
+
+
+def test_a_fragment_that_is_gone_or_ambiguous_is_named(page):
+    folder, declared = page
+    for text, times in (("pitch\n", 0), ("pitch 1 rad at r = 3, pitch 2 rad at r = 3\n", 2)):
+        (folder / "page.md").write_text(text)
+        with pytest.raises(VehiclemorError, match=rf"has {times} times.*pitch"):
+            list(fragments.printed_numbers(declared))
+
+
+def test_a_decimal_outside_of_fragments_is_found(page):
+    folder, declared = page
+    with (folder / "page.md").open("a") as file:
+        file.write(
+            "off by 0.37 m, `0.1 s`, [5.5](a-1.2.md), at most 4e-3, version 1.2.3, after 0.5 s\n"
+        )
+    condition = Verbatim(file="page.md", source="condition", texts=["after 0.5 s"])
+    declared = declared.model_copy(update={"verbatim": [condition]})
+    found = fragments.uncovered(declared, "page.md")
+    assert found == [f"page.md, line 3: {number}" for number in ("0.37", "5.5", "4e-3")]
+
+
+@pytest.mark.parametrize(
+    ("query", "word"),
+    [("rms_error; pdo", "pdo"), ("rms_error; rank=4", "rank=4"), ("rms_error", "no number")],
+)
+def test_a_wrong_query_is_named(page, query, word):
+    data = {"s": facts.load()}
+    with pytest.raises(VehiclemorError, match=word):
+        facts.evaluate(f"[s: {query}]", data)
+
+
+def test_numbers_are_printed_as_the_texts_have_them():
+    printed = [fragments.rendered(v, f) for v, f in ((5.6e-5, ".1e"), (25.0, "d"), (4e7, ".0e"))]
+    assert printed == ["5.6e-5", "25", "4e7"]
+    assert fragments.rendered(np.float64(0.3), ".2f") == "0.30"

@@ -1,0 +1,138 @@
+"""README and handbook describe what is there: links, quoted files, commands, examples."""
+
+import re
+import runpy
+import tomllib
+from configparser import ConfigParser
+
+import pytest
+import schemas
+
+from tests.texts.markdown import NAMES, ROOT, TEXTS, blocks, console_commands, inline_commands
+from vehiclemor.cli.app import app, main
+from vehiclemor.study.plans.study_file import study_path
+
+README = ROOT / "README.md"
+PAGES = pytest.mark.parametrize("path", TEXTS, ids=NAMES)
+FIRST_STEPS = ROOT / "paper" / "handbook" / "first-steps.md"
+STUDY_FILES = ROOT / "paper" / "handbook" / "study-files.md"
+
+
+@PAGES
+def test_links_lead_somewhere(path):
+    text = re.sub(r"```.*?```|`[^`]*`", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        file, _, anchor = link.partition("#")
+        if not file.startswith("https://"):
+            target = (path.parent / file).resolve() if file else path
+            assert target.is_file(), link
+            assert not anchor or anchor in _anchors(target.read_text(encoding="utf-8")), link
+
+
+def _anchors(text: str) -> set[str]:
+    """Anchors that GitHub gives to headings."""
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@PAGES
+def test_paths_in_code_exist(path):
+    text = path.read_text(encoding="utf-8")
+    folders = "src|tests|data|paper|benchmarks"
+    for name in re.findall(rf"`((?:{folders})/[\w/.-]+)`", text):
+        assert (ROOT / name).exists(), name
+
+
+@PAGES
+def test_quoted_files_are_those_of_the_project(path):
+    for block in blocks(path):
+        quoted = re.fullmatch(r"`([\w/.-]+)`:", block.above)
+        if quoted:
+            assert block.content == (ROOT / quoted[1]).read_text(encoding="utf-8"), quoted[1]
+
+
+def test_the_quarter_car_is_quoted_as_a_whole():
+    page = ROOT / "paper" / "handbook" / "add-a-model-or-method.md"
+    quoted = {block.above.strip("`:") for block in blocks(page)}
+    package = ROOT / "tests" / "plugin"
+    files = [
+        package / "pyproject.toml",
+        *(package / "vehiclemor_quarter_car").glob("quarter_car.*"),
+    ]
+    assert {str(file.relative_to(ROOT)) for file in files} <= quoted
+
+
+def test_the_page_of_schemas_is_current():
+    assert schemas.PAGE.read_text(encoding="utf-8") == schemas.page(), "run paper/schemas.py"
+
+
+def test_the_first_two_blocks_are_the_two_commands():
+    shell = [b.content for b in blocks(README) if b.language in ("sh", "shell", "bash", "console")]
+    assert shell[:2] == ["sh .ci/tox -e bench\n", "sh .ci/tox -e tests\n"]
+
+
+@PAGES
+def test_environments_of_tox_exist(path):
+    tox = ConfigParser()
+    tox.read(ROOT / "tox.ini")
+    for name in re.findall(r"tox -e (\w+)", path.read_text(encoding="utf-8")):
+        assert f"testenv:{name}" in tox, name
+
+
+# Parsed and not run, here: what takes long.  Their options are checked, and the names of studies.
+@PAGES
+def test_commands_can_be_parsed(path):
+    for words in [*console_commands(path), *inline_commands(path)]:
+        if words[0] == "vehiclemor" and len(words) > 1:
+            app.parse_args(words[1:], exit_on_error=False, print_error=False)
+            if words[1] == "run" and not words[2].startswith("my_"):
+                study_path(words[2])
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", [README, FIRST_STEPS], ids=["README", "first steps"])
+def test_console_blocks_run(path, here, capsys):
+    for words in console_commands(path):
+        assert words[0] == "vehiclemor"
+        assert main(words[1:]) == 0, words
+    capsys.readouterr()
+    assert list(here.glob("*.png"))
+
+
+def test_the_example_of_readme_runs_and_shows_what_readme_says(here, capsys):
+    (code,) = [block.content for block in blocks(README) if block.language == "python"]
+    (here / "example.py").write_text(code)
+    runpy.run_path("example.py")
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    errors = {words[0]: float(words[1]) for words in lines}
+    # Off by as much as what computes nothing.
+    assert errors["pod"] == pytest.approx(errors["replay"], rel=0.1)
+
+
+def test_the_example_study_runs(here, capsys):
+    first, *_ = [block.content for block in blocks(STUDY_FILES) if block.language == "toml"]
+    (here / "my_study.toml").write_text(first)
+    for words in console_commands(STUDY_FILES):
+        assert main(words[1:]) == 0, words
+    (code,) = [block.content for block in blocks(STUDY_FILES) if block.language == "python"]
+    (here / "example.py").write_text(code)
+    runpy.run_path("example.py")
+    assert "frequency_factor" in capsys.readouterr().out
+
+
+@PAGES
+def test_toml_blocks_are_toml(path):
+    for block in blocks(path):
+        if block.language == "toml":
+            tomllib.loads(block.content)
+
+
+def test_scripts_of_the_paper_explain_themselves():
+    for path in TEXTS:
+        for script in re.findall(r"python (paper/\w+\.py)", path.read_text(encoding="utf-8")):
+            assert f"Usage: python {script}" in (ROOT / script).read_text(encoding="utf-8")
