@@ -47,14 +47,9 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
         As the experiment keeps it, see `study/result.py`.  Where nothing could be computed the
         values are missing, and `status` and `message` tell why.
     """
-    with first_use(f"{experiment.model} with {experiment.method}"):
-        return _evaluated(experiment, model)
-
-
-def _evaluated(experiment: Experiment, model: Model | None) -> xr.Dataset:
-    kept = model is None
-    model = model or model_of(experiment)
-    with one_thread():
+    with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
+        kept = model is None
+        model = model or model_of(experiment)
         found = attempt(partial(_evaluated, experiment, model, kept))
         return _failed(experiment, model, found) if isinstance(found, Failure) else found
 
