@@ -11,6 +11,9 @@ from cyclopts import CycloptsError
 from vehiclemor.cli.exit_status import FAILED, STOPPED, WRONG_INPUT
 from vehiclemor.errors import MachineError, VehiclemorError, machine_reason
 
+# Seconds until a signal that has been heard by nobody is raised again.
+AGAIN = 2.0
+
 
 def ended(run: Callable[[], object]) -> int:
     """Exit status of a call; why it has ended early is one line on standard error."""
@@ -49,11 +52,17 @@ def _stopped_by_signals() -> Iterator[None]:
     """Let SIGTERM end a command as Ctrl-C does: workers ended, partial files removed."""
 
     def stop(number: int, _: object) -> None:
+        if hasattr(signal, "setitimer"):
+            # Libraries in C may drop an exception: it is raised again until the command has ended.
+            signal.signal(signal.SIGALRM, lambda *_: stop(number, None))
+            signal.setitimer(signal.ITIMER_REAL, AGAIN)
         raise _StopError(number)
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.errors import InputError
-from vehiclemor.study.plans.grid import expand
+from vehiclemor.progress import telling
+from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.study_file import StudyFile, file_as_stored, studies_and_files
 from vehiclemor.study.store import result_path, stored
 from vehiclemor.study.workers import Progress, Workers
 
@@ -43,18 +44,25 @@ def run_studies(
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; it must be at least 1")
-    definitions = load_studies(study)
-    protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
-    grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
+    files = studies_and_files(study)
+    protocols = [load_protocol(name) for _, d in files.values() for name in d.protocols]
+    grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
     results = {p.study: run_protocol(p, folder, jobs, progress) for p in protocols}
-    for grid in grids:
+    for path, grid in grids:
+        cells = grid.unique
         workers = Workers(grid.name, folder, jobs, progress)
-        workers([[cell] for cell in grid.unique.values()])
+        workers([[cell] for cell in cells.values()])
         results[grid.name] = stored(
             folder / "studies" / f"{grid.name}.nc",
             "cells",
             cells_digest(grid),
             partial(grid_dataset, grid, folder),
-            [result_path(folder, key) for key in grid.unique],
+            [result_path(folder, key) for key in cells],
+            file_as_stored(path, folder),
         )
     return results
+
+
+def _expanded(name: str, definition: StudyFile) -> Grid:
+    with telling(f"{name}: making the {definition.cells} cells of the grid"):
+        return expand(name, definition)

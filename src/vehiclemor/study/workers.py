@@ -65,12 +65,13 @@ class Workers:
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
         self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        if self._missing(groups):
+            prepare_folder(self.folder)
         self._report()
         for _ in range(TRIES):
             work = self._missing(groups)
             if not work:
                 return
-            prepare_folder(self.folder)
             faults = [fault for fault in self._evaluated(work) if fault]
             if faults:
                 _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
