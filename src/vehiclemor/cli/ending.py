@@ -32,7 +32,8 @@ def ended(run: Callable[[], object]) -> int:
     except (CycloptsError, VehiclemorError) as error:
         return _said(str(error), WRONG_INPUT)
     except (MemoryError, OSError) as error:
-        return _said(machine_reason(error) or str(error), FAILED)
+        reason = machine_reason(error)
+        return _said(reason or str(error), FAILED if reason else WRONG_INPUT)
     except _StopError as stop:
         text = "stopped; finished cells of a study are stored, run again to resume"
         return _said(text, STOPPED + stop.args[0])

@@ -19,13 +19,17 @@ def progress_of_cells() -> Iterator[Callable[[str, int, int], None]]:
 
     console = Console(stderr=True)
     tasks: dict[str, TaskID] = {}
+    totals: dict[str, int] = {}
     with Progress(console=console, disable=not console.is_terminal) as bar:
 
         def update(study: str, done: int, total: int) -> None:
-            if study not in tasks:
+            if totals.get(study) != total:
+                # The test of a protocol adds cells to those of its validation.
+                totals[study] = total
                 if done < total and not console.is_terminal:
                     print(f"{study}: {total - done} of {total} cells to compute", file=sys.stderr)
-                tasks[study] = bar.add_task(study, total=total)
-            bar.update(tasks[study], completed=done)
+            if study not in tasks:
+                tasks[study] = bar.add_task(study)
+            bar.update(tasks[study], completed=done, total=total)
 
         yield update

@@ -1,9 +1,12 @@
 """`vehiclemor run`: a study, resumed where an earlier run stopped."""
 
+import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 from vehiclemor import api
+from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.cli.progress import progress_of_cells
 
 
@@ -22,11 +25,23 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     from vehiclemor.study.run import run_studies
 
     began = time.perf_counter()
+    cells: dict[str, int] = {}
     with progress_of_cells() as progress:
-        results = run_studies(study, out, jobs, progress)
+
+        def counted(name: str, done: int, total: int) -> None:
+            cells[name] = total
+            progress(name, done, total)
+
+        results = run_studies(study, out, jobs, counted)
+    errors = 0
     for name, dataset in results.items():
-        statuses = [str(status) for status in dataset["status"].values.ravel()]
-        counted = ", ".join(f"{statuses.count(s)} {s}" for s in sorted(set(statuses)))
-        print(f"{name}: {counted}; {out / 'studies' / (name + '.nc')}")
+        count = Counter(str(status) for status in dataset["status"].values.ravel())
+        shared = cells[name] != count.total()
+        places = f"{cells[name]} cells" + (f" fill {count.total()} places" if shared else "")
+        statuses = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
+        print(f"{name}: {places}: {statuses}; {out / 'studies' / (name + '.nc')}")
+        errors += count["error"]
     print(f"{time.perf_counter() - began:.1f} s")
-    return 0
+    if errors:
+        print("cells with the status error are tried again by the next run", file=sys.stderr)
+    return FAILED if errors else 0

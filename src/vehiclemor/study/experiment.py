@@ -41,7 +41,7 @@ class Experiment:
     test: tuple[Scenario, ...]
     keep: Keep = "trajectories"
 
-    @cached_property
+    @property
     def configuration(self) -> str:
         """Canonical JSON text of the experiment."""
         names = self.__dataclass_fields__

@@ -64,5 +64,8 @@ def run_studies(
 
 
 def _expanded(name: str, definition: StudyFile) -> Grid:
-    with telling(f"{name}: making the {definition.cells} cells of the grid"):
-        return expand(name, definition)
+    with telling(f"{name}: a grid of {definition.cells} cells"):
+        grid = expand(name, definition)
+        # Made here: the keys take most of the time.
+        assert grid.unique
+        return grid

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.codegen.object_cache import cache_folder
 from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
@@ -68,12 +69,13 @@ class Workers:
         if self._missing(groups):
             prepare_folder(self.folder)
         self._report()
-        for _ in range(TRIES):
+        for left in reversed(range(TRIES)):
             work = self._missing(groups)
             if not work:
                 return
-            faults = [fault for fault in self._evaluated(work) if fault]
-            if faults:
+            again = left < TRIES - 1
+            faults = [fault for fault in self._evaluated(work, again) if fault]
+            if faults and left:
                 _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
         spoiled = sum(len(group) for group in self._missing(groups))
         if spoiled:
@@ -98,17 +100,18 @@ class Workers:
         if self.progress:
             self.progress(self.name, len(self.finished), len(self.asked))
 
-    def _evaluated(self, work: list[list[Experiment]]) -> Iterator[str]:
+    def _evaluated(self, work: list[list[Experiment]], again: bool) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
+        # One group of each method here, so that its loops are compiled once; what has killed a
+        # worker would kill this process too.
+        here = [] if again else list({g[0].method: g for g in reversed(work)}.values())
         # Starting processes costs seconds: a handful of groups is quicker without.
-        alone = self.jobs == 1 or len(work) < 2 * self.jobs
-        # One group of each method first, so that its loops are compiled once.
-        first = list({group[0].method: group for group in reversed(work)}.values())
-        here = work if alone else first
+        if self.jobs == 1 or (len(work) < 2 * self.jobs and not again):
+            here = work
         for group in here:
             yield self._taken(*evaluate_and_store(group, self.folder))
-        if not alone:
-            rest = [group for group in work if all(group is not other for other in first)]
+        rest = [group for group in work if all(group is not other for other in here)]
+        if rest:
             with closing(evaluated_by_workers(rest, self.folder, self.jobs)) as pool:
                 for done in pool:
                     yield self._taken(*done)
@@ -160,7 +163,10 @@ def evaluated_by_workers(
     warnings.filterwarnings("ignore", "Failed to kill subprocesses")
     # Without the empty value a worker that crashes would print where each of its threads was.
     pool = get_reusable_executor(
-        jobs, initializer=begin, initargs=(os.getpid(),), env={"PYTHONFAULTHANDLER": ""}
+        jobs,
+        initializer=begin,
+        initargs=(os.getpid(), str(cache_folder())),
+        env={"PYTHONFAULTHANDLER": ""},
     )
     waiting: set[Future] = set()
     left = iter(groups)
@@ -182,8 +188,9 @@ def evaluated_by_workers(
         remove_partial(folder)
 
 
-def begin(driver: int) -> None:
-    """Begin a worker: interrupts are the driver's to handle, and the worker ends with it."""
+def begin(driver: int, cache: str) -> None:
+    """Begin a worker: it shares the driver's cache, leaves interrupts to it, and ends with it."""
+    os.environ["VEHICLEMOR_CACHE"] = cache
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
