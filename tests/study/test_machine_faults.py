@@ -2,6 +2,7 @@
 
 import errno
 import os
+import signal
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
@@ -256,7 +257,7 @@ def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(tmp_path, cap
 
     def kill(_, done, __):
         if done == 9:
-            active_children()[0].kill()
+            os.kill(active_children()[0].pid, signal.SIGKILL)
 
     with pytest.raises(KeyboardInterrupt):
         run_studies(str(path), tmp_path, jobs=2, progress=stop)
