@@ -38,13 +38,6 @@ FUNCTIONS: dict[str, Callable] = {
     "mean": lambda array: array.mean(),
     "count": lambda array: array.sum(),
 }
-# Tables of the report -> (how its rows are named, which of the rows).
-PREDICTIVE = {
-    "predictive": (["model", "method"], "method"),
-    "outside": (["model", "method", "scenario"], "outside"),
-    "targets": (["model", "item"], "target"),
-    "terms": (["model", "method"], "paper"),
-}
 
 
 def sources_of(expression: str) -> list[str]:
@@ -106,17 +99,19 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     if kind == "operations":
         return operation_table(model).set_index("kernel").to_xarray()
     if kind == "benchmark":
-        rows = json.loads((folder / "benchmark.json").read_text(encoding="utf-8"))["benchmarks"]
+        path = folder / "benchmark.json"
+        if not path.exists():
+            raise VehiclemorError(f"{path}: no such file; `tox -e bench` makes it")
+        rows = json.loads(path.read_text(encoding="utf-8"))["benchmarks"]
         values = {_benchmark(row["fullname"]): row["stats"] | row["extra_info"] for row in rows}
         return pd.DataFrame.from_dict(values, "index").rename_axis("name").to_xarray()
     if kind == "published":
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
-    if kind in PREDICTIVE:
-        index, chosen = PREDICTIVE[kind]
+    if kind == "predictive":
         rows = predictive_comparison(folder, jobs)
-        rows = rows[rows["kind"] == chosen].dropna(axis=1, how="all")
-        return rows.set_index(index).to_xarray()
+        rows = rows[rows["kind"] == "method"].dropna(axis=1, how="all")
+        return rows.set_index(["model", "method"]).to_xarray()
     return run_studies(source, folder, jobs)[source]
 
 
@@ -137,7 +132,7 @@ def stored_files(source: str, folder: Path) -> list[Path]:
     studies = [source]
     if kind == "costs":
         studies = [f"timing-{model}"]
-    elif kind in PREDICTIVE:
+    elif kind == "predictive":
         studies = [f"predictive-{name}" for name in names("model")]
     return [folder / "studies" / f"{study}.nc" for study in studies]
 
@@ -148,8 +143,10 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
 
     kind = source.partition(" ")[0]
     commands = {"costs": "vehiclemor compare", "benchmark": "tox -e bench", "published": ""}
-    commands |= dict.fromkeys(PREDICTIVE, "vehiclemor compare predictive")
-    commands["operations"] = "python paper/regenerate.py"
+    commands |= {
+        "operations": "python paper/regenerate.py",
+        "predictive": "vehiclemor compare predictive",
+    }
     written = max((path.stat().st_mtime for path in files), default=None)
     when = datetime.now(UTC) if written is None else datetime.fromtimestamp(written, UTC)
     return {

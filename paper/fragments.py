@@ -108,8 +108,10 @@ def rendered(value: float, form: str) -> str:
 
 def rewritten(text: str, numbers: Iterable[tuple[Printed, str]]) -> str:
     """A text with other numbers in the places of its fragments."""
-    for number, new in sorted(numbers, reverse=True):
-        text = text[: number.span[0]] + new + text[number.span[1] :]
+    # Fragments may overlap: each place is written once.
+    places = {number.span: new for number, new in numbers}
+    for (first, last), new in sorted(places.items(), reverse=True):
+        text = text[:first] + new + text[last:]
     return text
 
 

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from vehiclemor.arguments import count, file_path, number, quoted, real_array
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
     from vehiclemor.maneuvers import Maneuver
     from vehiclemor.simulation.model import Model
+    from vehiclemor.simulation.trajectory import Start
 
 RESULTS = Path("results")
 
@@ -102,8 +107,8 @@ def model(
     """
     from vehiclemor.simulation.build import build
 
-    component("model", name)
-    return build(name, Path(parameter_file) if parameter_file else None, parameters)
+    path = None if parameter_file is None else file_path("parameter_file", parameter_file)
+    return build(name, path, parameters)
 
 
 _model = model
@@ -114,7 +119,7 @@ def simulate(
     method: str = "full_order",
     *,
     maneuver: str | Maneuver | None = None,
-    start: str | None = None,
+    start: Start | None = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     preset: str = "recommended",
@@ -134,7 +139,7 @@ def simulate(
     maneuver
         Registered name; the model's own by default.
     start
-        Initial condition; the model's first by default.
+        Initial condition, by name or as a state (n,); the model's first by default.
     frequency, amplitude
         Factors on the maneuver.
     preset
@@ -159,25 +164,32 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
+    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
     from vehiclemor.study.method_settings import complete_settings
     from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
-    ready = _model(model) if isinstance(model, str) else model
-    if isinstance(maneuver, str) or maneuver is None:
-        default = component("model", ready.name).maneuver
-        base: Maneuver = component("maneuver", maneuver or default)
-    else:
-        base = maneuver
+    ready = model if isinstance(model, Model) else _model(model)
+    if maneuver is None:
+        maneuver = ready.definition.maneuver
+    base = maneuver if isinstance(maneuver, Maneuver) else component("maneuver", maneuver)
     if rtol is not None:
-        settings["tolerance"] = rtol
+        if "tolerance" in settings:
+            raise InputError("rtol and tolerance are the same setting: give one of them")
+        settings["tolerance"] = number("rtol", rtol)
     chosen = complete_settings(ready, method, settings, preset)
-    test = Scenario(base.perturbed(frequency, amplitude), start or ready.starts[0])
+    if start is None:
+        start = ready.starts[0]
+    elif not isinstance(start, str):
+        start = tuple(ready.start(start).tolist())
+    test = Scenario(base.perturbed(frequency, amplitude), start)
     check(ready, test)
-    factors = [(float(f), float(a)) for f, a in training_set]
-    trained = training_scenarios(test, training, factors)
+    trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
+
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError
@@ -185,8 +197,20 @@ def simulate(
     return dataset
 
 
+def _pairs(training_set: Any) -> list[tuple[float, float]]:
+    """Pairs (frequency factor, amplitude factor); `InputError` if they are none."""
+    wrong = f"training_set is {quoted(training_set)}, not a list of pairs (frequency, amplitude)"
+    try:
+        pairs = real_array(training_set if len(training_set) else np.zeros((0, 2)))
+    except (TypeError, ValueError):
+        raise InputError(wrong) from None
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise InputError(wrong)
+    return [(frequency, amplitude) for frequency, amplitude in pairs.tolist()]
+
+
 def run_study(
-    study: str,
+    study: str | Path,
     jobs: int = 1,
     out: str | Path = RESULTS,
     progress: Callable[[str, int, int], None] | None = None,
@@ -211,11 +235,53 @@ def run_study(
         cell of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.study.plans.grid_results import flattened
+    from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
-    results = run_studies(study, Path(out), jobs, progress)
+    if progress is not None and not callable(progress):
+        raise InputError(f"progress is {quoted(progress)}, not a function")
+    with listening(progress):
+        results = run_studies(str(file_path("study", study)), file_path("out", out), jobs)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
+
+
+def plot(
+    result: xr.Dataset | str | Path,
+    kind: str = "histories",
+    path: str | Path | None = None,
+    *,
+    results: str | Path = RESULTS,
+    **at: object,
+) -> Figure:
+    """Draw a result; a dataset draws itself by `dataset.vehiclemor.plot(...)`.
+
+    Parameters
+    ----------
+    result
+        Dataset of `simulate` or `run_study`, a netCDF file, or the name of a study that was run.
+    kind
+        `histories` of outputs, `paths`, or `errors`.
+    path
+        Picture to write (PNG, SVG or PDF).
+    results
+        Results folder in which studies are looked for.
+    **at
+        Point of a study's grid, such as `rank=3`; else factors are 1 and the others first.  All
+        methods are drawn where none is chosen.
+
+    Raises
+    ------
+    VehiclemorError
+        If there is no such result, kind or point, or the result holds no histories.
+    """
+    from vehiclemor.report.accessor import ResultAccessor
+    from vehiclemor.report.result_selection import stored_result
+
+    if isinstance(result, str | Path):
+        result = stored_result(str(result), Path(results))
+    return ResultAccessor(result).plot(kind, path, **at)
 
 
 def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:
@@ -243,7 +309,7 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     """
     from vehiclemor.report.comparison.kinds import comparison
 
-    return comparison(what, Path(out), jobs)
+    return comparison(what, file_path("out", out), count("jobs", jobs))
 
 
 def figures(
@@ -273,4 +339,8 @@ def figures(
     """
     from vehiclemor.report.regenerate import regenerate_figures
 
-    return regenerate_figures(Path(results), Path(out), only, jobs)
+    folders = file_path("results", results), file_path("out", out)
+    chosen = [only] if isinstance(only, str) else only
+    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
+        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
+    return regenerate_figures(*folders, chosen, count("jobs", jobs))

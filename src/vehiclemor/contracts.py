@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
@@ -16,7 +17,7 @@ from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.build import build
+from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
 
 
@@ -37,16 +38,11 @@ def check_model(name: str) -> None:
     model, definition = build(name), _definition(name)
     for kind in ("coordinates", "speeds", "inputs", "outputs"):
         quantities = getattr(definition, kind)
-        declared = [quantity.name for quantity in quantities]
-        assert len(set(declared)) == len(declared), f"{name}: a name occurs twice in {declared}"
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
-    equations = "residual" if model.kind == "ae" else "derivative"
-    for function, size in (
-        (equations, len(definition.states)),
-        ("outputs", len(definition.outputs)),
-    ):
-        derived = model.equations.shapes[function]
-        assert derived == (size,), f"{name}: {function} has shape {derived}, not ({size},)"
+    try:
+        check_equations(definition, model.equations)
+    except InputError as error:
+        raise AssertionError(str(error)) from None
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
     timed = {case.method for case in definition.shown.timing}
     assert timed <= set(names("method")), f"{name}: unknown methods among {sorted(timed)} are timed"
@@ -108,7 +104,7 @@ def check_method(name: str, model_name: str) -> None:
         assert setting.description, f"{name}: a setting is not described"
     maneuver = _nominal(model)
     for preset in method.presets_of(model.kind):
-        settings = validated(method, model.kind, {}, preset)
+        settings = validated(method, model.kind, {}, preset, len(model.coordinates))
         method.check(model, settings)
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)

@@ -2,7 +2,9 @@
 
 import difflib
 import errno
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
@@ -40,7 +42,17 @@ class UnreachableError(VehiclemorError):
 
 
 class ConvergenceError(VehiclemorError):
-    """An iteration did not converge, or met a value that is not finite."""
+    """An iteration did not converge, or met a value that is not finite.
+
+    Attributes
+    ----------
+    trajectory
+        The run as far as it went, with its counts; None if there is none.
+    """
+
+    def __init__(self, message: str, trajectory: Any = None) -> None:
+        super().__init__(message)
+        self.trajectory = trajectory
 
 
 def machine_reason(error: BaseException) -> str:
@@ -50,6 +62,27 @@ def machine_reason(error: BaseException) -> str:
     if isinstance(error, OSError) and error.errno in MACHINE_ERRORS:
         return f"{error.strerror}"
     return ""
+
+
+def one_line(error: BaseException) -> str:
+    """Kind and text of an error in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+
+
+@contextmanager
+def blamed(whose: str) -> Iterator[None]:
+    """Turn what the code of a plug-in raises into one line that names it.
+
+    What the user can mend and what the machine does passes.
+    """
+    try:
+        yield
+    except VehiclemorError:
+        raise
+    except Exception as error:
+        if machine_reason(error):
+            raise
+        raise InputError(f"{whose}: {one_line(error)}") from error
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

@@ -9,8 +9,10 @@ from typing import Literal
 import numpy as np
 from pydantic import field_validator
 
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # No road vehicle has a part farther than this from its origin (m).
@@ -79,7 +81,7 @@ class ParameterFile(FileSchema):
 
 
 @dataclass(frozen=True)
-class ParameterSet:
+class ParameterSet(ShortRepr):
     """Validated parameters of one model, SI units.
 
     Attributes
@@ -172,14 +174,12 @@ def load_parameters(
 
 def _number_or_list(value: object, name: str) -> float | list[float]:
     try:
-        if isinstance(value, bool):
-            raise TypeError
-        array = np.array(value, dtype=float)
-        return [float(component) for component in array] if array.ndim else float(array)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"parameter {name}: {value!r} is not a number or list of numbers"
-        ) from None
+        array = real_array(value)
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.ndim > 1:
+        raise InputError(f"parameter {name}: {quoted(value)} is not a number or list of numbers")
+    return array.tolist()
 
 
 def _check_value(

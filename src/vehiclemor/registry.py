@@ -9,20 +9,20 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from vehiclemor.errors import InputError, did_you_mean
+from vehiclemor.arguments import quoted
+from vehiclemor.errors import InputError, did_you_mean, one_line
 
 GROUPS = {
     "model": "vehiclemor.models",
     "method": "vehiclemor.methods",
     "maneuver": "vehiclemor.maneuvers",
 }
-# Class of the components of a kind, named as in an entry point: it stands in a layer above.
+# Class of the components of a kind, named as in an entry point: most stand in a layer above.
 CLASSES = {
     "model": "vehiclemor.models.definition:ModelDefinition",
+    "method": "vehiclemor.reduction.interface:Method",
     "maneuver": "vehiclemor.maneuvers:Maneuver",
 }
-# What a component of another kind must have; see `reduction/interface.py` and the handbook.
-REQUIRED = {"method": ("summary", "reference", "settings", "presets", "accepts", "check", "fit")}
 
 
 def names(kind: str) -> list[str]:
@@ -40,24 +40,21 @@ def component(kind: str, name: str) -> Any:
         plug-in that can't be imported, or is something else.
     """
     entries = _entries(kind)
-    if name not in entries:
+    if not isinstance(name, str) or name not in entries:
         raise unknown(kind, name, entries)
+    where = f"{kind} {name!r} ({entries[name].value})"
     try:
         loaded = entries[name].load()
-    except Exception as error:
-        raise InputError(
-            f"{kind} {name!r} ({entries[name].value}) can't be imported: "
-            f"{type(error).__name__}: {error}"
-        ) from error
-    where = f"{kind} {name!r} ({entries[name].value})"
-    if kind in CLASSES:
-        wanted = EntryPoint(kind, CLASSES[kind], "").load()
-        if not isinstance(loaded, wanted):
-            found = type(loaded).__name__
-            raise InputError(f"{where} is of type {found}: it must be a {wanted.__name__}")
-    for attribute in REQUIRED.get(kind, ()):
-        if not hasattr(loaded, attribute):
-            raise InputError(f"{where} has no {attribute}")
+    # A module may even end the interpreter.
+    except (Exception, SystemExit) as error:
+        raise InputError(f"{where} can't be imported: {one_line(error)}") from error
+    wanted = EntryPoint(kind, CLASSES[kind], "").load()
+    if not isinstance(loaded, wanted):
+        found = type(loaded).__name__
+        raise InputError(f"{where} is of type {found}: it must be a {wanted.__name__}")
+    # Models are built again by their own names.
+    if kind == "model" and loaded.name != name:
+        raise InputError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
     return loaded
 
 
@@ -65,7 +62,7 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     """Error for an unknown name, with the nearest known ones."""
     known = sorted(known)
     hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
-    return InputError(f"unknown {kind} {str(name)!r}; {hint}")
+    return InputError(f"unknown {kind} {quoted(name)}; {hint}")
 
 
 @cache

@@ -31,13 +31,16 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 def _parsed(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise FileError(f"{path}: tables or lists are nested too deeply") from None
     except FileNotFoundError:
         raise FileError(f"{path}: no such file") from None
     except OSError as error:
         raise FileError(f"{path}: can't be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise FileError(f"{path}: not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
+    # A number of thousands of digits is no TOML error, but no number either; nor is "\0" a path.
+    except ValueError as error:
         raise FileError(f"{path}: not a valid TOML file: {error}") from None
 
 

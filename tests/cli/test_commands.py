@@ -3,12 +3,20 @@
 import json
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
+import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.cli import main
+from vehiclemor import api
+from vehiclemor.cli import main, progress
+from vehiclemor.study import run as study_run
+from vehiclemor.study.store import write_dataset
+from vehiclemor.study.workers import Workers
 
 
 def test_list(capsys):
@@ -39,6 +47,102 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, capsys):
     with xr.open_dataset(out) as written:
         np.testing.assert_array_equal(written["coordinates"], expected["coordinates"])
         assert list(written["coordinate"].values) == list(vm.model("double_wishbone").coordinates)
+
+
+def table_of(text):
+    """Output -> numbers of the table of a simulation."""
+    rows = [line.split() for line in text.splitlines() if line.split()[-1:] in (["m"], ["rad"])]
+    return {row[0]: row[1:-1] for row in rows}
+
+
+def test_simulate_prints_errors_in_a_table(capsys):
+    assert main(["simulate", "double_wishbone", "--method", "pod", "--all-outputs"]) == 0
+    text = capsys.readouterr().out
+    dataset = vm.simulate("double_wishbone", "pod")
+    table = table_of(text)
+    assert list(table) == dataset["output"].values.tolist()
+    names = ("rms_error", "floor_rms_error", "max_error", "signal_range")
+    for output, row in table.items():
+        expected = [dataset[name].sel(output=output).item() for name in names]
+        assert row == [f"{value:.1e}" if value else "-" for value in expected]
+    assert "floor: RMS error of the best approximation" in text
+    assert "nothing is kept: --out FILE.nc keeps the result, --plot draws it" in text
+
+
+def test_what_is_zero_or_missing_is_a_dash(capsys):
+    assert main(["simulate", "double_wishbone"]) == 0
+    text = capsys.readouterr().out
+    assert {tuple(row[:3]) for row in table_of(text).values()} == {("-", "-", "-")}
+    assert "4 more outputs: --all-outputs" in text
+
+
+def test_parameters_of_the_command_line_are_those_of_the_interface(tmp_path, capsys):
+    out, point = tmp_path / "run.nc", [0.0, 0.8, -0.13]
+    given = ["--parameter", "wheel_centre=0,0.8,-0.13", "--out", str(out)]
+    assert main(["simulate", "double_wishbone", *given]) == 0
+    assert f"written: {out}" in capsys.readouterr().out
+    model = vm.model("double_wishbone", {"wheel_centre": point})
+    with xr.open_dataset(out) as written:
+        np.testing.assert_array_equal(written["outputs"], vm.simulate(model)["outputs"])
+        assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
+
+
+def test_pictures_are_named_and_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["simulate", "double_wishbone", "--method", "pod", "--out", "run.nc"]
+    assert main([*arguments, "--plot"]) == 0
+    assert main([*arguments, "--plot", "mine.svg"]) == 0
+    assert main(["run", "figures-6-7", "--out", "results"]) == 0
+    for kind in ("errors", "paths"):
+        assert main(["plot", "run.nc", "--kind", kind]) == 0
+    assert main(["plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf"]) == 0
+    text = capsys.readouterr().out
+    names = ["double_wishbone-pod.png", "mine.svg", "study.pdf"]
+    names += [f"run-{kind}.png" for kind in ("errors", "paths")]
+    assert {path.name for path in tmp_path.iterdir()} == {*names, "run.nc", "results"}
+    for name in names:
+        assert f"written: {name}" in text
+        assert Path(name).stat().st_size > 1000
+    assert "at rank 4" in text
+
+
+def test_a_result_draws_itself(tmp_path):
+    dataset = vm.simulate("double_wishbone", "pod")
+    figure = dataset.vehiclemor.plot("histories", tmp_path / "a.png")
+    drawn = [axis.get_lines() for axis in figure.axes]
+    assert any(
+        np.array_equal(line.get_ydata(), dataset["outputs"].sel(output="spindle_y"))
+        for lines in drawn
+        for line in lines
+    )
+    write_dataset(dataset, tmp_path / "run.nc")
+    vm.plot(tmp_path / "run.nc", path=tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_progress_without_a_terminal_is_lines(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "INTERVAL", 0.01)
+    with progress.shown_progress():
+        workers = Workers("mine", Path("nowhere"), asked={"a", "b", "c"}, finished={"a"})
+        for line in ("mine: 2 of 3 to compute", "mine: 1 of 3, "):
+            workers._report()
+            told, end = "", time.monotonic() + 20.0
+            while line not in told and time.monotonic() < end:
+                told += capsys.readouterr().err
+            assert line in told
+
+
+@pytest.mark.parametrize("command", ["run", "compare", "figures"])
+def test_every_long_command_tells_of_cells(capsys, monkeypatch, tmp_path, command):
+    def long(*_):
+        Workers("mine", tmp_path, asked={"a", "b", "c"}, finished={"a"})._report()
+        return pd.DataFrame({"verdict": []}) if command == "compare" else {}
+
+    monkeypatch.setattr(api, command, long, raising=False)
+    monkeypatch.setattr(study_run, "run_studies", long)
+    arguments = {"run": ["figure-6"], "compare": ["--json"], "figures": []}
+    assert main([command, *arguments[command]]) == 0
+    assert "mine: 2 of 3 to compute" in capsys.readouterr().err
 
 
 def test_run_prints_statuses_and_resumes(tmp_path, capsys):

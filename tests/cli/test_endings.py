@@ -74,11 +74,11 @@ def test_what_the_machine_does_is_one_line_and_status_1(capsys, error, line):
 
 
 def test_counts_of_cells_agree(study, tmp_path, capsys):
-    for missing in ("6 of 6 cells to compute\n", ""):
+    for missing in ("small: 6 of 6 to compute\n", ""):
         assert main(["run", str(study), "--out", str(tmp_path / "out")]) == 0
         printed = capsys.readouterr()
-        assert printed.err == (f"small: {missing}" if missing else "")
-        assert printed.out.startswith("small: 6 cells fill 8 places: 8 ok; ")
+        assert printed.err == missing
+        assert printed.out.startswith("small: 6 cells, 8 grid points: 8 ok; ")
 
 
 def test_cells_with_errors_are_tried_again_and_said_in_the_exit_status(
@@ -94,7 +94,7 @@ def test_cells_with_errors_are_tried_again_and_said_in_the_exit_status(
         assert "4 error, 4 ok" in capsys.readouterr().out
     assert main(arguments) == 0
     printed = capsys.readouterr()
-    assert printed.err == "small: 2 of 6 cells to compute\n"
+    assert printed.err == "small: 2 of 6 to compute\n"
     assert "8 ok" in printed.out
 
 
@@ -111,7 +111,7 @@ def test_a_terminal_that_cannot_show_a_name_ends_no_study(study, tmp_path, monke
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii"))
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
     sys.stdout.flush()
-    assert shown.getvalue().startswith(rb"\u8eca: 6 cells fill 8 places: 8 ok")
+    assert shown.getvalue().startswith(rb"\u8eca: 6 cells, 8 grid points: 8 ok")
 
 
 def test_a_folder_in_the_place_of_a_cell_is_named(fails, study, tmp_path, capsys):

@@ -10,11 +10,13 @@ import xarray as xr
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.report.predictive.rows import method_rows, predictive_comparison, protocol_of
+from vehiclemor.report.predictive.targets import target_rows
 from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose
 from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol_file import SpeedTarget
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import training_run
 
@@ -187,6 +189,21 @@ def test_the_comparison_marks_the_winner_and_judges_it(done):
     assert "* fixed basis" in text
     assert "newton 1e-6" in text
     json.loads(rows.to_json(orient="records"))
+
+
+@pytest.mark.parametrize(("scatter", "verdict"), [(0.01, "met"), (0.3, "not_comparable")])
+def test_a_speed_up_is_judged_only_where_the_rounds_agree(done, scatter, verdict):
+    _, _, dataset = done
+    dataset = dataset.assign(
+        seconds_lower=(1.0 - 0.5 * scatter) * dataset["seconds"],
+        seconds_upper=(1.0 + 0.5 * scatter) * dataset["seconds"],
+    )
+    targets = [SpeedTarget(against="within bounds", ratio=1e-9)]
+    protocol = protocol_of(dataset).model_copy(update={"targets": targets})
+    rows = method_rows(dataset, protocol)
+    row = target_rows(dataset, protocol, rows)[-1]
+    assert (row["item"], row["verdict"]) == ("speed-up, within bounds", verdict)
+    assert ("30 %" in row["reason"]) == (verdict == "not_comparable")
 
 
 def test_a_failed_run_is_a_row_with_its_reason(done):

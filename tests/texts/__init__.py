@@ -1,0 +1,1 @@
+"""README and handbook agree with what is there."""

@@ -65,6 +65,7 @@ def page(tmp_path, monkeypatch):
     texts = [
         "pitch {[s: rms_error; pod; rank=3] | .1e} rad at r = 3",
         "over {count([s: status] == 'ok') | d} ways",
+        "{[s: rms_error; pod; rank=3] | .1e} rad at r = 3 over",
     ]
     part = Fragments(file="page.md", texts=texts)
     declared = Manifest(sources={"s": "study"}, varying=[], fragments=[part], verbatim=[])
@@ -127,6 +128,11 @@ def test_a_wrong_query_is_named(page, query, word):
     data = {"s": facts.load()}
     with pytest.raises(VehiclemorError, match=word):
         facts.evaluate(f"[s: {query}]", data)
+
+
+def test_a_missing_benchmark_is_one_line(tmp_path):
+    with pytest.raises(VehiclemorError, match="tox -e bench"):
+        facts.load("benchmark", tmp_path, 1)
 
 
 def test_numbers_are_printed_as_the_texts_have_them():

@@ -8,8 +8,11 @@ from configparser import ConfigParser
 import pytest
 import schemas
 
+import vehiclemor
 from tests.texts.markdown import NAMES, ROOT, TEXTS, blocks, console_commands, inline_commands
 from vehiclemor.cli.app import app, main
+from vehiclemor.report.citation import citations
+from vehiclemor.report.published import load_published
 from vehiclemor.study.plans.study_file import study_path
 
 README = ROOT / "README.md"
@@ -83,7 +86,9 @@ def test_environments_of_tox_exist(path):
 @PAGES
 def test_commands_can_be_parsed(path):
     for words in [*console_commands(path), *inline_commands(path)]:
-        if words[0] == "vehiclemor" and len(words) > 1:
+        if words[0] == "vehiclemor" and len(words) == 2:
+            assert words[1] in app, words
+        elif words[0] == "vehiclemor":
             app.parse_args(words[1:], exit_on_error=False, print_error=False)
             if words[1] == "run" and not words[2].startswith("my_"):
                 study_path(words[2])
@@ -130,6 +135,17 @@ def test_toml_blocks_are_toml(path):
     for block in blocks(path):
         if block.language == "toml":
             tomllib.loads(block.content)
+
+
+def test_citation_names_this_version_and_the_published_paper():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    paper = load_published().paper
+    assert f"\nversion: {vehiclemor.__version__}\n" in citation
+    assert f"\n## {vehiclemor.__version__}\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    for value in (f'"{paper.title}"', f'"{paper.journal}"', paper.doi, f"year: {paper.year}"):
+        assert value in citation
+    assert paper.doi in README.read_text(encoding="utf-8")
+    assert paper.doi in citations()
 
 
 def test_scripts_of_the_paper_explain_themselves():

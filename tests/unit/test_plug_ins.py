@@ -2,6 +2,7 @@
 
 from importlib.metadata import EntryPoint
 
+import numpy as np
 import pytest
 
 import vehiclemor as vm
@@ -13,12 +14,14 @@ from vehiclemor.errors import InputError
 def plug_in(tmp_path, monkeypatch):
     """Register a module text as a method, beside the built-ins."""
 
-    def register(name, text):
-        (tmp_path / f"{name}_module.py").write_text(text)
+    def register(name, text, attribute=""):
+        # A name of its own in each test: what was imported before stays imported.
+        module = f"{name}_{tmp_path.name}"
+        (tmp_path / f"{module}.py").write_text(text)
         monkeypatch.syspath_prepend(tmp_path)
-        entry = EntryPoint(name, f"{name}_module", registry.GROUPS["method"])
-        known = registry._entries("method")
-        monkeypatch.setattr(registry, "_entries", {"method": {**known, name: entry}}.__getitem__)
+        known = {kind: dict(registry._entries(kind)) for kind in registry.GROUPS}
+        known["method"][name] = EntryPoint(name, f"{module}{attribute}", registry.GROUPS["method"])
+        monkeypatch.setattr(registry, "_entries", known.__getitem__)
 
     return register
 
@@ -29,7 +32,9 @@ def plug_in(tmp_path, monkeypatch):
         ("def fit(:", "SyntaxError"),
         ("raise RuntimeError('at import')", "RuntimeError: at import"),
         ("import no_such_package", "no_such_package"),
-        ("summary = 'half'", "has no reference"),
+        ("summary = 'half'", "is of type module: it must be a Method"),
+        ("raise SystemExit(3)", "can't be imported: SystemExit: 3"),
+        ("raise ValueError('one\\ntwo')", "can't be imported: ValueError: one two"),
     ],
 )
 def test_a_broken_plug_in_is_named_and_harmless(plug_in, text, words):
@@ -47,3 +52,117 @@ def test_no_plug_in_takes_a_built_in_name(monkeypatch):
     monkeypatch.setattr(registry, "entry_points", lambda **_: [*real, thief])
     found = registry._entries.__wrapped__("method")
     assert found["pod"].value == "vehiclemor.reduction.methods.pod:METHOD"
+
+
+REPLAY = """
+from dataclasses import replace
+import numpy as np
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.methods import replay
+class Reduced:
+    offline, effective_rank = Offline(), 0
+    def __init__(self, inner): self.inner = inner
+    def simulate(self, *given): return self.inner.simulate(*given)
+    def best_approximation(self, states): return None
+def fit(*given): return Reduced(replay.METHOD.fit(*given))
+def altered(**values):
+    def simulate(self, *given):
+        run = self.inner.simulate(*given)
+        return replace(run, **{name: change(getattr(run, name)) for name, change in values.items()})
+    Reduced.simulate = simulate
+METHOD = replace(replay.METHOD, name="faulty", fit=fit)
+"""
+STUDY = """
+title = "mine"
+model = "double_wishbone"
+[[methods]]
+method = "faulty"
+[[methods]]
+method = "replay"
+"""
+
+
+@pytest.fixture
+def faulty(plug_in):
+    """A method whose text ends in a change."""
+    return lambda change: plug_in("faulty", f"{REPLAY}{change}\n", ":METHOD")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("METHOD = replace(METHOD, fit=lambda *_: 1 / 0)", "ZeroDivisionError"),
+        ("METHOD = replace(METHOD, fit=lambda *_: None)", "method 'faulty': fit gives None"),
+        ("METHOD = replace(METHOD, fit=lambda model: model)", "TypeError"),
+        ("METHOD = replace(METHOD, check=lambda *_: 1 / 0)", "ZeroDivisionError"),
+        ("Reduced.simulate = lambda *_: 1 / 0", "ZeroDivisionError"),
+        ("Reduced.simulate = lambda *_: None", "Reduced: simulate gives None, no Trajectory"),
+        ("altered(outputs=lambda o: o[1:])", "outputs (1000, 6) of float64, not (1001, 6)"),
+        ("altered(outputs=lambda o: o + 0j)", "outputs (1001, 6) of complex128"),
+        ("altered(outputs=lambda o: 'x')", "outputs ()"),
+        ("altered(coordinates=lambda q: np.hstack([q, q]))", "(1001, 16)"),
+        ("altered(time=lambda t: t[:5])", "5 times, not the 1001"),
+        ("altered(status=lambda s: 'fine')", "status 'fine'"),
+        ("altered(seconds=lambda s: 'x')", "seconds 'x'"),
+        ("altered(counts=lambda c: None)", "counts None"),
+        ("Reduced.best_approximation = lambda _, s: s[:3]", "(3, 8)"),
+        ("Reduced.effective_rank = 'x'", "effective_rank is 'x', no whole number"),
+        ("del Reduced.offline", "has no offline"),
+        ("Reduced.offline = None", "offline is None, no Offline"),
+    ],
+)
+def test_a_method_that_breaks_is_an_error_of_its_own_cells(faulty, tmp_path, change, words):
+    faulty(change)
+    data = vm.simulate("double_wishbone", "faulty")
+    message = data["message"].item()
+    assert data["status"].item() == "error"
+    assert words in message
+    assert "\n" not in message
+    assert np.isnan(data["rms_error"]).all()
+
+
+def test_a_study_with_a_broken_method_is_finished(faulty, tmp_path):
+    faulty("altered(outputs=lambda o: o[1:])")
+    path = tmp_path / "mine.toml"
+    path.write_text(STUDY)
+    data = vm.run_study(path, out=tmp_path / "results").squeeze()
+    assert data["status"].values.tolist() == ["error", "ok"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("refusal=lambda m: 1 / 0", "method 'faulty': refusal: ZeroDivisionError: division by"),
+        ("refusal=lambda m: 3", "method 'faulty': refusal gives 3, not text"),
+        ("refusal=lambda m: None", "method 'faulty': refusal gives None, not text"),
+    ],
+)
+def test_a_broken_refusal_refuses(faulty, tmp_path, change, words):
+    faulty(f"METHOD = replace(METHOD, {change})")
+    with pytest.raises(InputError, match=words):
+        vm.simulate("double_wishbone", "faulty")
+    path = tmp_path / "mine.toml"
+    path.write_text(STUDY)
+    data = vm.run_study(path, out=tmp_path / "results").squeeze()
+    assert data["status"].values.tolist() == ["rejected", "ok"]
+    assert words in data["message"].values[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("settings=None", "method 'faulty': settings: AttributeError"),
+        ("settings=['ae']", "method 'faulty': settings: AttributeError"),
+        ("settings={'ae': dict}", "method 'faulty': settings of ae are no class of Settings"),
+        ("presets=None", "method 'faulty': presets: AttributeError"),
+        ("presets={'ae': {'mine': {'rnk': 3}}}", "preset 'mine' sets 'rnk', which is no setting"),
+        ("summary=None", "method 'faulty': summary is not text"),
+        ("fit=3", "method 'faulty': fit is not a function"),
+    ],
+)
+def test_a_declaration_that_is_none_is_listed_with_what_is_wrong(faulty, change, words):
+    faulty(f"METHOD = replace(METHOD, {change})")
+    assert words in vm.methods()["faulty"]
+    with pytest.raises(InputError, match="faulty") as error:
+        vm.simulate("double_wishbone", "faulty")
+    assert "\n" not in str(error.value)

@@ -71,7 +71,7 @@ def test_plugins_register_as_built_ins_do() -> None:
 
 @pytest.mark.usefixtures("plugins")
 def test_plugin_that_is_no_method_is_one_line() -> None:
-    with pytest.raises(InputError, match=r"method 'empty' \(json\) has no summary"):
+    with pytest.raises(InputError, match=r"'empty' \(json\) is of type module: it must be a M"):
         component("method", "empty")
 
 

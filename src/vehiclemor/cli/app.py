@@ -3,30 +3,44 @@
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
+from vehiclemor.cli.conversion import strict
 from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
+from vehiclemor.cli.plot import plot
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
+from vehiclemor.resources import handbook_folder
 
 app = App(
     name="vehiclemor",
     version=__version__,
-    help="Benchmark suite for model order reduction of multibody vehicle models.",
+    help="Benchmark suite for model order reduction of multibody vehicle models.\n\n"
+    f"Handbook (notation, findings, how to add a model or a method): {handbook_folder()}",
+    default_parameter=Parameter(converter=strict),
     help_epilogue=MEANING,
     # It must reach `ended`, which tells how to resume.
     suppress_keyboard_interrupt=False,
 )
-app.command(list_components, name="list")
-for command in (show, simulate, run, compare, figures, cite):
-    app.command(command)
+COMMANDS = {
+    "list": list_components,
+    "show": show,
+    "simulate": simulate,
+    "plot": plot,
+    "run": run,
+    "compare": compare,
+    "figures": figures,
+    "cite": cite,
+}
+for name, command in COMMANDS.items():
+    app.command(command, name=name)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

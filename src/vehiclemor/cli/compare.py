@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import MISSED
+from vehiclemor.cli.progress import shown_progress
 
 
 def compare(
@@ -33,7 +34,8 @@ def compare(
     jobs
         Number of processes for missing studies.
     """
-    rows = api.compare(what, out, jobs)
+    with shown_progress():
+        rows = api.compare(what, out, jobs)
     if json_output:
         print(rows.to_json(orient="records", indent=2))
     else:

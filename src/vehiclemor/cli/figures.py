@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from vehiclemor import api
+from vehiclemor.cli.progress import shown_progress
 from vehiclemor.errors import InputError
 
 
@@ -30,6 +31,8 @@ def figures(
     chosen = [name.strip() for name in only.split(",") if name.strip()]
     if only and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    for path in api.figures(chosen, out, results, jobs):
+    with shown_progress():
+        written = api.figures(chosen, out, results, jobs)
+    for path in written:
         print(path)
     return 0

@@ -20,14 +20,19 @@ def key_values(option: str, given: Iterable[str]) -> dict[str, object]:
             raise InputError(f"{option} {text!r} is not key=value")
         if key in found:
             raise InputError(f"{option} {key} is given twice")
-        found[key] = _parsed(value)
+        found[key] = parsed(value)
     return found
 
 
-def _parsed(text: str) -> object:
-    for kind in (int, float, lambda listed: [float(number) for number in listed.split(",")]):
+def parsed(text: str) -> object:
+    """An integer, a number, a list of numbers separated by commas, or text."""
+    for kind in (int, float, _numbers):
         try:
             return kind(text)
         except ValueError:
             continue
     return text
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(number) for number in text.split(",")]

@@ -1,13 +1,13 @@
 """`vehiclemor list`: what is registered."""
 
 import json
-import shutil
 import textwrap
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from vehiclemor import api
+from vehiclemor.report.printing import width, wrapped
 
 # A longer name has a line of its own.
 LONGEST = 30
@@ -33,14 +33,13 @@ def list_components(
         print(json.dumps(found if what is None else found[what], indent=2))
         return 0
     # A table of rich would take a tenth of the time of this command.
-    width = shutil.get_terminal_size().columns
     for kind, entries in found.items():
         print(f"{kind}:")
         column = min(max(map(len, entries)), LONGEST) + 4
         for name, summary in entries.items():
-            lines = textwrap.wrap(summary, width - column) or [""]
+            lines = textwrap.wrap(summary, width() - column) or [""]
             beside = [] if len(name) > LONGEST else [f"  {name}".ljust(column) + lines.pop(0)]
             print("\n".join([*(beside or [f"  {name}"]), *(" " * column + li for li in lines)]))
         print()
-    print("vehiclemor show NAME says more of each; vehiclemor show study-schema: your own study.")
+    print(wrapped("vehiclemor show NAME says more, show study-schema how to write a study", 0, 2))
     return 0

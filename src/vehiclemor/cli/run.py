@@ -7,11 +7,14 @@ from pathlib import Path
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
-from vehiclemor.cli.progress import progress_of_cells
+from vehiclemor.cli.progress import shown_progress
+from vehiclemor.report.printing import wrapped
 
 
 def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     """Run a study; what an earlier run has finished is not computed again.
+
+    A cell that stands at several points of the grid is computed once.
 
     Parameters
     ----------
@@ -22,24 +25,25 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     out
         Results folder.
     """
+    from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
     began = time.perf_counter()
     cells: dict[str, int] = {}
-    with progress_of_cells() as progress:
+    with shown_progress() as shown:
 
         def counted(name: str, done: int, total: int) -> None:
             cells[name] = total
-            progress(name, done, total)
+            shown(name, done, total)
 
-        results = run_studies(study, out, jobs, counted)
+        with listening(counted):
+            results = run_studies(study, out, jobs)
     errors = 0
     for name, dataset in results.items():
         count = Counter(str(status) for status in dataset["status"].values.ravel())
-        shared = cells[name] != count.total()
-        places = f"{cells[name]} cells" + (f" fill {count.total()} places" if shared else "")
-        statuses = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
-        print(f"{name}: {places}: {statuses}; {out / 'studies' / (name + '.nc')}")
+        counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
+        places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
+        print(wrapped(f"{name}: {places}; {out / 'studies' / f'{name}.nc'}", 0, 2))
         errors += count["error"]
     print(f"{time.perf_counter() - began:.1f} s")
     if errors:

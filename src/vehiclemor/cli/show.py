@@ -1,8 +1,6 @@
 """`vehiclemor show`: everything that a name declares."""
 
 import json
-import shutil
-import textwrap
 from pathlib import Path
 from typing import Annotated
 
@@ -11,12 +9,13 @@ from cyclopts import Parameter
 from vehiclemor import api
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.cli.table import print_table
+from vehiclemor.report.printing import wrapped
 
 
 def show(
     name: str,
     *,
-    parameter: Annotated[tuple[str, ...], Parameter(negative="")] = (),
+    parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     parameters: Path | None = None,
     json_output: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> int:
@@ -55,9 +54,7 @@ def _print(key: str, content: object, indent: str = "") -> None:
             print_table(rows)
     elif content:
         text = ", ".join(map(str, content)) if isinstance(content, list) else content
-        width = shutil.get_terminal_size().columns
-        following = indent + "  "
-        print(textwrap.fill(f"{indent}{key}: {text}", width, subsequent_indent=following))
+        print(wrapped(f"{key}: {text}", len(indent), len(indent) + 2))
 
 
 def _by_source(key: str, rows: list[dict[str, object]]) -> dict[str, list[dict[str, object]]]:

@@ -1,28 +1,42 @@
 """`vehiclemor simulate`: one run of a model with a method, and its errors."""
 
+from __future__ import annotations
+
+import inspect
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
+from vehiclemor.cli.key_values import key_values
+from vehiclemor.cli.picture import picture_file
 from vehiclemor.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def simulate(
     model: str,
     *,
     method: str = "full_order",
-    settings: Annotated[tuple[str, ...], Parameter(name="--set", negative="")] = (),
+    settings: Annotated[
+        tuple[str, ...], Parameter(name="--set", negative="", show_default=False)
+    ] = (),
     maneuver: str | None = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     start: str | None = None,
     preset: str = "recommended",
     training: str = "matched",
+    parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     parameters: Path | None = None,
     out: Path | None = None,
+    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")] = None,
+    all_outputs: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Simulate a model with a method; errors are against the full-order solution.
 
@@ -46,27 +60,23 @@ def simulate(
         Preset of the method's settings.
     training
         matched, or nominal (trained on the unperturbed input).
+    parameter
+        name=value: a parameter of the model in SI units, a point as x,y,z; may be given several
+        times.  `vehiclemor show MODEL` has names, units and bounds.
     parameters
         Parameter file; the model's own public data by default.
     out
         netCDF file for the result.
+    plot
+        Draw the result into this file, or into MODEL-METHOD.png here.
+    all_outputs
+        Print errors of every output, not only of those that tables show.
     """
-    from vehiclemor.reduction.validation import parsed
-
-    chosen: dict[str, Any] = {}
-    for setting in settings:
-        key, separator, value = setting.partition("=")
-        if not separator or not key:
-            raise InputError(f"--set {setting!r} is not key=value")
-        if key in chosen:
-            raise InputError(f"--set {key} is given twice")
-        chosen[key] = parsed(value)
+    chosen = _settings(settings)
+    picture = None if plot is None else picture_file("--plot", plot, f"{model}-{method}")
     if out is not None:
         _check_writable(out)
-    ready = api.model(model, parameter_file=parameters)
-    reserved = {"frequency", "amplitude", "maneuver", "start", "preset", "training", "training_set"}
-    for key in reserved & set(chosen):
-        raise InputError(f"--set {key}: not a setting of a method; use --{key}")
+    ready = api.model(model, key_values("--parameter", parameter), parameters)
     dataset = api.simulate(
         ready,
         method,
@@ -78,24 +88,44 @@ def simulate(
         training=training,
         **chosen,
     )
+    from vehiclemor.report.simulation import simulation_text
+
+    shown = ready.outputs if all_outputs else ready.definition.shown.outputs
+    print(simulation_text(dataset, shown, ready.counts))
+    _keep(dataset, out, picture)
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _settings(given: Sequence[str]) -> dict[str, Any]:
+    settings = key_values("--set", given)
+    for key in inspect.signature(api.simulate).parameters.keys() & settings.keys():
+        raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
+    return settings
+
+
+def _keep(dataset: xr.Dataset, out: Path | None, picture: Path | None) -> None:
     if out is not None:
         from vehiclemor.study.store import write_dataset
 
         write_dataset(dataset, out)
-    from vehiclemor.report.simulation import simulation_text
-
-    print(simulation_text(dataset, ready.counts))
-    if out is not None:
         print(f"written: {out}")
-    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+    if picture is not None:
+        api.plot(dataset, path=picture)
+        print(f"written: {picture}")
+    if out is None and picture is None:
+        print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
 
 
 def _check_writable(out: Path) -> None:
     from vehiclemor.study.store import read_dataset
 
-    if out.is_dir():
-        raise InputError(f"--out {out}: is a folder, not a file")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: the folder {out.parent} does not exist")
-    if out.exists():
+    try:
+        if out.is_dir():
+            raise InputError(f"--out {out}: is a folder, not a file")
+        if not out.parent.is_dir():
+            raise InputError(f"--out {out}: the folder {out.parent} does not exist")
+        exists = out.exists()
+    except OSError as error:
+        raise InputError(f"--out {out}: can't be written ({error.strerror})") from None
+    if exists:
         read_dataset(out, "source", "vehiclemor")

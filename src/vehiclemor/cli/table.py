@@ -1,6 +1,8 @@
-"""Tables on the terminal: as wide as that is, 80 columns where there is none."""
+"""Tables of text on the terminal: every column but the first is wrapped where needed."""
 
 from collections.abc import Mapping, Sequence
+
+from vehiclemor.report.printing import width
 
 
 def print_table(rows: Sequence[Mapping[str, object]]) -> None:
@@ -23,16 +25,15 @@ def print_table(rows: Sequence[Mapping[str, object]]) -> None:
         )
     for row in rows:
         table.add_row(*(_text(row[heading]) for heading in headings))
-    console = Console(highlight=False, markup=False)
+    console = Console(width=width(), highlight=False, markup=False)
     with console.capture() as captured:
         console.print(table)
     print("\n".join(line.rstrip() for line in captured.get().splitlines()))
 
 
 def _text(value: object) -> str:
-    """A number with six digits; nothing for what is missing."""
     if isinstance(value, list):
-        return ", ".join(map(_text, value))
+        return ", ".join(_text(part) for part in value)
     if isinstance(value, float):
         return f"{value:.6g}"
     return "" if value is None else str(value)

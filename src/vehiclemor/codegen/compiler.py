@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from types import FunctionType, ModuleType
 from typing import Any, get_args
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
+from numba.core.codegen import AOTCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import cpu_target
+from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.np.arrayobj import populate_array
 
 from vehiclemor.codegen import loop_intrinsics
@@ -21,6 +23,7 @@ from vehiclemor.codegen.loop_types import declared_arguments
 
 WORD = ir.IntType(64)
 OPTIONS = {
+    "nopython": True,
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract"},
@@ -31,18 +34,58 @@ OPTIONS = {
 INTRINSICS = {name: getattr(loop_intrinsics, name) for name in ("vector", "matrix", "call_kernel")}
 
 
+class _Part(AOTCodeLibrary):
+    """Optimised code that is only linked into other code: it gets no machine code of its own."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No address: nothing is called from here."""
+        del name
+        self._ensure_finalized()
+        return 0
+
+
+class _Codegen(JITCPUCodegen):
+    """Code for this processor, as numba makes it, but not loaded."""
+
+    _library_class = _Part
+
+    def _add_module(self, module: Any) -> None:
+        pass
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Nothing: code without Python objects has no environment."""
+
+
+class _Target(CPUTarget):
+    @property
+    def typing_context(self) -> Any:
+        return cpu_target.typing_context
+
+    @property
+    def target_context(self) -> Any:
+        return _context()
+
+
+@cache
+def _context() -> Any:
+    context: Any = cpu_target.target_context
+    return context.subtarget(_internal_codegen=_Codegen("loops"))
+
+
+class _Dispatcher(CPUDispatcher):
+    targetdescr = _Target("cpu")
+
+
 @global_compiler_lock
 def compiled_module(module: ir.Module, libraries: Sequence[Any] = ()) -> bytes:
     """Object code of an LLVM module; functions of the libraries are linked into it."""
-    context: Any = cpu_target.target_context
+    context = _context()
     library = context.codegen().create_library(module.name)
-    library.enable_object_caching()
     module.triple = context.codegen().magic_tuple()[0]
     library.add_ir_module(module)
     for other in libraries:
         library.add_linking_library(other)
-    library.finalize()
-    return library.serialize_using_object_code()[2][0]
+    return library.emit_native_object()
 
 
 def compiled_loops(
@@ -84,7 +127,8 @@ def linked(modules: Sequence[ModuleType], given: Mapping[str, Any]) -> dict[str,
             if inspect.isfunction(value) and value.__module__ == module.__name__:
                 copied = FunctionType(value.__code__, namespace, name)
                 copied.__annotations__ = value.__annotations__
-                functions[name] = njit(**OPTIONS, forceinline=name in inlined)(copied)
+                options = OPTIONS | {"forceinline": name in inlined}
+                functions[name] = _Dispatcher(copied, targetoptions=options)
     for namespace in namespaces:
         namespace.update(functions | INTRINSICS | dict(given))
     return functions
@@ -102,7 +146,7 @@ def _numba_type(declared: Any) -> Any:
 
 def _export(module: ir.Module, name: str, described: Any) -> None:
     """A C function that takes the arguments of a compiled one from an array of words."""
-    context: Any = cpu_target.target_context
+    context = _context()
     kind = context.call_conv.get_function_type(described.restype, described.argtypes)
     inner = ir.Function(module, kind, described.llvm_func_name)
     outer = ir.Function(module, ir.FunctionType(WORD, [WORD.as_pointer()]), name)

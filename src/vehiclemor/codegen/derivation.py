@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
 from vehiclemor.codegen.object_cache import cache_folder, fetched
 from vehiclemor.codegen.sources import source_digest
+from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -26,7 +27,7 @@ LAYERS = ("models", "symbolic", "codegen")
 
 
 @dataclass(frozen=True)
-class Derivation:
+class Derivation(ShortRepr):
     """What is left of a model's program: the sources of its kernels, and what describes them.
 
     Attributes

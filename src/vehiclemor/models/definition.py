@@ -14,6 +14,7 @@ from vehiclemor.errors import InputError, did_you_mean
 from vehiclemor.models.quantities import Quantity
 from vehiclemor.models.report import ModelReport, completed
 from vehiclemor.parameters import Declared
+from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -43,7 +44,7 @@ def _unset(values: Values) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ModelDefinition:
+class ModelDefinition(ShortRepr):
     """Declaration of a model; its entry point names an instance.
 
     It holds no symbols: `derive` imports what it needs when it is called, so that a model that was
@@ -76,6 +77,8 @@ class ModelDefinition:
         Parameters -> coordinates (n,) at which all inputs are zero (kind `ae`).
     travel_limit
         Wheel travel in m up to which the limits of reach are looked for (kind `ae`).
+    stops
+        Coordinate -> largest magnitude in its unit that the mechanism may reach (kind `ae`).
     starts
         Parameters and what was solved -> initial states (2 n,) by name, the default first (`ode`
         and `dae`).
@@ -93,7 +96,8 @@ class ModelDefinition:
     error_scale
         State -> magnitude in its unit below which its errors count absolutely, 1 by default.
     validity
-        Output -> (smallest, largest) value in its unit at which the model means anything.
+        Output or input -> (smallest, largest) value in its unit at which the model means anything.
+        A run that leaves that of an output has diverged, an input beyond its own is refused.
     loads
         Outputs that are zero where a wheel has left the road.
     report
@@ -118,6 +122,8 @@ class ModelDefinition:
     rates).
     """
 
+    repr_fields = ("name", "kind", "summary")
+
     name: str
     kind: str
     summary: str
@@ -135,6 +141,7 @@ class ModelDefinition:
     check: Callable[[Values], None] = _anything
     design_coordinates: Callable[[Values], np.ndarray] = _unset
     travel_limit: float = 0.5
+    stops: Mapping[str, float] = field(default_factory=dict)
     starts: Callable[[Values], dict[str, np.ndarray]] = _unset
     solved: tuple[str, ...] = ()
     solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = _nothing
@@ -159,10 +166,24 @@ class ModelDefinition:
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself, so that a plug-in's author reads one clear line."""
+        if not isinstance(self.name, str) or not isinstance(self.summary, str):
+            raise InputError("name and summary of a model must be text")
         if self.kind not in KINDS:
             raise InputError(
                 f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"
             )
+        for kind in ("coordinates", "speeds", "inputs", "outputs"):
+            quantities = getattr(self, kind)
+            if not all(isinstance(quantity, Quantity) for quantity in quantities):
+                raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
+            names = [quantity.name for quantity in quantities]
+            if len(set(names)) != len(names) or not (names or kind == "speeds"):
+                raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
+        for name, declared in self.parameters.items():
+            if not isinstance(declared, Declared):
+                raise InputError(
+                    f"model {self.name!r}: parameter {name!r} is not declared by a unit"
+                )
         needed = "design_coordinates" if self.kind == "ae" else "starts"
         if getattr(self, needed) is _unset:
             raise InputError(f"model {self.name!r} of kind {self.kind} declares no {needed}")
@@ -176,11 +197,12 @@ class ModelDefinition:
             raise InputError(f"model {self.name!r} has heading_pairs, but no heading in planar")
         outputs = {q.name for q in self.outputs}
         report = self.report
+        self._known("stops", self.stops, (q.name for q in self.coordinates))
         self._known("cyclic", self.cyclic, self.states)
         self._known("planar", self.planar, self.states)
         self._known("heading_pairs", (n for pair in self.heading_pairs for n in pair), self.states)
         self._known("error_scale", self.error_scale, self.states)
-        self._known("validity", self.validity, outputs)
+        self._known("validity", self.validity, outputs | {q.name for q in self.inputs})
         self._known("loads", self.loads, outputs)
         shown = (*report.outputs, *report.printed_outputs, *report.settings_outputs)
         self._known("report", (*shown, *report.bounds), outputs)

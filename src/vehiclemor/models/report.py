@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 
+from vehiclemor.short_repr import ShortRepr
+
 Value = float | int | str | bool
 
 
@@ -36,7 +38,7 @@ class TimingCase:
 
 
 @dataclass(frozen=True)
-class ModelReport:
+class ModelReport(ShortRepr):
     """What tables and figures show of a model; what is empty follows from its kind.
 
     Attributes

@@ -10,9 +10,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vehiclemor.arguments import quoted
+from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -75,7 +78,7 @@ def fits_all(model: Model, settings: Any) -> None:
 
 
 @dataclass(frozen=True)
-class Method:
+class Method(ShortRepr):
     """A reduction method.
 
     Attributes
@@ -99,6 +102,8 @@ class Method:
         `recommended` is the defaults where it isn't named.
     """
 
+    repr_fields = ("name", "summary", "reference")
+
     name: str
     summary: str
     settings: Mapping[str, type[Settings]]
@@ -108,12 +113,41 @@ class Method:
     check: Callable[[Any, Any], None] = fits_all
     presets: Mapping[str, Presets] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Refuse what is no method, so that its author reads one clear line."""
+        for name in ("name", "summary", "reference"):
+            if not isinstance(getattr(self, name), str):
+                raise InputError(f"method {quoted(self.name)}: {name} is not text")
+        for name in ("fit", "refusal", "check"):
+            if not callable(getattr(self, name)):
+                raise InputError(f"method {self.name!r}: {name} is not a function")
+        with blamed(f"method {self.name!r}: settings"):
+            wrong = [kind for kind, s in self.settings.items() if not issubclass(s, Settings)]
+        if wrong:
+            raise InputError(
+                f"method {self.name!r}: settings of {wrong[0]} are no class of Settings"
+            )
+        with blamed(f"method {self.name!r}: presets"):
+            for kind, presets in self.presets.items():
+                for preset, name in ((p, n) for p, values in presets.items() for n in values):
+                    if name not in self.names_of(kind):
+                        raise InputError(
+                            f"method {self.name!r}: preset {preset!r} sets {name!r}, "
+                            f"which is no setting of kind {kind}"
+                        )
+
     def accepts(self, model: Model) -> tuple[bool, str]:
-        """Whether the method can reduce a model, and why not."""
+        """Whether the method can reduce a model, and why not; a broken refusal refuses."""
         if model.kind not in self.settings:
             kinds = " or ".join(self.settings)
             return False, f"{self.name} reduces kind {kinds}; {model.name} is of kind {model.kind}"
-        reason = self.refusal(model)
+        try:
+            with blamed(f"method {self.name!r}: refusal"):
+                reason = self.refusal(model)
+        except InputError as error:
+            reason = str(error)
+        if not isinstance(reason, str):
+            reason = f"method {self.name!r}: refusal gives {quoted(reason)}, not text"
         return not reason, reason
 
     def presets_of(self, kind: str) -> Presets:

@@ -8,6 +8,7 @@ import numpy as np
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
@@ -24,7 +25,7 @@ def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedSystem:
+class ReducedSystem(ShortRepr):
     """Equations in reduced states, with the ways there and back.
 
     Attributes
@@ -61,7 +62,7 @@ class ReducedSystem:
 
     def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
         """Path of the reduced states."""
-        check_inputs(maneuver, self.model.name, self.model.inputs)
+        check_inputs(maneuver, self.model.definition)
         state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
         how = Solver(self.solver, self.tolerance, times)
         return self.system.run(maneuver, state, self.spaces, how)

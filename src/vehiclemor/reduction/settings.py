@@ -11,6 +11,8 @@ from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
 
 Value = int | float | str
 LARGEST_NUMBER = 1e300
+# Beyond a tenth nothing is solved any more.
+LARGEST_TOLERANCE = 0.1
 
 
 class Settings(BaseModel):
@@ -65,9 +67,18 @@ ProjectedSolver = Annotated[
     OneOf(("dopri5", "rodas4")),
     Field(description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4"),
 ]
+# Of an iteration.
+StepTolerance = Annotated[
+    float,
+    Field(gt=0.0, le=LARGEST_TOLERANCE, description="largest step of the last iteration"),
+]
 Tolerance = Annotated[
     float,
-    Field(ge=1e-13, description="largest local error of a state relative to its typical size"),
+    Field(
+        ge=1e-13,
+        le=LARGEST_TOLERANCE,
+        description="largest local error of a state relative to its typical size",
+    ),
 ]
 
 

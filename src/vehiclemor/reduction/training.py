@@ -8,6 +8,7 @@ import numpy as np
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.registry import unknown
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -19,7 +20,7 @@ POLICIES = {
 
 
 @dataclass(frozen=True)
-class TrainingRun:
+class TrainingRun(ShortRepr):
     """One maneuver of the full-order model, solved wherever a method asks."""
 
     model: Model

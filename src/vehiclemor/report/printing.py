@@ -11,6 +11,8 @@ from typing import NamedTuple
 WIDTH, WIDEST = 80, 120
 # The first column, which may be wrapped, is never narrower.
 NARROWEST = 12
+# The longest word in a heading of a table without room.
+SHORT_WORD = 7
 # Indents of a table and of the notes in it.
 TABLE, NOTE = 2, 6
 
@@ -72,6 +74,10 @@ def table_text(headings: Sequence[str], rows: Iterable[Line], left: Sequence[int
 
     rows = list(rows)
     widths = _widths(headings, rows)
+    words = [word for row in rows for cell in row.cells[:1] for word in cell.split()]
+    if widths[0] < max(map(len, words), default=0):
+        headings = [headings[0], *map(_abbreviated, headings[1:])]
+        widths = _widths(headings, rows)
 
     def started(header: bool) -> Table:
         table = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0))
@@ -98,6 +104,11 @@ def table_text(headings: Sequence[str], rows: Iterable[Line], left: Sequence[int
     console = Console(file=target, width=width(), color_system=None, highlight=False)
     console.print(Padding(Group(*parts), (0, 0, 0, TABLE)))
     return "\n".join(line.rstrip() for line in target.getvalue().splitlines())
+
+
+def _abbreviated(heading: str) -> str:
+    """A heading whose long words are cut, such as `displa. max`."""
+    return " ".join(f"{w[:6]}." if len(w) > SHORT_WORD else w for w in heading.split())
 
 
 def _widths(headings: Sequence[str], rows: Sequence[Line]) -> list[int]:
@@ -146,6 +157,8 @@ def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
             width(),
             initial_indent=" " * first,
             subsequent_indent=" " * rest,
+            # A path stays whole.
+            break_long_words=False,
             break_on_hyphens=False,
         )
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from vehiclemor.report.printing import Line, power, table_text, terms, wrapped
@@ -25,17 +25,19 @@ LEGEND = {
 }
 
 
-def simulation_text(dataset: xr.Dataset, counts: Iterable[str]) -> str:
-    """Status, a table of errors, solver counts and seconds of a simulation."""
+def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[str]) -> str:
+    """Status, a table of the errors of some outputs, solver counts and seconds of a simulation."""
     title = f"{dataset.attrs['title']}: {dataset['status'].item()} {dataset['message'].item()}"
     parts = [wrapped(title), wrapped(str(dataset["remark"].item()))]
     lines = []
-    for output in dataset["output"].values:
+    for output in shown:
         row = dataset.sel(output=output)
         numbers = [power(float(row[name])) for name in COLUMNS]
         lines.append(Line([str(output), *numbers, str(row["output_unit"].item())]))
     parts.append(table_text(["output", *COLUMNS.values(), "unit"], lines, (0, len(COLUMNS) + 1)))
     parts.append(terms(LEGEND))
+    if further := dataset.sizes["output"] - len(shown):
+        parts.append(f"{further} more outputs: --all-outputs")
     parts.append(wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)))
     seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
     parts.append(f"seconds in the compiled loop {seconds:.3e} ({clock})")

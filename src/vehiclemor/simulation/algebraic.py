@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,20 +14,24 @@ from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import DESIGN_START
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
-from vehiclemor.simulation.checks import check_inputs, check_positive, output_times
+from vehiclemor.simulation.checks import (
+    check_inputs,
+    check_positive,
+    checked_array,
+    checked_inputs,
+    output_times,
+)
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
-from vehiclemor.simulation.travel_limits import reachable_range
 
-# Input increment (m) above which a step of the input is cut into substeps.  Beside a fold, Newton's
-# method jumps to the other branch from farther away than this.
+# Input increment (m) above which a step of the input is cut into substeps.
 LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_dense", "chord")
-# Rack displacements at which the limits of travel are found; between them the tighter ones count.
-RACKS_OF_REACH = 9
+# Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
+SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
 KINEMATIC_LOOPS = ("simulation.newton_loops",)
 INLINED_KERNELS = ("residual", "residual_jacobian", "newton_step", "tangent_parts", "tangent")
@@ -34,6 +39,7 @@ REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",
     newton_loops.SINGULAR: "the matrix of a linear system is singular",
+    newton_loops.OFF_BRANCH: "Newton's method does not contract, however short the step",
 }
 
 
@@ -45,6 +51,20 @@ class AlgebraicModel(Model):
     def design(self) -> np.ndarray:
         """Coordinates (n,) at the design position, where all inputs are zero."""
         return self.initial[DESIGN_START]
+
+    def start(self, name: Start | None = None) -> np.ndarray:
+        """Coordinates (n,) at the design position, whose name is the only start.
+
+        Raises
+        ------
+        InputError
+            If it is another name, or coordinates: these follow from the inputs.
+        """
+        if not isinstance(name, str | None):
+            raise InputError(
+                f"{self.name} starts from {DESIGN_START!r} alone: its inputs say where it is"
+            )
+        return super().start(name)
 
     def residual(self, q: Any, u: Any) -> np.ndarray:
         """Residual Phi(q; u), shape (n,)."""
@@ -60,7 +80,7 @@ class AlgebraicModel(Model):
 
     def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Residuals (samples, n) along a path of coordinates and inputs."""
-        return self.along("residual", coordinates, inputs)
+        return self.along("residual", coordinates, inputs, finite=True)
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
@@ -79,11 +99,48 @@ class AlgebraicModel(Model):
         return self.solve_path(np.zeros(1), inputs).coordinates[0]
 
     def reach(self, rack: float = 0.0) -> tuple[float, float]:
-        """Lowest and highest reachable wheel travel (m) at a rack displacement (m)."""
-        known: dict[float, tuple[float, float]] = self.__dict__.setdefault("_reach", {})
-        if rack not in known:
-            known[rack] = reachable_range(self, rack, self.definition.travel_limit)
-        return known[rack]
+        """Lowest and highest reachable wheel travel (m) at a rack displacement (m).
+
+        It is what can be reached by moving the rack at the design height, then the wheel: up to the
+        first fold, where the Jacobian is singular, or to the first of the model's `stops`, to
+        1e-6 m on the side that can be reached.  The folds alone would let the reach jump: those of
+        the double wishbone's lower limit end in a cusp at a rack of 0.28 mm, beyond which the wheel
+        goes 39 mm further down while its steering angle runs from 1 to 3 rad.
+
+        Raises
+        ------
+        InputError
+            If the displacement is not a finite number.
+        UnreachableError
+            If not even the design height can be reached at this displacement.
+        """
+        (rack,) = checked_array(rack, 1, "rack displacement", self.name)
+        low, high = (self._limit(rack, end) for end in (-1.0, 1.0))
+        return low, high
+
+    def _limit(self, rack: float, direction: float) -> float:
+        """How far (m) the height gets downwards (-1) or upwards (1) at a rack displacement (m)."""
+        target, reached = np.array([direction * self.definition.travel_limit, rack]), np.empty(2)
+        iteration = self._iteration(NEWTON_TOLERANCE, SHORTEST_SEARCH_STEP)
+        loop = self.loop("travel_limit")
+        if loop(self._mechanism, target, iteration, reached, self._buffer()):
+            raise UnreachableError(
+                f"{self.name}: rack displacement {rack:g} m is out of reach at the design height; "
+                f"it goes to {reached[1]:.4f} m"
+            )
+        return float(reached[0])
+
+    @cached_property
+    def _mechanism(self) -> newton_loops.Mechanism:
+        stops = self.definition.stops
+        largest = np.array([stops.get(name, np.inf) for name in self.coordinates])
+        jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
+        orientation = int(np.linalg.slogdet(jacobian).sign)
+        return newton_loops.Mechanism(self.design, largest, self.constants, orientation)
+
+    def _buffer(self) -> np.ndarray:
+        n = len(self.coordinates)
+        return np.empty(4 * n + 3 * len(self.inputs) + n * (2 * n + 1))
 
     def simulate(
         self,
@@ -100,13 +157,14 @@ class AlgebraicModel(Model):
         maneuver
             Its inputs are the model's.
         start
-            One of `starts`.
+            One of `starts`; a mechanism's coordinates follow from its inputs, not from a state.
         times
             Increasing times (samples,) in s.
         solver
             `newton`, the default: fresh Jacobians, generated elimination, started at the previous
             sample.  `newton_dense`: the same with dense elimination and partial pivoting.
-            `chord`: constant inverse of the design position, started at a quadratic extrapolation.
+            `chord`: constant inverse of the design position, started at a quadratic extrapolation;
+            where it does not contract, a fresh inverse, then Newton's method.
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default.
 
@@ -117,15 +175,25 @@ class AlgebraicModel(Model):
         ConvergenceError
             If an iteration fails; time and reachable range are named.
         """
-        check_inputs(maneuver, self.name, self.inputs)
         self.start(start)
         times = output_times(times, maneuver, repeats=True)
         return self.solve_path(
             times,
-            maneuver.at(times),
+            self.inputs_of(maneuver, times),
             "newton" if solver is None else solver,
             NEWTON_TOLERANCE if tolerance is None else tolerance,
         )
+
+    def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
+        """Inputs (samples, number of inputs) of a maneuver as the loops want them.
+
+        Raises
+        ------
+        InputError
+            If they are not the model's, or one isn't finite.
+        """
+        check_inputs(maneuver, self.definition)
+        return checked_inputs(maneuver.at(times), times, self.inputs)
 
     def solve_path(
         self,
@@ -136,38 +204,35 @@ class AlgebraicModel(Model):
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
         check_positive("tolerance", tolerance)
-        inputs = np.ascontiguousarray(inputs, dtype=float)
-        if inputs.shape != (len(times), len(self.inputs)) or not len(inputs):
-            raise InputError(
-                f"inputs have shape {inputs.shape}, not ({len(times)}, {len(self.inputs)}) with "
-                f"at least one sample"
-            )
-        self.check_reach(times, inputs)
-        n = len(self.coordinates)
-        solution = newton_loops.Solution(np.full((len(inputs), n), np.nan), new_counts())
-        iteration = newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT)
+        inputs = checked_inputs(inputs, times, self.inputs)
+        path = np.full((len(inputs), len(self.coordinates)), np.nan)
+        solution = newton_loops.Solution(path, new_counts())
+        further: tuple[str, ...] = ()
         how: Any
         if solver in ("newton", "newton_dense"):
-            loop, how = self.loop("newton_path"), int(solver == "newton_dense")
+            entry, how = "newton_path", int(solver == "newton_dense")
         elif solver != "chord":
             raise unknown("solver", solver, SOLVERS)
         else:
             inverse = np.linalg.inv(self.jacobian(self.design, np.zeros(len(self.inputs))))
-            loop, how = self.loop("chord_path"), inverse.T.copy()
-            solution.counts[newton_loops.JACOBIANS] = 1
-        buffer = np.empty(2 * n + 3 * len(self.inputs) + n * (n + 1))
-        arguments = (self.design, inputs, self.constants, how, iteration, solution, buffer)
+            entry, how, further = "chord_path", inverse.T.copy(), ("simulation.chord_loops",)
+        mechanism, iteration = self._mechanism, self._iteration(tolerance, SHORTEST_STEP)
+        arguments = (mechanism, inputs, how, iteration, solution, self._buffer())
+        loop = self.loop(entry, *further)
         status, seconds = timed(loop.prepared(*arguments), solution.counts)
-        path, counts = solution
-        if status != newton_loops.CONVERGED:
-            sample = int(counts[newton_loops.SAMPLE])
-            low, high = self.reach(float(inputs[sample, 1]))
-            raise ConvergenceError(
-                f"{self.name}: {REASONS[status]} at t = {times[sample]:.6g} s, height "
-                f"{inputs[sample, 0]:.4f} m ({solver}); the reachable range is "
-                f"{low:.4f} to {high:.4f} m"
-            )
-        return self.trajectory(times, inputs, path, counts, seconds)
+        stopped = int(solution.counts[newton_loops.SAMPLE]) if status else len(times)
+        beyond = np.flatnonzero((np.abs(path[:stopped]) > mechanism.stops).any(axis=1))
+        if not (status or len(beyond)):
+            return self.trajectory(times, inputs, path, solution.counts, seconds)
+        sample = int(beyond[0]) if len(beyond) else stopped
+        path[sample:] = np.nan
+        self._check_reach(times, inputs, sample)
+        failure = int(status), sample
+        failed = self.trajectory(times, inputs, path, solution.counts, seconds, failure)
+        raise ConvergenceError(f"{self.name}: {failed.message} ({solver})", failed)
+
+    def _iteration(self, tolerance: float, shortest: float) -> newton_loops.Iteration:
+        return newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, shortest)
 
     def trajectory(
         self,
@@ -188,7 +253,7 @@ class AlgebraicModel(Model):
             inputs,
             path,
             np.empty((len(path), 0)),
-            self.outputs_at(path, inputs),
+            self.along("outputs", path, inputs),
             {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=False)},
             seconds,
             status,
@@ -212,40 +277,15 @@ class AlgebraicModel(Model):
         modules = (*KINEMATIC_LOOPS, *further)
         return loops(modules, (name,), inlined, sizes)[name]
 
-    def check_reach(self, times: np.ndarray, inputs: np.ndarray) -> None:
-        """Raise if a height is out of reach or an input isn't finite.
-
-        Raises
-        ------
-        InputError
-            If an input isn't finite.
-        UnreachableError
-            If a height is out of reach.
-        """
-        bad = np.argwhere(~np.isfinite(inputs))
-        if len(bad):
-            sample, column = bad[0]
-            raise InputError(
-                f"input {self.inputs[column]} is not finite at t = {times[sample]:.6g} s"
-            )
-        heights, racks = inputs[:, 0], inputs[:, 1]
-        known = np.unique(racks)
-        if len(known) > RACKS_OF_REACH:
-            known = np.linspace(known[0], known[-1], RACKS_OF_REACH)
-        limits = np.array([self.reach(float(rack)) for rack in known])
-        # Between two racks the tighter limits count: as functions of the rack they can jump.
-        after = np.searchsorted(known, racks)
-        before = np.where(known[after] == racks, after, after - 1)
-        low = np.maximum(limits[after, 0], limits[before, 0])
-        high = np.minimum(limits[after, 1], limits[before, 1])
-        outside = np.flatnonzero((heights < low) | (heights > high))
-        if len(outside):
-            sample = outside[0]
+    def _check_reach(self, times: np.ndarray, inputs: np.ndarray, sample: int) -> None:
+        """Raise `UnreachableError` if the height of a sample is out of reach."""
+        (height, rack), heights = inputs[sample], inputs[:, 0]
+        low, high = self.reach(rack)
+        if not low <= height <= high:
             raise UnreachableError(
-                f"{self.name}: height {heights[sample]:.5g} m at t = {times[sample]:.6g} s is out "
-                f"of reach (from {heights.min():.4g} to {heights.max():.4g} m are asked for); the "
-                f"reachable range is {low[sample]:.4f} to {high[sample]:.4f} m "
-                f"(rack at {racks[sample]:g} m)"
+                f"{self.name}: height {height:.5g} m at t = {times[sample]:.6g} s is out of reach "
+                f"(from {heights.min():.4g} to {heights.max():.4g} m are asked for); the reachable "
+                f"range is {low:.4f} to {high:.4f} m (rack at {rack:g} m)"
             )
 
 

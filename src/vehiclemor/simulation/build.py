@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.arguments import real_array
 from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
-from vehiclemor.errors import GeometryError
+from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.models.definition import DESIGN_START, ModelDefinition, Values
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
+from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
@@ -73,8 +75,11 @@ def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> Algebra
     # Imported here: a model of one kind needs nothing of the other.
     from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
 
-    design = definition.design_coordinates(parameters.values())
+    with blamed(f"model {definition.name!r}: design_coordinates"):
+        design = real_array(definition.design_coordinates(parameters.values()))
     equations, digest = compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
+    check_equations(definition, equations)
+    _check_states(definition, {DESIGN_START: design})
     constants = hoisted_constants(equations, parameters, [])
     model = AlgebraicModel(
         definition, equations, parameters, digest, constants, {DESIGN_START: design}
@@ -100,13 +105,48 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
         key: parameters[key] if declared.size > 1 else float(parameters[key])
         for key, declared in definition.parameters.items()
     }
-    definition.check(values)
+    with blamed(f"model {definition.name!r}: check"):
+        definition.check(values)
     equations, digest = compiled(definition.name, definition.derive)
-    values |= solved_parameters(definition, values, parameters, equations)
-    solved = [float(values[key]) for key in definition.solved]
+    check_equations(definition, equations)
+    with blamed(f"model {definition.name!r}: solve_equilibrium"):
+        values |= solved_parameters(definition, values, parameters, equations)
+        solved = [float(values[key]) for key in definition.solved]
     constants = hoisted_constants(equations, parameters, solved)
-    initial = definition.starts(values)
+    with blamed(f"model {definition.name!r}: starts"):
+        initial = {name: real_array(x) for name, x in definition.starts(values).items()}
+    _check_states(definition, initial)
     return DynamicModel(definition, equations, parameters, digest, constants, initial)
+
+
+def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
+    """Raise `InputError` if functions that were derived are missing or of another shape."""
+    n, outputs = len(definition.coordinates), len(definition.outputs)
+    constraints = len(definition.constraints)
+    if definition.kind == "ae":
+        needed = {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
+        further: dict[str, tuple[int, ...]] = {"joints": (len(definition.joints), 3)}
+    else:
+        needed = {"derivative": (2 * n,)}
+        further = {"second_order": (n, n + 1), "speeds": (n,), "violations": (constraints, 2)}
+        further["descriptor"] = (n + constraints, n + 1)
+    needed["outputs"] = (outputs,)
+    for function, shape in (needed | further).items():
+        derived = equations.shapes.get(function)
+        if derived is None and function in needed:
+            raise InputError(f"model {definition.name!r}: its equations have no {function}")
+        if derived not in (None, shape):
+            raise InputError(
+                f"model {definition.name!r}: {function} has shape {derived}, not {shape}"
+            )
+
+
+def _check_states(definition: ModelDefinition, initial: Mapping[str, np.ndarray]) -> None:
+    """Raise `InputError` if a model starts nowhere, or from what is no state of it."""
+    if not initial:
+        raise InputError(f"model {definition.name!r} has no start")
+    for name, state in initial.items():
+        checked_array(state, len(definition.states), f"start {name!r}", definition.name)
 
 
 def compiled(
@@ -119,7 +159,8 @@ def compiled(
     loops
         Modules of the loops that run it.
     """
-    made = derivation(name, derive)
+    with blamed(f"model {name!r}: its equations can't be derived"):
+        made = derivation(name, derive)
     return made, kernel_hash(f"{made.source}\n{loops_digest(loops)}")
 
 

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.models.definition import ModelDefinition
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -20,7 +22,7 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
     try:
         array = np.atleast_1d(loop_array(value))
     except (TypeError, ValueError):
-        raise InputError(f"{name} is {value!r}, {model} needs {size} numbers") from None
+        raise InputError(f"{name} is {quoted(value)}, {model} needs {size} numbers") from None
     if array.shape != (size,):
         raise InputError(f"{name} has shape {array.shape}, {model} needs ({size},)")
     if not np.isfinite(array).all():
@@ -29,14 +31,100 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
     return array
 
 
-def check_inputs(maneuver: Maneuver, model: str, inputs: Sequence[str]) -> None:
-    """Raise `InputError` if a maneuver is none, or gives other inputs than a model has."""
+def checked_path(
+    value: Any, size: int, name: str, samples: int | None = None, finite: bool = True
+) -> np.ndarray:
+    """A path (samples, size) of floats, as compiled functions want it; finite unless told.
+
+    Raises
+    ------
+    InputError
+        If it has another shape, or holds what is no finite number.
+    """
+    try:
+        path = loop_array(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be arrays of numbers: {error}") from None
+    wanted = f"({'samples' if samples is None else samples}, {size})"
+    if path.ndim != 2 or path.shape[1] != size or samples not in (None, len(path)):
+        raise InputError(f"{name} have shape {path.shape}, not {wanted}")
+    if finite and not np.isfinite(path).all():
+        row, column = np.argwhere(~np.isfinite(path))[0]
+        raise InputError(f"{name}[{row}, {column}] is not finite")
+    return path
+
+
+def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Inputs (samples, inputs) at given times, as compiled functions want them.
+
+    Raises
+    ------
+    InputError
+        If there are none, they have another shape or one isn't finite; its time is named.
+    """
+    if not len(times):
+        raise InputError("inputs are needed at one time at least")
+    inputs = checked_path(value, len(names), "inputs", len(times), finite=False)
+    if not np.isfinite(inputs).all():
+        sample, column = np.argwhere(~np.isfinite(inputs))[0]
+        raise InputError(f"input {names[column]} is not finite at t = {times[sample]:.6g} s")
+    return inputs
+
+
+def check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
+    """Raise `InputError` if a maneuver is none, or gives other inputs than a model has.
+
+    Nor may an input leave the bounds in which the model declares that it means anything.
+    """
     if not isinstance(maneuver, Maneuver):
-        raise InputError(f"{maneuver!r} is not a maneuver: get one by its name from the registry")
-    if tuple(maneuver.inputs) != tuple(inputs):
+        wrong = quoted(maneuver)
+        raise InputError(f"{wrong} is not a maneuver: get one by its name from the registry")
+    names = tuple(quantity.name for quantity in definition.inputs)
+    if maneuver.inputs != names:
         raise InputError(
-            f"maneuver {maneuver.name!r} gives inputs {', '.join(maneuver.inputs)}, "
-            f"{model} needs {', '.join(inputs)}"
+            f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
+            f"{definition.name} needs {', '.join(names)}"
+        )
+    units = {quantity.name: quantity.unit for quantity in definition.inputs}
+    bounded = {name: b for name, b in definition.validity.items() if name in units}
+    if not bounded:
+        return
+    times = maneuver.times
+    values = maneuver.at(times)
+    for name, (low, high) in bounded.items():
+        column = values[:, names.index(name)]
+        outside = np.flatnonzero(np.isfinite(column) & ((column < low) | (column > high)))
+        if len(outside):
+            sample, unit = outside[0], units[name]
+            raise InputError(
+                f"{maneuver}: input {name} is {column[sample]:.4g} {unit} at t = "
+                f"{times[sample]:.6g} s; {definition.name} holds from {low:g} to {high:g} {unit}"
+            )
+
+
+def check_resolved(maneuver: Maneuver) -> None:
+    """Raise `InputError` if the output times are too far apart to show the inputs.
+
+    Between two output times without a corner an input stays within a quarter of its range of the
+    straight line, as a sine of three samples a period does; it may leave it once.
+    """
+    times, between = maneuver.times, 0.38
+    step = times[1]
+    values = maneuver.at(times)
+    inside = maneuver.at(times[:-1] + between * step)
+    # What is not finite is found, with its time, by whoever solves it.
+    if not (np.isfinite(values).all() and np.isfinite(inside).all()):
+        return
+    off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])
+    everywhere = np.concatenate([values, inside])
+    wrong = off > 0.25 * (everywhere.max(axis=0) - everywhere.min(axis=0))
+    corners = np.searchsorted(times, maneuver.break_points, side="right") - 1
+    wrong[corners[(corners >= 0) & (corners < len(wrong))]] = False
+    column = int(wrong.sum(axis=0).argmax())
+    if wrong[:, column].sum() > 1:
+        raise InputError(
+            f"{maneuver}: at a frequency factor of {maneuver.frequency_factor:g} input "
+            f"{maneuver.inputs[column]} changes faster than output times {step:g} s apart can show"
         )
 
 
@@ -47,7 +135,7 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     )
     if not (number and 0.0 < float(value) < np.inf and float(value) >= smallest):  # type: ignore[arg-type]
         bound = f"at least {smallest:g}" if smallest else "positive"
-        raise InputError(f"{name} is {value!r}; it must be a finite number, {bound}")
+        raise InputError(f"{name} is {quoted(value)}; it must be a finite number, {bound}")
 
 
 def cut_short(maneuver: Maneuver) -> str:
@@ -76,7 +164,7 @@ def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.nd
     try:
         times = loop_array(given)
     except (TypeError, ValueError):
-        raise InputError(f"output times are {given!r}, no list of times in s") from None
+        raise InputError(f"output times are {quoted(given)}, no list of times in s") from None
     if times.ndim != 1:
         raise InputError("output times must be a list of times in s")
     slack = 1e-9 * maneuver.duration
@@ -105,6 +193,9 @@ def left_validity(
     """
     first, message = len(times), ""
     for name, (low, high) in validity.items():
+        # An input: it is checked before the run.
+        if name not in names:
+            continue
         values = outputs[:, names.index(name)]
         outside = np.flatnonzero(~((values >= low) & (values <= high)))
         if len(outside) and outside[0] < first:
@@ -133,4 +224,4 @@ def lifted_wheels(
 
 def loop_array(values: Any) -> np.ndarray:
     """Floats in the one kind of array that the loops are compiled for."""
-    return np.require(values, float, ("C", "A", "W"))
+    return np.require(real_array(values), float, ("C", "A", "W"))

@@ -86,7 +86,7 @@ class DynamicModel(Model):
 
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
-        return self.along("derivative", states, inputs)
+        return self.along("derivative", states, inputs, finite=True)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
@@ -159,7 +159,7 @@ class DynamicModel(Model):
             longest_step,
         )
         if trajectory.status != "ok":
-            raise ConvergenceError(f"{self.name}: {trajectory.message}")
+            raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
         return trajectory
 
     def integrate(
@@ -181,7 +181,7 @@ class DynamicModel(Model):
         windows
             Formulation of the system and its subspaces by window.
         """
-        check_inputs(maneuver, self.name, self.inputs)
+        check_inputs(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step)
@@ -208,7 +208,7 @@ class DynamicModel(Model):
         failure: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        outputs = self.outputs_at(states, inputs)
+        outputs = self.along("outputs", states, inputs)
         message, sample = failure, len(times)
         if not failure:
             message, sample = left_validity(self.definition.validity, self.outputs, times, outputs)

@@ -15,6 +15,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.models.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.paths import along
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Start, Trajectory
@@ -29,7 +30,7 @@ NEEDED_FOR = {
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(ShortRepr):
     """A model with one parameter set, as studies, methods and reports see it.
 
     A state is the coordinates and, after them, the speeds; kinematic models have no speeds.
@@ -49,6 +50,8 @@ class Model:
     initial
         Start -> state (n,); the default first.
     """
+
+    repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
 
     definition: ModelDefinition
     equations: Derivation
@@ -127,7 +130,7 @@ class Model:
         """
         if not isinstance(name, str | None):
             return self._state(name, "start").copy()
-        name = name or self.starts[0]
+        name = self.starts[0] if name is None else name
         if name not in self.initial:
             raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")
         return self.initial[name].copy()
@@ -145,12 +148,20 @@ class Model:
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
-        return self.along("outputs", states, inputs)
+        return self.along("outputs", states, inputs, finite=True)
 
-    def along(self, function: str, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Results (samples, size) of a function of the equations along a path."""
+    def along(
+        self, function: str, states: np.ndarray, inputs: np.ndarray, finite: bool = False
+    ) -> np.ndarray:
+        """Results (samples, size) of a function of the equations along a path.
+
+        Parameters
+        ----------
+        finite
+            Whether to refuse what is no number, as a trajectory is after it has failed.
+        """
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
-        return along(self.kernels, function, self.constants, (states, inputs), sizes)
+        return along(self.kernels, function, self.constants, (states, inputs), sizes, finite)
 
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""

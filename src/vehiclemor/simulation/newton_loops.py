@@ -1,6 +1,12 @@
 """Full-order solution of Phi(q; u(t)) = 0 along time: compiled loops with the kernels inlined.
 
 Every entry returns why it has stopped, and writes the sample at which to `Solution.counts`.
+
+A solution is on the branch of the design position if it is joined to it by steps of the inputs in
+each of which Newton's method contracts: then it is the only one near, and the Jacobian is regular
+on the way (Newton-Kantorovich; P. Deuflhard, Newton Methods for Nonlinear Problems, 2011, sections
+2.1 and 5.1).  The first two corrections only estimate that.  Beside a fold they can be small by
+chance, so that the sign of the Jacobian's determinant is looked at too, but where they are tiny.
 """
 
 import math
@@ -8,9 +14,15 @@ from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, matrix, vector
 
-CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR = range(4)
+CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)
 # Places of the counts; behind them the sample at which a loop has stopped.
 ITERATIONS, RESIDUALS, JACOBIANS, LINEAR_SOLVES, SAMPLE = range(5)
+# Largest first correction (rad or m), and largest ratio of the second to it, on the branch.
+CORRECTION, CONTRACTION = 0.1, 1.0 / 16.0
+# A second correction (rad or m) below which the iteration can't have crossed a fold.
+CERTAIN = 1e-5
+# Substeps that an increment is cut into at most; beyond, any mechanism is torn apart.
+MOST_SUBSTEPS = 1e4
 # Sizes that the compiler knows: coordinates, inputs.
 N, INPUTS = 0, 0
 
@@ -26,11 +38,43 @@ class Iteration(NamedTuple):
         Most iterations for a sample.
     largest_increment
         Increment of an input above which its step is cut into substeps.
+    shortest_step
+        Step of an input at which the way to a position is given up.
     """
 
     tolerance: Float
     limit: Int
     largest_increment: Float
+    shortest_step: Float = 0.0
+
+
+class Mechanism(NamedTuple):
+    """What is solved.
+
+    Attributes
+    ----------
+    start
+        Coordinates (N,) at the design position, where the inputs are zero.
+    stops
+        Largest magnitude (N,) of each coordinate.
+    constants
+        Of the kernels.
+    orientation
+        Sign of the Jacobian's determinant at the design position: it changes at a fold.
+    """
+
+    start: Vector
+    stops: Vector
+    constants: Vector
+    orientation: Int
+
+
+class Work(NamedTuple):
+    """Scratch space: a step (N,), coordinates to return to (N,), a matrix (N, N + 1)."""
+
+    step: Vector
+    kept: Vector
+    full: Matrix
 
 
 class Solution(NamedTuple):
@@ -49,7 +93,16 @@ class Solution(NamedTuple):
 
 
 # Short functions: their arrays would cost as much to pass as they take.
-INLINED = ("all_below", "failure", "small_solve", "increments", "scratch")
+INLINED = (
+    "all_below",
+    "failure",
+    "small_solve",
+    "increments",
+    "scratch",
+    "newton",
+    "largest_of",
+    "stopped",
+)
 
 
 def residual(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
@@ -73,7 +126,7 @@ def increments(u, target, largest):
             distance = change
     if distance <= largest:
         return 1
-    return math.ceil(distance / largest - 1e-9)
+    return math.ceil(min(distance / largest, MOST_SUBSTEPS) - 1e-9)
 
 
 def all_below(step, size, tolerance):
@@ -84,6 +137,14 @@ def all_below(step, size, tolerance):
     return below
 
 
+def largest_of(step):
+    """Magnitude of the largest component (N,) of a step."""
+    largest = 0.0
+    for i in range(N):
+        largest = max(largest, abs(step[i]))
+    return largest
+
+
 def failure(q):
     """Status of an iteration that has used up its limit."""
     for i in range(N):
@@ -92,19 +153,35 @@ def failure(q):
     return TOO_MANY_ITERATIONS
 
 
+def stopped(counts, iterations, jacobians, status):
+    """The status of a loop that ends, its counts written down."""
+    counts[ITERATIONS], counts[RESIDUALS], counts[LINEAR_SOLVES] = (
+        iterations,
+        iterations,
+        iterations,
+    )
+    counts[JACOBIANS] = jacobians
+    return status
+
+
 def small_solve(a, r):
     """Solve the leading r x r block of a for column N by elimination with partial pivoting.
 
-    The solution replaces column N.  False if a pivot is zero or not finite.
+    The solution replaces column N.  Gives the sign of the determinant, zero if a pivot is zero or
+    not finite.
     """
+    sign = 1
     for k in range(r):
         pivot = k
         for i in range(k + 1, r):
             if abs(a[i, k]) > abs(a[pivot, k]):
                 pivot = i
         if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
-            return False
+            return 0
+        if a[pivot, k] < 0.0:
+            sign = -sign
         if pivot != k:
+            sign = -sign
             for j in range(k, r):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
             a[k, N], a[pivot, N] = a[pivot, N], a[k, N]
@@ -119,13 +196,104 @@ def small_solve(a, r):
         for j in range(k + 1, r):
             total -= a[k, j] * a[j, N]
         a[k, N] = total / a[k, k]
-    return True
+    return sign
+
+
+def newton(q, u, mechanism, dense, iteration, work):
+    """Newton's method from q, which it changes: its iterations, negative where it has failed."""
+    constants, step, full = mechanism.constants, work.step, work.full
+    first, second = 0.0, 0.0
+    for count in range(1, iteration.limit + 1):
+        if dense:
+            residual_jacobian(q, u, constants, full)
+            if not small_solve(full, N):
+                return -count
+            for i in range(N):
+                step[i] = full[i, N]
+        else:
+            newton_step(q, u, constants, step)
+        for i in range(N):
+            q[i] -= step[i]
+        if all_below(step, N, iteration.tolerance):
+            if second <= CERTAIN:
+                return count
+            residual_jacobian(q, u, constants, full)
+            same = small_solve(full, N) == mechanism.orientation
+            return count + 1 if same else -count - 1
+        if count == 1:
+            first = largest_of(step)
+            if not first <= CORRECTION:
+                return -count
+        elif count == 2:
+            second = largest_of(step)
+            if not second <= CONTRACTION * first:
+                return -count
+    return -iteration.limit
+
+
+def moved(q, u, place, target, mechanism, dense, iteration, work):
+    """Move one input of a solved position to a target in steps that stay on the branch.
+
+    Returns
+    -------
+    int
+        Iterations, negative where not even the shortest step goes further, since the branch or a
+        stop is near: q and u are then those of the last position.
+    """
+    length, iterations = iteration.largest_increment, 0
+    while u[place] != target:
+        before = u[place]
+        for i in range(N):
+            work.kept[i] = q[i]
+        u[place] = target
+        if abs(target - before) > length:
+            u[place] = before + math.copysign(length, target - before)
+        taken = newton(q, u, mechanism, dense, iteration, work)
+        iterations += abs(taken)
+        if taken > 0 and within(q, mechanism.stops):
+            length = min(2.0 * length, iteration.largest_increment)
+            continue
+        length = 0.5 * abs(u[place] - before)
+        u[place] = before
+        for i in range(N):
+            q[i] = work.kept[i]
+        if not length >= iteration.shortest_step:
+            return -iterations
+    return iterations
+
+
+def within(q, stops):
+    """Whether no coordinate is beyond its stop."""
+    inside = True
+    for i in range(N):
+        inside &= abs(q[i]) <= stops[i]
+    return inside
+
+
+def approach(q, u, target, mechanism, dense, iteration, work):
+    """From the design position to the inputs of a target, one after the other, the height last.
+
+    Returns
+    -------
+    int
+        Iterations, negative where the branch ends before.
+    """
+    for i in range(N):
+        q[i] = mechanism.start[i]
+    for i in range(INPUTS):
+        u[i] = 0.0
+    iterations = 0
+    for place in range(INPUTS - 1, -1, -1):
+        taken = moved(q, u, place, target[place], mechanism, dense, iteration, work)
+        iterations += abs(taken)
+        if taken < 0:
+            return -iterations
+    return iterations
 
 
 def newton_path(
-    q_start: Vector,
+    mechanism: Mechanism,
     inputs: Matrix,
-    constants: Vector,
     dense: Int,
     iteration: Iteration,
     solution: Solution,
@@ -136,12 +304,11 @@ def newton_path(
     The step comes from the generated straight-line elimination or, if `dense`, from elimination
     with partial pivoting, as a solver that knows nothing about the model would do it.
 
-    Inputs begin at zero.  An increment above the largest is cut into substeps, so that the
-    iteration can't jump to another branch of solutions.
+    Inputs begin at zero.  An increment above the largest is cut into substeps.  Where Newton's
+    method does not contract, the sample is approached from the design position instead.
     """
     path, counts = solution.path, solution.counts
-    q, step, u, previous, target = scratch(q_start, buffer)
-    full = matrix(buffer, 2 * N + 3 * INPUTS, N, N + 1)
+    q, u, previous, target, work = scratch(mechanism.start, buffer)
     iterations = 0
     for sample in range(inputs.shape[0]):
         counts[SAMPLE] = sample
@@ -151,97 +318,56 @@ def newton_path(
         for substep in range(1, substeps + 1):
             for i in range(INPUTS):
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
-            converged = False
-            for _ in range(iteration.limit):
-                if dense:
-                    residual_jacobian(q, u, constants, full)
-                    if not small_solve(full, N):
-                        return SINGULAR
-                    for i in range(N):
-                        step[i] = full[i, N]
-                else:
-                    newton_step(q, u, constants, step)
-                iterations += 1
-                for i in range(N):
-                    q[i] -= step[i]
-                if all_below(step, N, iteration.tolerance):
-                    converged = True
-                    break
-            if not converged:
-                return failure(q)
+            taken = newton(q, u, mechanism, dense, iteration, work)
+            iterations += abs(taken)
+            if taken < 0:
+                taken = approach(q, u, target, mechanism, dense, iteration, work)
+                iterations += abs(taken)
+                if taken < 0:
+                    return stopped(counts, iterations, iterations, OFF_BRANCH)
+                break
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):
             path[sample, i] = q[i]
-    for kind in range(4):
-        counts[kind] = iterations
-    return CONVERGED
+    return stopped(counts, iterations, iterations, CONVERGED)
 
 
-def scratch(q_start, buffer):
-    """Coordinates, step and inputs in the buffer: now, at the sample before and at the next."""
-    q, step = vector(buffer, 0, N), vector(buffer, N, N)
-    u, previous = vector(buffer, 2 * N, INPUTS), vector(buffer, 2 * N + INPUTS, INPUTS)
-    for i in range(N):
-        q[i] = q_start[i]
-    for i in range(INPUTS):
-        u[i], previous[i] = 0.0, 0.0
-    return q, step, u, previous, vector(buffer, 2 * N + 2 * INPUTS, INPUTS)
-
-
-def chord_path(
-    q_start: Vector,
-    inputs: Matrix,
-    constants: Vector,
-    inverse_t: Matrix,
+def travel_limit(
+    mechanism: Mechanism,
+    target: Vector,
     iteration: Iteration,
-    solution: Solution,
+    reached: Vector,
     buffer: Vector,
 ) -> Int:
-    """Chord method: one constant inverse Jacobian, started from a quadratic extrapolation in time.
+    """How far the branch goes to a target, one input after the other, the height last.
 
-    `inverse_t` is the transposed inverse Jacobian at the design position.  Only the residual is
-    evaluated.  The extrapolation assumes equidistant samples; where they are not, it is just a
-    worse start.  One of higher order would start nearer, but multiplies the errors of earlier
-    samples by more than one iteration takes away (15 times, cubic, against 7).
+    `reached` are the inputs (INPUTS,) at which it ends; the status is that of all inputs but the
+    height.
     """
-    path, counts = solution.path, solution.counts
-    q, step, u, previous, target = scratch(q_start, buffer)
-    phi = vector(buffer, 2 * N + 3 * INPUTS, N)
-    evaluations, smooth = 0, 0
-    for sample in range(inputs.shape[0]):
-        counts[SAMPLE] = sample
-        for i in range(INPUTS):
-            target[i] = inputs[sample, i]
-        substeps = increments(previous, target, iteration.largest_increment)
-        # An extrapolation over a jump of the input could end on another branch.
-        smooth = smooth + 1 if substeps == 1 else 0
-        if smooth > 3:
-            for i in range(N):
-                q[i] = 3.0 * (path[sample - 1, i] - path[sample - 2, i]) + path[sample - 3, i]
-        for substep in range(1, substeps + 1):
-            for i in range(INPUTS):
-                u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
-            converged = False
-            for _ in range(iteration.limit):
-                residual(q, u, constants, phi)
-                evaluations += 1
-                for i in range(N):
-                    step[i] = 0.0
-                for j in range(N):
-                    for i in range(N):
-                        step[i] += inverse_t[j, i] * phi[j]
-                for i in range(N):
-                    q[i] -= step[i]
-                if all_below(step, N, iteration.tolerance):
-                    converged = True
-                    break
-            if not converged:
-                return failure(q)
-        for i in range(INPUTS):
-            previous[i] = target[i]
-        for i in range(N):
-            path[sample, i] = q[i]
-    counts[ITERATIONS], counts[RESIDUALS] = evaluations, evaluations
-    counts[LINEAR_SOLVES] = evaluations
-    return CONVERGED
+    q, u, _, _, work = scratch(mechanism.start, buffer)
+    status = CONVERGED
+    for place in range(INPUTS - 1, -1, -1):
+        if moved(q, u, place, target[place], mechanism, 0, iteration, work) < 0 and place:
+            status = OFF_BRANCH
+            break
+    for i in range(INPUTS):
+        reached[i] = u[i]
+    return status
+
+
+def scratch(start, buffer):
+    """Coordinates and inputs of a loop: now, at the sample before, at the next; what it works in.
+
+    They are parts of the buffer, set to the design position.
+    """
+    q, step, kept = vector(buffer, 0, N), vector(buffer, N, N), vector(buffer, 2 * N, N)
+    full = matrix(buffer, 3 * N, N, N + 1)
+    first = 3 * N + N * (N + 1)
+    u, previous = vector(buffer, first, INPUTS), vector(buffer, first + INPUTS, INPUTS)
+    for i in range(N):
+        q[i] = start[i]
+    for i in range(INPUTS):
+        u[i], previous[i] = 0.0, 0.0
+    target = vector(buffer, first + 2 * INPUTS, INPUTS)
+    return q, u, previous, target, Work(step, kept, full)

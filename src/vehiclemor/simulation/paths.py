@@ -9,7 +9,7 @@ import numpy as np
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import InputError
-from vehiclemor.simulation.checks import loop_array
+from vehiclemor.simulation.checks import checked_path
 
 PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")
 
@@ -20,6 +20,7 @@ def along(
     constants: np.ndarray,
     paths: tuple[np.ndarray, np.ndarray],
     sizes: tuple[int, int, int],
+    finite: bool = False,
 ) -> np.ndarray:
     """Results (samples, size) of a kernel at every sample of a path.
 
@@ -29,19 +30,16 @@ def along(
         States and inputs by sample.
     sizes
         Numbers of states, inputs and results.
+    finite
+        Whether to refuse what is not finite.
 
     Raises
     ------
     InputError
         If a path has another shape: the kernel reads as many numbers as it knows.
     """
-    try:
-        states, inputs = (np.atleast_1d(loop_array(path)) for path in paths)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"states and inputs must be arrays of numbers: {error}") from None
-    for path, kind, size in zip((states, inputs), ("states", "inputs"), sizes[:2], strict=True):
-        if path.shape != (len(states), size):
-            raise InputError(f"{kind} have shape {path.shape}, not ({len(states)}, {size})")
+    states = checked_path(paths[0], sizes[0], "states", finite=finite)
+    inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
     result = np.empty((len(states), sizes[2]))
     address = np.array([address_of(kernels, name)], dtype=np.int64)
     path_loops()["kernel_path"](states, inputs, address, constants, result)

@@ -6,6 +6,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.integrators.structures import Spans, Subspaces
 
 # Of the equations that are integrated; see the modules of these names in `formulations`.
@@ -13,7 +14,7 @@ FORMULATIONS = ("full", "state", "coordinates")
 
 
 @dataclass(frozen=True)
-class ProjectionWindows:
+class ProjectionWindows(ShortRepr):
     """Formulation of a system with one affine subspace for each window.
 
     Attributes

@@ -13,6 +13,7 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Ready, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, loop_array, output_times
 from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.integrators import catalogue
@@ -109,7 +110,7 @@ class RunArguments(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class System(ShortRepr):
     """A first-order system whose right-hand side is machine code.
 
     Attributes

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vehiclemor.short_repr import ShortRepr
+
 # A named initial condition of a model, or a state (n,).
-Start = str | np.ndarray
+Start = str | tuple[float, ...] | np.ndarray
 STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {
@@ -30,7 +32,7 @@ EVALUATIONS = {"ae": "residual_evaluations", "ode": "rhs_calls", "dae": "rhs_cal
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class Trajectory(ShortRepr):
     """Result of one simulation.
 
     Attributes

@@ -50,4 +50,17 @@ def trajectory_dataset(
         ("remark", "what else there is to know"),
     ):
         variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
-    return xr.Dataset(variables | (further or {}), coordinates)
+    return with_units(xr.Dataset(variables | (further or {}), coordinates))
+
+
+def with_units(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with a unit at each variable that has one.
+
+    `see output_unit` becomes the unit of all outputs if they share one, and is left out otherwise:
+    a plot would show it.  The unit of each output stays beside it.
+    """
+    for variable in dataset.data_vars.values():
+        if variable.attrs.get("units", "").startswith("see "):
+            units = set(dataset[variable.attrs.pop("units").removeprefix("see ")].values.tolist())
+            variable.attrs |= {"units": units.pop()} if len(units) == 1 else {}
+    return dataset

@@ -14,10 +14,11 @@ from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.validation import checked_fit, checked_run
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.study.experiment import Experiment, Keep
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.linear_algebra import one_thread
@@ -47,8 +48,8 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
         As the experiment keeps it, see `study/result.py`.  Where nothing could be computed the
         values are missing, and `status` and `message` tell why.
     """
+    kept = model is None
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
-        kept = model is None
         model = model or model_of(experiment)
         found = attempt(partial(_evaluated, experiment, model, kept))
         return _failed(experiment, model, found) if isinstance(found, Failure) else found
@@ -142,7 +143,8 @@ def _fit(
 
     def fit() -> ReducedModel:
         runs = [training_run(model, scenario) for scenario in training]
-        return method.fit(model, runs, for_method(model, method_name, json.loads(settings)))
+        complete = for_method(model, method_name, json.loads(settings))
+        return checked_fit(method_name, method.fit(model, runs, complete))
 
     with one_thread():
         return attempt(fit)
@@ -181,21 +183,27 @@ def _tested(
     def run() -> Outcome:
         start = start_of(model, scenario)
         if keep == "errors":
-            return Outcome(_finite(reduced.simulate(scenario.maneuver, start)), reference)
+            return Outcome(_sound(model, reduced, scenario, start), reference)
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
-        trajectory = _finite(reduced.simulate(scenario.maneuver, start))
+        trajectory = _sound(model, reduced, scenario, start)
         nearest = reduced.best_approximation(reference.states)
         if nearest is None:
             return Outcome(trajectory, reference)
+        if np.shape(nearest) != reference.states.shape:
+            raise TypeError(
+                f"best_approximation gives shape {np.shape(nearest)}, not its argument's"
+            )
         floor = rms(model.outputs_at(nearest, reference.inputs) - reference.outputs)
         return Outcome(trajectory, reference, floor)
 
     return attempt(run)
 
 
-def _finite(trajectory: Trajectory) -> Trajectory:
-    """The trajectory; what ends without complaint, but in values that are no numbers, diverged."""
+def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:
+    """A run; what ends without complaint, but in values that are no numbers, diverged."""
+    run = reduced.simulate(scenario.maneuver, start)
+    trajectory = checked_run(model, scenario.maneuver, reduced, run)
     if trajectory.status != "ok" or np.isfinite(trajectory.outputs).all():
         return trajectory
     return replace(trajectory, status="diverged", message="an output is not finite")

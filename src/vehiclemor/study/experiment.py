@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.provenance import code_digest
@@ -15,7 +16,7 @@ Keep = Literal["trajectories", "metrics", "errors"]
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(ShortRepr):
     """What one result file holds, and all that determines it.
 
     Attributes

@@ -15,6 +15,7 @@ from vehiclemor.errors import (
     UnreachableError,
     VehiclemorError,
     machine_reason,
+    one_line,
 )
 
 Result = TypeVar("Result")
@@ -56,7 +57,7 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
     except Exception as error:
         if reason := machine_reason(error):
             raise MachineError(reason) from error
-        return Failure("error", f"{whose}{type(error).__name__}: {_line(error)}")
+        return Failure("error", whose + one_line(error))
 
 
 def _line(error: Exception) -> str:

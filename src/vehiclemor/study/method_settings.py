@@ -32,7 +32,8 @@ def complete_settings(
     method: Method = component("method", method_name)
     if not accepted(model, method):
         return {}
-    return validated(method, model.kind, given or {}, preset).model_dump()
+    coordinates = len(model.coordinates)
+    return validated(method, model.kind, given or {}, preset, coordinates).model_dump()
 
 
 def accepted(model: Model, method: Method) -> bool:

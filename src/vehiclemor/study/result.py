@@ -13,7 +13,7 @@ from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import Offline, ReducedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+from vehiclemor.simulation.trajectory_dataset import trajectory_dataset, with_units
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.provenance import attributes
@@ -71,9 +71,9 @@ def metrics_dataset(
     if model.speeds:
         found["rms_speed_error"] = rms(run.speeds - full.speeds)
         found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
-    residual_at = getattr(model, "residual_at", None)
-    if residual_at is not None:
-        found["largest_residual"] = float(np.abs(residual_at(run.coordinates, run.inputs)).max())
+    if model.kind == "ae":
+        residuals = model.along("residual", run.coordinates, run.inputs)
+        found["largest_residual"] = float(np.abs(residuals).max())
     histories = variables({"reference_outputs": full.outputs}, "time")
     dataset = trajectory_dataset(model, run, variables(found | _of_fit(reduced)) | histories)
     if experiment.keep == "metrics":
@@ -139,7 +139,7 @@ def errors_dataset(
         "output": [quantity.name for quantity in outputs],
         "output_unit": ("output", [quantity.unit for quantity in outputs]),
     }
-    return xr.Dataset(described, coordinates, _attributes(experiment))
+    return with_units(xr.Dataset(described, coordinates, _attributes(experiment)))
 
 
 def _errors(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

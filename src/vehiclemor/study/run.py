@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.errors import InputError
+from vehiclemor.arguments import count
 from vehiclemor.progress import telling
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
@@ -14,15 +14,13 @@ from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import StudyFile, file_as_stored, studies_and_files
 from vehiclemor.study.store import result_path, stored
-from vehiclemor.study.workers import Progress, Workers
+from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def run_studies(
-    study: str, folder: Path, jobs: int = 1, progress: Progress | None = None
-) -> dict[str, xr.Dataset]:
+def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
     """Run a study, or all studies of a collection, and combine the results.
 
     Parameters
@@ -33,8 +31,6 @@ def run_studies(
         Results folder; cells that it holds already are not computed again.
     jobs
         Number of processes.
-    progress
-        Called with (study, finished cells, all cells).
 
     Returns
     -------
@@ -42,15 +38,14 @@ def run_studies(
         Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
         is `predictive-<protocol>`.
     """
-    if jobs < 1:
-        raise InputError(f"jobs is {jobs}; it must be at least 1")
+    count("jobs", jobs)
     files = studies_and_files(study)
     protocols = [load_protocol(name) for _, d in files.values() for name in d.protocols]
     grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
-    results = {p.study: run_protocol(p, folder, jobs, progress) for p in protocols}
+    results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
     for path, grid in grids:
         cells = grid.unique
-        workers = Workers(grid.name, folder, jobs, progress)
+        workers = Workers(grid.name, folder, jobs)
         workers([[cell] for cell in cells.values()])
         results[grid.name] = stored(
             folder / "studies" / f"{grid.name}.nc",

@@ -13,6 +13,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.training import TrainingRun, policy_factors
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.checks import check_inputs, check_resolved
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 
@@ -29,13 +30,13 @@ class Scenario:
     maneuver
         The input, with its factors.
     start
-        Name of an initial condition.
+        Name of an initial condition, or a state as numbers.
     speed
         Initial speed in m/s; None is that of the model's parameters, if it has any.
     """
 
     maneuver: Maneuver
-    start: str
+    start: str | tuple[float, ...]
     speed: float | None = None
 
     @property
@@ -43,7 +44,7 @@ class Scenario:
         """One readable line, unique within a protocol."""
         run = self.maneuver
         factors = [f"f {run.frequency_factor:g}", f"a {run.amplitude_factor:g}"]
-        words = [run.name, *factors, self.start]
+        words = [run.name, *factors, self.start if isinstance(self.start, str) else "own state"]
         if self.speed is not None:
             words.append(f"{self.speed:g} m/s")
         return ", ".join(words)
@@ -62,7 +63,7 @@ class Scenario:
         }
 
     @property
-    def run_key(self) -> tuple[str, str, float | None]:
+    def run_key(self) -> tuple[str, str | tuple[float, ...], float | None]:
         """Equal for scenarios that are one run of the model, whatever their names."""
         return input_hash(self.maneuver), self.start, self.speed
 
@@ -124,12 +125,8 @@ def training_scenarios(
 
 def check(model: Model, scenario: Scenario) -> None:
     """Raise `InputError` if the model can't be run in the scenario."""
-    maneuver = scenario.maneuver
-    if maneuver.inputs != model.inputs:
-        raise InputError(
-            f"maneuver {maneuver.name} gives inputs {', '.join(maneuver.inputs)}; "
-            f"{model.name} needs {', '.join(model.inputs)}"
-        )
+    check_inputs(scenario.maneuver, model.definition)
+    check_resolved(scenario.maneuver)
     if scenario.speed is not None and own_speed(model) is None:
         raise InputError(f"{model.name} has no {SPEED}: a scenario of it has no speed")
     model.start(start_of(model, scenario))

@@ -104,10 +104,11 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
         If the file is missing, corrupt, or not the expected one; it is left as it is.
     """
     import xarray as xr
+    from xarray.backends import NetCDF4DataStore
 
     with _opened(path, attribute, expected) as file:
         file.set_auto_maskandscale(True)
-        return xr.open_dataset(xr.backends.NetCDF4DataStore(file)).load()
+        return xr.open_dataset(NetCDF4DataStore(file)).load()
 
 
 def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarray]:

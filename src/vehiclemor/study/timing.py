@@ -25,6 +25,7 @@ from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.progress import tell
 from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.scenario import Scenario, start_of
 from vehiclemor.study.store import stored
@@ -186,6 +187,8 @@ def _rounds(
     tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
     shape = (len(experiments), len(tests))
     timed = np.ones(shape, dtype=bool) if finished is None else finished.copy()
+    work = f"rounds of times on {model.name}"
+    tell(work, 0, rounds + 1)
     fits = [_warm_fit(model, e, timed[index].any()) for index, e in enumerate(experiments)]
     seconds = np.full((rounds + 1, *shape), np.nan)
     for turn in range(rounds + 1):
@@ -201,6 +204,7 @@ def _rounds(
                     timed[index, place] = False
                 else:
                     seconds[turn, index, place] = run.seconds
+        tell(work, turn + 1, rounds + 1)
     return seconds[1:], [offline for _, offline in fits]
 
 

@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +18,7 @@ from vehiclemor.codegen.object_cache import cache_folder
 from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
     cell_path,
     prepare_folder,
@@ -30,7 +31,6 @@ from vehiclemor.study.store import (
 if TYPE_CHECKING:
     import xarray as xr
 
-Progress = Callable[[str, int, int], None]
 Groups = Sequence[Sequence[Experiment]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
@@ -42,15 +42,11 @@ _LOG = logging.getLogger("vehiclemor")
 
 @dataclass
 class Workers:
-    """Evaluates what is missing of some experiments, in so many jobs, and stores it.
-
-    `progress` is called with (name, finished experiments, all experiments).
-    """
+    """Evaluates what is missing of some experiments, in so many jobs, and stores it."""
 
     name: str
     folder: Path
     jobs: int = 1
-    progress: Progress | None = None
     asked: set[str] = field(default_factory=set)
     finished: set[str] = field(default_factory=set)
 
@@ -67,6 +63,7 @@ class Workers:
         self.asked |= keys
         self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
         if self._missing(groups):
+            # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
         self._report()
         for left in reversed(range(TRIES)):
@@ -97,24 +94,22 @@ class Workers:
         return [part for part in parts if part]
 
     def _report(self) -> None:
-        if self.progress:
-            self.progress(self.name, len(self.finished), len(self.asked))
+        tell(self.name, len(self.finished), len(self.asked))
 
     def _evaluated(self, work: list[list[Experiment]], again: bool) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
-        # One group of each method here, so that its loops are compiled once; what has killed a
-        # worker would kill this process too.
-        here = [] if again else list({g[0].method: g for g in reversed(work)}.values())
-        # Starting processes costs seconds: a handful of groups is quicker without.
+        # Starting processes costs seconds: a handful of groups is quicker without.  But what has
+        # killed a worker would kill this process too.
         if self.jobs == 1 or (len(work) < 2 * self.jobs and not again):
-            here = work
-        for group in here:
-            yield self._taken(*evaluate_and_store(group, self.folder))
-        rest = [group for group in work if all(group is not other for other in here)]
-        if rest:
-            with closing(evaluated_by_workers(rest, self.folder, self.jobs)) as pool:
-                for done in pool:
-                    yield self._taken(*done)
+            for group in work:
+                yield self._taken(*evaluate_and_store(group, self.folder))
+            return
+        # One group of each method first, so that workers compile different loops at a time.
+        first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
+        work.sort(key=lambda group: id(group) not in first)
+        with closing(evaluated_by_workers(work, self.folder, self.jobs)) as pool:
+            for done in pool:
+                yield self._taken(*done)
 
     def _taken(self, finished: list[str], fault: str) -> str:
         self.finished.update(finished)

@@ -5,6 +5,7 @@ moved into one further function, `constants`, which runs once for a parameter se
 that run at every time point read its results.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -76,12 +77,14 @@ def assemble(
     Raises
     ------
     ValueError
-        If a name of the model begins with an underscore: those are the generated names.
+        If a name of the model begins with an underscore: those are the generated names.  If results
+        are no real expressions of the arguments and parameters, or don't fill their shape.
     """
     for symbol in [*parameters, *(s for group in arguments.values() for s in group)]:
         if symbol.name.startswith("_"):
             raise ValueError(f"{symbol.name}: names that begin with an underscore are reserved")
     parameter_set = frozenset(parameters)
+    results = {name: (_sympified(name, *result), result[1]) for name, result in results.items()}
     wanted = [expression for expressions, _ in results.values() for expression in expressions]
     definitions = tape.definitions
     order = dependencies(wanted, definitions)
@@ -107,12 +110,15 @@ def assemble(
         used = dependencies(part, varying)
         functions[name] = Function(tuple((s, varying[s]) for s in used), part, shape)
 
+    known = {symbol for group in arguments.values() for symbol in group} | varying.keys()
     read: dict[sp.Symbol, None] = {}
     for function in functions.values():
         for expression in [e for _, e in function.assignments] + list(function.results):
             for symbol in free_symbols(expression):
                 if symbol in constant_definitions or symbol in parameter_set:
                     read[symbol] = None
+                elif symbol not in known:
+                    raise ValueError(f"{symbol} is neither an argument nor a parameter")
     symbols = tuple(read)
     constants = Function(
         tuple((s, constant_definitions[s]) for s in dependencies(symbols, constant_definitions)),
@@ -126,6 +132,19 @@ def assemble(
         symbols,
         functions,
     )
+
+
+def _sympified(name: str, expressions: Sequence[object], shape: tuple[int, ...]) -> list[sp.Expr]:
+    """Results of a function as expressions; plain numbers become SymPy's."""
+    found = [sp.sympify(expression) for expression in expressions]
+    if len(found) != math.prod(shape):
+        raise ValueError(f"{name} has {len(found)} results, its shape {shape} another number")
+    for expression in found:
+        if not isinstance(expression, sp.Expr) or expression.has(
+            sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I
+        ):
+            raise ValueError(f"{name}: {expression} is no real number")
+    return found
 
 
 def _share(

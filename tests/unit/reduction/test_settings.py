@@ -10,8 +10,8 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import Settings, one_of
-from vehiclemor.reduction.validation import parsed, validated
+from vehiclemor.reduction.settings import OneOf, Settings
+from vehiclemor.reduction.validation import validated
 
 
 class Declared(Settings):
@@ -19,7 +19,7 @@ class Declared(Settings):
     period: float = Field(5.0, gt=0.0, description="how long")
     mode: Literal["fast", "slow"] = Field("fast", description="how")
     label: str = Field("", description="any text")
-    order: Annotated[str, one_of(("up", "down"))] = "up"
+    order: Annotated[str, OneOf(("up", "down"))] = "up"
     share: float = Field(0.5, ge=0.0, le=1.0)
 
 
@@ -78,15 +78,6 @@ def test_allowed_numbers_pass_with_their_declared_type(rank: int, period: float)
     assert settings.period == period
     assert type(settings.period) is float
     assert type(validated(declared(), "ode", {"period": 2}).period) is float
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [("3", 3), ("-2", -2), ("2.5", 2.5), ("1e-6", 1e-6), ("fast", "fast"), ("", ""), ("3a", "3a")],
-)
-def test_text_of_the_command_line_gets_its_kind(text: str, value: object) -> None:
-    assert parsed(text) == value
-    assert type(parsed(text)) is type(value)
 
 
 def test_integer_beyond_all_floats_is_one_line() -> None:

@@ -36,8 +36,25 @@ def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: T
         assert int(dataset[name]) == full.counts[name]
     for variable in dataset.variables.values():
         assert variable.attrs.get("long_name")
-    for name in ("coordinates", "outputs", "inputs", "seconds", "time", *ALGEBRAIC_COUNTS):
+    for name in ("inputs", "seconds", "time", *ALGEBRAIC_COUNTS):
         assert dataset[name].attrs["units"]
+
+
+def test_a_plot_shows_the_unit_where_there_is_one(model: AlgebraicModel, full: Trajectory) -> None:
+    further = {"error": ("output", np.arange(6.0), {"units": "see output_unit"})}
+    dataset = trajectory_dataset(model, full, further)
+    assert dataset["inputs"].attrs["units"] == "m"
+    # Outputs are in m and rad: each has its own beside it.
+    for name, unit in {
+        "outputs": "output_unit",
+        "error": "output_unit",
+        "coordinates": "coordinate_unit",
+    }.items():
+        assert "units" not in dataset[name].attrs
+        assert set(dataset[name][unit].values) == {"m", "rad"}
+    axis = dataset["outputs"].sel(output="toe").plot()[0].axes
+    assert axis.get_ylabel() == "outputs"
+    axis.figure.clear()
 
 
 def test_further_variables_are_added(model: AlgebraicModel, full: Trajectory) -> None:

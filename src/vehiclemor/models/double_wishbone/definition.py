@@ -56,5 +56,8 @@ DEFINITION = ModelDefinition(
     parameters=POINTS,
     derive=derive,
     design_coordinates=design_coordinates,
+    # Beyond what a steering does (wheels turn by 0.7 rad, racks move by 0.08 m), and before the
+    # cusp of the lower limit: there the wheel has turned by 1.04 rad, and soon turns right round.
+    stops={"zeta": 1.0, "s": 0.1},
     report=REPORT,
 )

@@ -12,6 +12,7 @@ import numpy as np
 from vehiclemor.errors import GeometryError
 from vehiclemor.models.definition import Derivative
 from vehiclemor.models.double_wishbone.points import POINTS, check_linkage, tie_rod_angles
+from vehiclemor.models.vehicle_parameters import check_moments
 
 # Places of z, theta, the left lower arm and the left rear arm among the coordinates.
 HEIGHT, PITCH, LOWER_ARM, REAR_ARM = 2, 4, 10, 20
@@ -20,8 +21,6 @@ SPINS = slice(48, 52)
 # Accelerations (m/s^2, rad/s^2) below which nothing moves; rounding alone gives a tenth of it.
 AT_REST = 1e-9
 MOST_ITERATIONS = 30
-# Share by which a published moment of inertia may break the triangle inequality.
-ROUNDED = 0.01
 
 
 def check(p: Mapping[str, Any]) -> None:
@@ -62,7 +61,7 @@ def check(p: Mapping[str, Any]) -> None:
 
 
 def _check_inertia(p: Mapping[str, Any]) -> None:
-    """Raise `GeometryError` if no body can have one of the inertia tensors.
+    """Raise `GeometryError` if no body can have one of the inertia tensors, see `check_moments`.
 
     Wheels are let pass: the published moments of a tire about its axis exceed twice those across.
     """
@@ -70,19 +69,14 @@ def _check_inertia(p: Mapping[str, Any]) -> None:
     xx, yy, zz = p["rear_arm_inertia"]
     arm = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     moments = {
-        name: np.sort(p[name])
+        name: p[name]
         for name in ("chassis_inertia", "upper_arm_inertia", "lower_arm_inertia", "carrier_inertia")
     }
     moments["rear_arm_inertia"] = np.linalg.eigvalsh(arm)
     across = p["tie_rod_transverse_inertia"]
-    moments["tie_rod_axial_inertia"] = np.sort([p["tie_rod_axial_inertia"], across, across])
-    for name, (smallest, middle, largest) in moments.items():
-        # A share of the largest: published moments of flat and thin bodies are rounded.
-        if smallest <= 0.0 or largest > (smallest + middle) * (1.0 + ROUNDED):
-            raise GeometryError(
-                f"{name}: no body has the principal moments of inertia {smallest:.4g}, "
-                f"{middle:.4g}, {largest:.4g} kg m^2 (the largest is at most the sum of the others)"
-            )
+    moments["tie_rod_axial_inertia"] = np.array([p["tie_rod_axial_inertia"], across, across])
+    for name, values in moments.items():
+        check_moments(name, values)
 
 
 def wheel_places(p: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -61,7 +61,8 @@ DEFINITION = ModelDefinition(
     cyclic=("X", "Y", *(f"gamma_{wheel}" for wheel in WHEELS)),
     planar=("X", "Y", "psi"),
     # Slip needs forward motion, the contact point lies below the wheel centre.
-    validity={"longitudinal_speed": FORWARD, **UPRIGHT},
+    # Steering as far as that of the car (CommonRoad, BMW 320i).
+    validity={"longitudinal_speed": FORWARD, **UPRIGHT, "delta": (-1.066, 1.066)},
     loads=TIRE_LOADS,
     report=REPORT,
 )

@@ -8,6 +8,7 @@ import numpy as np
 
 from vehiclemor.errors import GeometryError
 from vehiclemor.models.independent_suspension.quantities import COORDINATES, FRONT, SPEEDS
+from vehiclemor.models.vehicle_parameters import check_moments
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def derived(p: Mapping[str, Any]) -> Derived:
 
 
 def check(p: Mapping[str, Any]) -> None:
-    """Raise `GeometryError` if the vehicle can't stand on its four wheels."""
+    """Raise `GeometryError` if the vehicle can't stand on its four wheels, or be at all."""
     d = derived(p)
     for name, distance in zip(("front", "rear"), d.sprung_distance, strict=True):
         if distance <= 0.0:
@@ -90,6 +91,9 @@ def check(p: Mapping[str, Any]) -> None:
             f"the sprung body has a yaw inertia of {d.yaw_inertia:.4g} kg m^2: "
             "whole_car_yaw_inertia is smaller than that of the unsprung masses alone"
         )
+    xx, yy, xz = p["roll_inertia"], p["pitch_inertia"], p["product_of_inertia"]
+    tensor = np.array([[xx, 0.0, xz], [0.0, yy, 0.0], [xz, 0.0, d.yaw_inertia]])
+    check_moments("sprung body", np.linalg.eigvalsh(tensor))
 
 
 def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -48,9 +48,9 @@ PARAMETERS = {
     "spin_inertia": Declared("kg m^2", above=0.0, at_most=1e4),
     "diametral_inertia": Declared("kg m^2", above=0.0, at_most=1e4),
     "slip_speed": shared.SLIP_SPEED,
-    "nominal_load": Declared("N", above=0.0),
-    "load_scale": Declared("1", above=0.0),
-    **{name: Declared("1") for name in MAGIC_FORMULA},
+    "nominal_load": shared.LOAD,
+    "load_scale": Declared("1", above=0.0, at_most=100.0),
+    **dict.fromkeys(MAGIC_FORMULA, shared.TIRE_COEFFICIENT),
     # Below walking pace the slip of a rolling wheel has no meaning.
     "initial_speed": shared.initial_speed(slowest=1.0),
     **shared.DROP,

@@ -6,10 +6,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.errors import ConvergenceError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, Tolerance
+from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.model import Model
@@ -24,9 +26,7 @@ class AlgebraicSettings(Settings):
         description="newton: fresh Jacobians; newton_dense: without the generated elimination; "
         "chord: constant inverse and predictor",
     )
-    tolerance: float = Field(
-        NEWTON_TOLERANCE, gt=0.0, description="largest step of the last iteration"
-    )
+    tolerance: StepTolerance = NEWTON_TOLERANCE
 
 
 class DynamicSettings(OnlineSettings):
@@ -46,7 +46,7 @@ def _strongest(solver: str, tolerance: float) -> Presets:
 
 
 @dataclass(frozen=True)
-class FullOrderModel:
+class FullOrderModel(ShortRepr):
     """The full-order model behind the interface of a reduced model."""
 
     model: Model
@@ -60,8 +60,14 @@ class FullOrderModel:
         return len(self.model.coordinates)
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Full-order trajectory at the maneuver's output times."""
-        return self.model.simulate(maneuver, start, solver=self.solver, tolerance=self.tolerance)
+        """Full-order trajectory at the maneuver's output times; it may have diverged."""
+        how = {"solver": self.solver, "tolerance": self.tolerance}
+        try:
+            return self.model.simulate(maneuver, start, **how)
+        except ConvergenceError as error:
+            if error.trajectory is None:
+                raise
+            return error.trajectory
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""

@@ -39,6 +39,7 @@ from vehiclemor.reduction.vehicle.linear_vehicle import (
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 
 # Lateral speed (m/s) of a typical maneuver.
@@ -46,7 +47,7 @@ SIDEWARD = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class SingleTrack:
+class SingleTrack(ShortRepr):
     """Condensed linear dynamics of (V, r).
 
     Attributes

@@ -16,11 +16,12 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.kernels import checked_inputs, map_loop
+from vehiclemor.reduction.polynomials.kernels import map_loop
 from vehiclemor.reduction.polynomials.map_loops import BLOCK
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.model import Model
@@ -44,7 +45,7 @@ class PathMapSettings(Settings):
 
 
 @dataclass(frozen=True)
-class PathMapModel:
+class PathMapModel(ShortRepr):
     """Coordinates as polynomials of the travel.
 
     Attributes
@@ -77,7 +78,7 @@ class PathMapModel:
         """Polynomials at the maneuver's output times."""
         model, times = self.model, maneuver.times
         model.start(start)
-        inputs = checked_inputs(model, maneuver)
+        inputs = model.inputs_of(maneuver, times)
         degree, n = len(self.coefficients) - 1, len(model.coordinates)
         (low, high), slack = self.travel, SLACK * (self.travel[1] - self.travel[0])
         limits = np.array([low - slack, high + slack, self.rack - slack, self.rack + slack])

@@ -19,7 +19,6 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuvers import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import (
-    checked_inputs,
     derivatives,
     monomials,
     residual_loop,
@@ -27,9 +26,10 @@ from vehiclemor.reduction.polynomials.kernels import (
 from vehiclemor.reduction.polynomials.residual_loops import Polynomials
 from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
-from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -57,14 +57,12 @@ class PolynomialResidualSettings(Settings):
         "chord",
         description="chord: constant reduced Jacobian; newton: a fresh one in each iteration",
     )
-    tolerance: float = Field(
-        1e-6, gt=0.0, description="largest step of the last iteration (reduced coordinates)"
-    )
+    tolerance: StepTolerance = 1e-6
     seed: int = Field(0, ge=0, description="seed of the points beside the training path")
 
 
 @dataclass(frozen=True)
-class PolynomialResidualModel:
+class PolynomialResidualModel(ShortRepr):
     """Polynomial reduced equations g(x) = response^T (u - u_mean).
 
     Attributes
@@ -108,7 +106,7 @@ class PolynomialResidualModel:
         """Solve the polynomial equations at the maneuver's output times."""
         model, times = self.model, maneuver.times
         began_at = self.reduced(model.start(start)[None, :])[0]
-        inputs = checked_inputs(model, maneuver)
+        inputs = model.inputs_of(maneuver, times)
         rank = self.basis.rank
         polynomials = Polynomials(
             np.concatenate([self.mean_inputs, self.basis.mean]),

@@ -14,12 +14,13 @@ from vehiclemor.models.definition import KINDS
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
 @dataclass(frozen=True)
-class ReplayModel:
+class ReplayModel(ShortRepr):
     """Stored training trajectories."""
 
     model: Model

@@ -6,10 +6,6 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from vehiclemor.codegen.loops import Loop, loops
-from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.checks import check_inputs, loop_array
 
 # Where small solves are.
 NEWTON = ("simulation.newton_loops",)
@@ -93,21 +89,3 @@ def residual_loop(name: str, inputs: int, rank: int, degree: int) -> Loop:
     sizes = {"N": rank, "INPUTS": inputs}
     modules = (*NEWTON, "reduction.polynomials.residual_loops")
     return loops(modules, (name,), polynomial_kernels(rank, degree), sizes)[name]
-
-
-def checked_inputs(model: AlgebraicModel, maneuver: Maneuver) -> np.ndarray:
-    """Inputs (samples, inputs) of a maneuver at its output times, as the loops want them.
-
-    Raises
-    ------
-    InputError
-        If the maneuver's inputs are not the model's, or one isn't finite.
-    """
-    check_inputs(maneuver, model.name, model.inputs)
-    times = maneuver.times
-    inputs = loop_array(maneuver.at(times))
-    bad = np.argwhere(~np.isfinite(inputs))
-    if len(bad):
-        sample, column = bad[0]
-        raise InputError(f"input {model.inputs[column]} is not finite at t = {times[sample]:.6g} s")
-    return inputs

@@ -12,13 +12,13 @@ from vehiclemor.codegen.loop_types import Cube, Int, Matrix, Vector, matrix, vec
 from vehiclemor.simulation.newton_loops import (
     CONVERGED,
     INPUTS,
-    JACOBIANS,
     SAMPLE,
     SINGULAR,
     N,
     Solution,
     failure,
     small_solve,
+    stopped,
 )
 
 
@@ -98,7 +98,7 @@ def reduced_path(
                 for k in range(N):
                     matrix_of[k, N] = step[k]
                 if not small_solve(matrix_of, N):
-                    return SINGULAR
+                    return stopped(counts, iterations, newton * iterations, SINGULAR)
                 for k in range(N):
                     step[k] = matrix_of[k, N]
             converged = True
@@ -108,7 +108,7 @@ def reduced_path(
             if converged:
                 break
         if not converged:
-            return failure(x)
+            return stopped(counts, iterations, newton * iterations, failure(x))
         for k in range(N):
             third[k] = second[k]
             second[k] = first[k]
@@ -118,11 +118,7 @@ def reduced_path(
             for k in range(N):
                 total += basis[k, i] * x[k]
             path[sample, i] = total
-    for kind in range(4):
-        counts[kind] = iterations
-    if not newton:
-        counts[JACOBIANS] = 0
-    return CONVERGED
+    return stopped(counts, iterations, newton * iterations, CONVERGED)
 
 
 def terms_path(points: Matrix, loads: Matrix, coefficients: Matrix, result: Matrix) -> Int:

@@ -15,6 +15,7 @@ from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
 from vehiclemor.reduction.projection.windows import by_window, first_samples
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Iteration
@@ -24,7 +25,7 @@ ITERATION_LIMIT = 50
 
 
 @dataclass(frozen=True)
-class AlgebraicProjection:
+class AlgebraicProjection(ShortRepr):
     """Reduced model on affine subspaces, one in each window.
 
     Attributes
@@ -54,7 +55,7 @@ class AlgebraicProjection:
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
         model, times = self.model, maneuver.times
-        inputs = maneuver.at(times)
+        inputs = model.inputs_of(maneuver, times)
         n, windows = len(model.coordinates), len(self.bases)
         bases, tests = np.zeros((windows, n, n)), np.zeros((windows, n, n))
         for k, basis in enumerate(self.bases):

@@ -20,6 +20,7 @@ from vehiclemor.simulation.newton_loops import (
     all_below,
     failure,
     small_solve,
+    stopped,
 )
 
 # Number of entries of the Jacobian that are no structural zeros.
@@ -139,7 +140,7 @@ def projected_path(
                     else:
                         reduced[k, N] = weighted(test, k, product, N)
                 if not small_solve(reduced, r):
-                    return SINGULAR
+                    return stopped(counts, iterations, iterations, SINGULAR)
                 for j in range(r):
                     step[j] = reduced[j, N]
                     qh[j] -= step[j]
@@ -148,9 +149,7 @@ def projected_path(
                     converged = True
                     break
             if not converged:
-                return failure(q)
+                return stopped(counts, iterations, iterations, failure(q))
             for i in range(N):
                 path[sample, i] = q[i]
-    for kind in range(4):
-        counts[kind] = iterations
-    return CONVERGED
+    return stopped(counts, iterations, iterations, CONVERGED)

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.errors import InputError
+from vehiclemor.short_repr import ShortRepr
 
 MOST_SNAPSHOTS = 100_000
 
 
 @dataclass(frozen=True)
-class Basis:
+class Basis(ShortRepr):
     """Affine subspace mean + span(vectors).
 
     Attributes

@@ -72,7 +72,7 @@ class DynamicProjection(ReducedSystem):
         """
         model, spaces = self.model, self.spaces
         rates = np.full(len(self.bases), np.nan)
-        for k in np.flatnonzero(spaces.ranks):
+        for k in np.flatnonzero(spaces.ranks).tolist():
             y = self._at_mean(k)[: spaces.ranks[k]]
             jacobian = linearisation.reduced_jacobian(model, spaces, k, y)
             rates[k] = np.linalg.eigvals(jacobian).real.max()

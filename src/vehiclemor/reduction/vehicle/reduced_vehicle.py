@@ -11,6 +11,7 @@ from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Run, System
@@ -49,7 +50,7 @@ NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedVehicle:
+class ReducedVehicle(ShortRepr):
     """A vehicle whose reduced equations are linear in features, see `features`.
 
     Attributes

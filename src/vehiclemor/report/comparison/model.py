@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component
+from vehiclemor.report.costs import LEGEND as COSTS
 from vehiclemor.report.costs import cost_table, costs_text
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.errors import study_tables
@@ -12,12 +14,14 @@ from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rows import predictive_comparison
 from vehiclemor.report.predictive.text import predictive_text
-from vehiclemor.report.printing import Line, power, table_text, wrapped
+from vehiclemor.report.printing import Footnotes, Line, power, table_text, wrapped
+from vehiclemor.report.spectrum import spectrum_table, spectrum_text
+from vehiclemor.simulation.build import build
 
 LEGEND = (
-    "RMS errors in the nominal run, on which the methods are trained (replay is exact there), and "
-    "the largest over perturbations of frequency and amplitude by up to 20 %, with the training "
-    "unchanged; SI units"
+    "RMS errors, SI units; nom.: in the nominal run, on which the methods are trained (replay is "
+    "exact there); pert.: the largest over perturbations of frequency and amplitude by up to 20 %, "
+    "with the training unchanged; -: exactly zero, or none"
 )
 
 
@@ -28,12 +32,14 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     -------
     pandas.DataFrame
         `kind` tells what a row is.  `nominal`, `perturbed`: one run of a method, as in
-        `errors.study_tables`.  `cost`: as in `cost_table`.  The others are those of
-        `predictive_comparison`.
+        `errors.study_tables`.  `cost`, `spectrum`: as in `cost_table`, `spectrum_table`.  The
+        others are those of `predictive_comparison`.
     """
     studies = {"nominal": nominal(name, folder), "perturbed": perturbed(name, folder)}
     parts = [study_tables(name, [s], folder, jobs).assign(kind=k) for k, s in studies.items()]
     parts.append(cost_table(name, folder).assign(kind="cost"))
+    if pod.METHOD.accepts(build(name))[0]:
+        parts.append(spectrum_table(name).assign(kind="spectrum"))
     parts.append(predictive_comparison(folder, jobs, study=unseen(name, folder)))
     parts.append(pd.DataFrame(paper_terms_rows([name], folder)))
     return pd.concat(parts, ignore_index=True).assign(model=name)
@@ -41,22 +47,27 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
 
 def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
     """The comparison of a model as text."""
-    columns = {
-        f"rms_{o}": label_of(o).short for o in component("model", name).shown.printed_outputs
-    }
-    records = rows.to_dict("records")
-    printed: list[Line] = []
-    for row in records:
-        if row["kind"] != "nominal":
-            continue
-        # A run that has failed leaves no error, and then there is no largest one.
-        same = [r for r in records if r["kind"] == "perturbed" and r["method"] == row["method"]]
-        moved = {c: max((r[c] for r in same), key=lambda e: (e != e, e)) for c in columns}
-        cells = [f"{row['method']}, {row['start']}", str(int(row["effective_rank"]))]
-        cells += [power(errors[column]) for column in columns for errors in (row, moved)]
-        printed.append(Line(cells, "" if row["status"] == "ok" else row["message"]))
-    heads = ["method, start", "rank"]
-    heads += [f"{short} {kind}" for short in columns.values() for kind in ("nominal", "perturbed")]
-    title = f"{name}\n{wrapped(LEGEND)}\n{table_text(heads, printed)}"
-    rest = rows.loc[~rows["kind"].isin(["nominal", "perturbed", "cost"])]
-    return "\n\n".join([title, costs_text(name, folder), predictive_text(rest)])
+    shown = component("model", name).shown.printed_outputs
+    columns = {f"rms_{output}": label_of(output).short for output in shown}
+    records, notes = rows.to_dict("records"), Footnotes()
+    nominal_runs = [row for row in records if row["kind"] == "nominal"]
+    lines: list[Line] = []
+    for start in dict.fromkeys(row["start"] for row in nominal_runs):
+        heading = f"start {start}"
+        for row in [row for row in nominal_runs if row["start"] == start]:
+            # A run that has failed leaves no error, and then there is no largest one.
+            same = [r for r in records if r["kind"] == "perturbed" and r["method"] == row["method"]]
+            moved = {c: max((r[c] for r in same), key=lambda e: (e != e, e)) for c in columns}
+            told = notes.marks("" if row["status"] == "ok" else row["message"])
+            cells = [f"{row['method']} {told}".rstrip(), str(int(row["effective_rank"]))]
+            cells += [power(errors[column]) for column in columns for errors in (row, moved)]
+            lines.append(Line(cells, heading=heading))
+            heading = ""
+    heads = ["method", "rank"]
+    heads += [f"{short} {kind}" for short in columns.values() for kind in ("nom.", "pert.")]
+    title = "\n".join([name, wrapped(f"{LEGEND}."), table_text(heads, lines), notes.text()])
+    rest = rows.loc[~rows["kind"].isin(["nominal", "perturbed", "cost", "spectrum"])]
+    modes = [row for row in records if row["kind"] == "spectrum"]
+    costs = f"{wrapped(f'{COSTS}.')}\n{costs_text(name, folder)}"
+    found = [spectrum_text(modes)] if modes else []
+    return "\n\n".join([title.rstrip(), costs, *found, predictive_text(rest)])

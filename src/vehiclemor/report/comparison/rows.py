@@ -112,7 +112,7 @@ def claim_row(claim: Claim, variant: str, finding: Finding, start: str = PUBLISH
         within=finding.met,
         verdict=judged(finding.met, start),
         measure=finding.measure,
-        reason=finding.seen,
+        reason=finding.seen or finding.measure,
         threshold_source=finding.threshold,
     )
 
@@ -157,8 +157,7 @@ def claim_rows(claim: Claim, results: Results) -> list[Row]:
         return [not_comparable(claim, reason)]
     rows: list[Row] = []
     for start in _starts(claim, results):
-        part = {name: _from_start(dataset, start) for name, dataset in results.items()}
-        rows += _rows_of_start(claim, part, start)
+        rows += _rows_of_start(claim, from_start(results, start), start)
     return rows
 
 
@@ -179,7 +178,9 @@ def _starts(claim: Claim, results: Results) -> list[str]:
     return list(dict.fromkeys(found)) or [PUBLISHED_START]
 
 
-def _from_start(dataset: xr.Dataset, start: str) -> xr.Dataset:
-    if "start" in dataset.dims and start in dataset["start"].values:
-        return dataset.sel(start=start)
-    return dataset
+def from_start(results: Results, start: str) -> Results:
+    """Studies of one start, where they have several."""
+    return {
+        name: dataset.sel(start=start) if start in dataset.indexes.get("start", ()) else dataset
+        for name, dataset in results.items()
+    }

@@ -125,6 +125,6 @@ def _cells(row: Row | None, notes: Footnotes) -> list[str]:
     settings = row.variant.partition(", ")[2]
     told = [] if settings in ("", *SHOWN) else [f"with {settings}"]
     reason = row.reason.split("; ")[0]
-    if not row.within and reason != PARAMETERS.split("; ")[0]:
+    if not row.within and reason not in (PARAMETERS.split("; ")[0], row.measure):
         told.append(reason)
     return [number(row.reproduced), f"{word} {notes.marks(*told)}".rstrip()]

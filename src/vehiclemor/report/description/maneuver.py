@@ -1,6 +1,6 @@
 """A maneuver: its inputs, how long it takes, and what of it can be changed."""
 
-from vehiclemor.maneuvers import LARGEST_FACTOR, Maneuver
+from vehiclemor.maneuvers import FACTORS, Maneuver
 from vehiclemor.registry import component, names
 from vehiclemor.report.description.schema import bounds
 
@@ -23,10 +23,7 @@ def maneuver_description(name: str) -> dict[str, object]:
             for i, unit, s in zip(maneuver.inputs, units, signals, strict=True)
         ],
         "parameters": [
-            {"name": f"{name} factor", "default": 1.0, "bounds": bounds(*limits)}
-            for name, limits in (
-                ("frequency", (0.0, None, LARGEST_FACTOR)),
-                ("amplitude", (None, -LARGEST_FACTOR, LARGEST_FACTOR)),
-            )
+            {"name": f"{name} factor", "default": 1.0, "bounds": bounds(None, *limits)}
+            for name, limits in FACTORS.items()
         ],
     }

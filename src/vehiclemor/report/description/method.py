@@ -1,5 +1,7 @@
 """A method as it is declared: settings by kind of model, presets, and the models it accepts."""
 
+from collections.abc import Mapping
+
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, names
 from vehiclemor.report.description.acceptance import accepts
@@ -27,5 +29,5 @@ def method_description(name: str) -> dict[str, object]:
     return {**head, **settings, "presets": presets, "models": models}
 
 
-def _changes(values: object) -> str:
-    return ", ".join(f"{key}={value}" for key, value in dict(values).items()) or "the defaults"
+def _changes(values: Mapping[str, object]) -> str:
+    return ", ".join(f"{key}={value}" for key, value in values.items()) or "the defaults"

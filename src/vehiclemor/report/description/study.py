@@ -17,13 +17,13 @@ def study_description(name: str) -> dict[str, object]:
     """Grid and methods of a study, its members if it is a collection, or its protocols."""
     path = study_path(name)
     study = read_toml(path, StudyFile)
-    head = {"study": path.stem, "summary": study.title, "file": str(path)}
+    head: dict[str, object] = {"study": path.stem, "summary": study.title, "file": str(path)}
     if study.studies:
         rows = [
-            {"study": member, "cells": content.cells, "summary": content.title}
+            {"study": member, "grid points": content.points, "summary": content.title}
             for member, content in load_studies(name).items()
         ]
-        return {**head, "cells": sum(row["cells"] for row in rows), "studies": rows}
+        return {**head, "grid points": sum(row["grid points"] for row in rows), "studies": rows}
     if study.protocols:
         return head | {f"protocol {name}": _protocol(name) for name in study.protocols}
     grid = {key: values(entry) for key, entry in study.grid.items()}
@@ -33,7 +33,7 @@ def study_description(name: str) -> dict[str, object]:
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
         "training": study.training,
-        "cells": study.cells,
+        "grid points": study.points,
         "keeps": study.keep,
         "grid": [
             {"dimension": key, "values": ", ".join(map(str, entry))} for key, entry in grid.items()

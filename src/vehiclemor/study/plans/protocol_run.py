@@ -21,15 +21,13 @@ from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.study_file import file_as_stored
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.store import result_path, stored
-from vehiclemor.study.workers import Progress, Workers
+from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def run_protocol(
-    protocol: Protocol, folder: Path, jobs: int = 1, progress: Progress | None = None
-) -> xr.Dataset:
+def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
     """Run a protocol; what an earlier run has finished is not computed again.
 
     Returns
@@ -38,7 +36,7 @@ def run_protocol(
         On the dimensions `row`, `scenario` and `output`, stored as
         `studies/predictive-<protocol>.nc` too.
     """
-    workers = Workers(protocol.study, folder, jobs, progress)
+    workers = Workers(protocol.study, folder, jobs)
     rows = validate(
         protocol.model,
         protocol.definition,

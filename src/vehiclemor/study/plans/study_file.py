@@ -3,10 +3,10 @@
 import math
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
@@ -14,16 +14,23 @@ from vehiclemor.resources import data_folder, data_names
 from vehiclemor.toml_files import FileSchema, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
-# A grid of more cells than this is a mistake in a file, not a study.
-MOST_CELLS = 1_000_000
+# A grid of more points than this is a mistake in a file, not a study.
+MOST_POINTS = 1_000_000
 
 
 class Span(FileSchema):
     """Equidistant values, both ends included."""
 
-    first: float
-    last: float
+    first: float = Field(allow_inf_nan=False)
+    last: float = Field(allow_inf_nan=False)
     count: int = Field(ge=1, le=10_000)
+
+
+# Told apart by their form, so that what is wrong with one is not read as the other.
+Axis = Annotated[
+    Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
+    Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
+]
 
 
 class MethodEntry(FileSchema):
@@ -67,7 +74,7 @@ class StudyFile(FileSchema):
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
-    grid: dict[str, list[int | float | str] | Span] = Field(
+    grid: dict[str, Axis] = Field(
         default_factory=dict,
         description="dimension -> values; frequency_factor, amplitude_factor, or any setting",
     )
@@ -81,8 +88,8 @@ class StudyFile(FileSchema):
         return {entry.label or entry.method: entry for entry in self.methods}
 
     @property
-    def cells(self) -> int:
-        """Number of points of the grid, times starts and methods."""
+    def points(self) -> int:
+        """Number of points of the grid; one cell may stand at several of them."""
         sizes = (len(values(entry)) for entry in self.grid.values())
         return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
 
@@ -95,13 +102,12 @@ class StudyFile(FileSchema):
 
     @field_validator("grid")
     @classmethod
-    def _not_empty(
-        cls, value: dict[str, list[int | float | str] | Span]
-    ) -> dict[str, list[int | float | str] | Span]:
+    def _not_empty(cls, value: dict[str, Axis]) -> dict[str, Axis]:
         for name, entry in value.items():
-            if isinstance(entry, list) and not entry:
+            points = values(entry)
+            if not points:
                 raise ValueError(f"{name} has no values")
-            if isinstance(entry, list) and len(set(entry)) != len(entry):
+            if len(set(points)) != len(points):
                 raise ValueError(f"{name} has the same value twice")
         return value
 
@@ -120,12 +126,18 @@ class StudyFile(FileSchema):
         doubles = {label for label in labels if labels.count(label) > 1}
         if doubles:
             raise ValueError(f"label {sorted(doubles)[0]!r} is used twice")
-        if self.cells > MOST_CELLS:
-            raise ValueError(f"the grid has {self.cells} cells, more than {MOST_CELLS}")
+        for entry in self.methods:
+            for name in self.grid.keys() & entry.settings.keys():
+                method = entry.label or entry.method
+                raise ValueError(
+                    f"{name} is set twice: in the grid and in the settings of {method}"
+                )
+        if self.points > MOST_POINTS:
+            raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
         return self
 
 
-def values(entry: list[int | float | str] | Span) -> list[int | float | str]:
+def values(entry: Axis) -> list[int | float | str]:
     """Values of one grid entry."""
     if isinstance(entry, Span):
         # Rounded, so that 1.1 is 1.1 and a grid holds the nominal point exactly.

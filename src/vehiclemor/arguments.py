@@ -1,0 +1,90 @@
+"""What users hand in, checked where it comes in: numbers, counts, arrays, folders."""
+
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+
+# Longest representation of a value that an error quotes.
+LONGEST_QUOTE = 60
+
+
+def quoted(value: object) -> str:
+    """A value as an error shows it: one line, cut short."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}..."
+
+
+def real_array(value: Any) -> np.ndarray:
+    """Floats of a number or of nested lists of numbers.
+
+    Raises
+    ------
+    TypeError
+        If anything is no real number: text, a date, a masked, complex or logical value.
+    """
+    array = None if np.ma.is_masked(value) else np.asarray(value)
+    if array is None or array.dtype.kind not in "iuf":
+        raise TypeError(f"{quoted(value)} is not a number or a list of numbers")
+    return array.astype(float, copy=False)
+
+
+def number(name: str, value: object) -> float:
+    """A finite real number.
+
+    Raises
+    ------
+    InputError
+        If it is anything else.
+    """
+    try:
+        array = real_array(value)
+    except (TypeError, ValueError):
+        array = None
+    if array is None or array.ndim:
+        raise InputError(f"{name}: {quoted(value)} is not a number")
+    if not math.isfinite(array):
+        raise InputError(f"{name}: {float(array)} is not finite")
+    return float(array)
+
+
+def within(name: str, value: float, bounds: tuple[float, float], unit: str = "") -> float:
+    """The value; `InputError` if it lies outside its bounds."""
+    for wrong, side, bound in (
+        (value < bounds[0], "below", bounds[0]),
+        (value > bounds[1], "above", bounds[1]),
+    ):
+        if wrong:
+            raise InputError(f"{name}: {value:g}{unit} is {side} {bound:g}{unit}")
+    return value
+
+
+def count(name: str, value: object, least: int = 1) -> int:
+    """A whole number, at least so large.
+
+    Raises
+    ------
+    InputError
+        If it is anything else.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or int(value) < least:  # type: ignore[arg-type]
+        raise InputError(f"{name} is {quoted(value)}; it must be a whole number, at least {least}")
+    return int(value)  # type: ignore[arg-type]
+
+
+def file_path(name: str, value: object) -> Path:
+    """Path of a file or folder.
+
+    Raises
+    ------
+    InputError
+        If it is no path, or an empty one.
+    """
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in str(value):
+        raise InputError(f"{name}: {quoted(value)} is not a path")
+    return Path(value)

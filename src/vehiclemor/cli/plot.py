@@ -1,0 +1,48 @@
+"""`vehiclemor plot`: a picture of a result that was stored."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from vehiclemor import api
+from vehiclemor.cli.key_values import key_values
+from vehiclemor.cli.picture import picture_file
+from vehiclemor.report.printing import wrapped
+
+
+def plot(
+    result: str,
+    *,
+    kind: Literal["histories", "paths", "errors"] = "histories",
+    select: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
+    out: Path | None = None,
+    results: Path = api.RESULTS,
+) -> int:
+    """Draw a stored result: histories of the outputs, paths, or errors.
+
+    Parameters
+    ----------
+    result
+        A netCDF file that simulate has written, or a study that has been run.
+    kind
+        What is drawn.
+    select
+        dimension=value: a point of the study's grid; may be given several times.  Else factors are
+        1 and the others first; all methods are drawn.
+    out
+        Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
+    results
+        Results folder in which studies are looked for.
+    """
+    picture = picture_file("--out", [] if out is None else [out], f"{Path(result).stem}-{kind}")
+    from vehiclemor.report.figures.result_plot import plot_result
+    from vehiclemor.report.result_selection import at_point, stored_result
+
+    chosen = key_values("--select", select)
+    dataset, point = at_point(stored_result(result, results), chosen)
+    plot_result(dataset, picture, kind)
+    if point:
+        print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
+    print(f"written: {picture}")
+    return 0

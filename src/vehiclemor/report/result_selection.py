@@ -1,0 +1,62 @@
+"""Which run of a stored result is meant: a file of one run, or a point of a study's grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vehiclemor.errors import InputError
+from vehiclemor.registry import unknown
+from vehiclemor.study.plans.study_file import FACTORS, load_studies, study_path
+from vehiclemor.study.store import read_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def stored_result(name: str, results: Path) -> xr.Dataset:
+    """A netCDF file, or the stored result of a study.
+
+    Raises
+    ------
+    InputError, FileError
+        If there is no such study, it has not been run, or the file isn't a result.
+    """
+    path = Path(name)
+    if path.suffix != ".nc":
+        if len(load_studies(name)) > 1:
+            raise InputError(f"{name} is a collection: name one of {', '.join(load_studies(name))}")
+        path = results / "studies" / f"{study_path(name).stem}.nc"
+        if not path.exists():
+            raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
+    return read_dataset(path, "source", "vehiclemor")
+
+
+def at_point(dataset: xr.Dataset, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
+    """A result at one point of its grid, all methods beside each other, and the point in words.
+
+    A dimension that is not chosen is at its nominal or first value.
+
+    Raises
+    ------
+    InputError
+        If the result has no such dimension or value.
+    """
+    grid = [str(d) for d in dataset["status"].dims]
+    for key in chosen:
+        if key not in grid:
+            raise unknown("dimension of the result", key, grid)
+    words = []
+    for dimension in grid:
+        values = dataset[dimension].values.tolist()
+        if dimension == "method" and dimension not in chosen:
+            continue
+        default = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
+        value = chosen.get(dimension, default)
+        if value not in values:
+            raise InputError(f"{dimension} {value!r}; it has {', '.join(map(str, values))}")
+        dataset = dataset.isel({dimension: values.index(value)})
+        if len(values) > 1:
+            words.append(f"{dimension} {value}")
+    return dataset, ", ".join(words)

@@ -1,0 +1,43 @@
+"""Objects that show themselves in one line: arrays by their shape, the rest cut short."""
+
+import dataclasses
+import reprlib
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+
+class ShortRepr:
+    """Base of dataclasses that hold arrays, functions or whole models."""
+
+    # Attributes that are shown; all fields by default.
+    repr_fields: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        # A dataclass makes its own where a class has none in itself.
+        cls.__repr__ = ShortRepr.__repr__
+
+    def __repr__(self) -> str:
+        fields = self.repr_fields or [f.name for f in dataclasses.fields(self)]  # type: ignore[arg-type]
+        texts = (f"{name}={_short(getattr(self, name))}" for name in fields)
+        return f"{type(self).__name__}({', '.join(texts)})"
+
+
+def _short(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    if isinstance(shape, tuple):
+        return f"{type(value).__name__}{shape}"
+    if isinstance(value, ShortRepr) and hasattr(value, "name"):
+        return f"{type(value).__name__} {value.name!r}"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(map(str, [*value][:4]))}{', ...' if len(value) > 4 else ''}}}"
+    if callable(value):
+        return getattr(value, "__name__", type(value).__name__)
+    text = " ".join(_CUT.repr(value).split())
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
+LONGEST = 80
+_CUT = reprlib.Repr()
+_CUT.maxtuple = _CUT.maxlist = 4
+_CUT.maxstring = _CUT.maxother = LONGEST

@@ -1,0 +1,176 @@
+"""What `show` and `list` print is what was declared, and no name is unknown to them."""
+
+import json
+
+import pytest
+from pydantic import BaseModel
+
+import vehiclemor as vm
+from vehiclemor.cli import main
+from vehiclemor.cli.key_values import parsed
+from vehiclemor.codegen import derivation, object_cache
+from vehiclemor.parameters import load_parameters
+from vehiclemor.registry import component, names
+from vehiclemor.report.description.schema import SCHEMAS, words
+from vehiclemor.resources import data_names, handbook_folder
+from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.toml_files import FileSchema
+
+
+@pytest.mark.parametrize("name", names("model"))
+def test_a_model_shows_all_that_it_declares(name):
+    model, definition = vm.model(name), component("model", name)
+    shown = vm.describe(name)
+    for kind in ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints"):
+        declared = [(q.name, q.unit, q.long_name) for q in getattr(definition, kind)]
+        assert [tuple(row.values()) for row in shown[kind]] == declared
+    entries = load_parameters(name, definition.parameters, definition.parameter_file).entries
+    for row, (parameter, entry) in zip(shown["parameters"], entries.items(), strict=True):
+        assert (row["name"], row["value"], row["unit"]) == (parameter, entry.value, entry.unit)
+        assert (row["status"], row["source"]) == (entry.status, entry.source)
+    assert {row["source"] for row in shown["sources"]} >= {e.source for e in entries.values()}
+    assert shown["starts"] == list(model.starts)
+    accepting = [m for m in names("method") if component("method", m).accepts(model)[0]]
+    assert shown["methods"] == accepting
+
+
+@pytest.mark.parametrize("name", names("method"))
+def test_a_method_shows_every_setting_of_every_kind(name):
+    models = {model: vm.model(model) for model in names("model")}
+    shown, method = vm.describe(name), component("method", name)
+    for kind, declared in method.settings.items():
+        (table,) = [rows for key, rows in shown.items() if {"settings,", kind} <= set(key.split())]
+        assert [row["name"] for row in table] == list(declared.model_fields)
+        for row, field in zip(table, declared.model_fields.values(), strict=True):
+            assert row["meaning"] == field.description
+            assert row["default"] == field.default
+    presets = {(row["preset"], row["kind"]) for row in shown["presets"]}
+    assert presets == {(p, kind) for kind in method.settings for p in method.presets_of(kind)}
+    for row in shown["models"]:
+        accepted, reason = method.accepts(models[row["model"]])
+        assert (row["accepted"], row["reason"]) == ("yes" if accepted else "no", reason)
+
+
+def test_choices_and_bounds_of_settings_are_shown():
+    rows = {row["name"]: row for row in vm.describe("full_order")["settings, kind ode and dae"]}
+    assert rows["solver"]["type"].startswith("dopri5, rodas4, ros34pw2")
+    assert rows["tolerance"]["type"] == "number >= 1e-13"
+
+
+@pytest.mark.parametrize("name", names("maneuver"))
+def test_a_maneuver_shows_its_inputs_and_the_models_it_drives(name):
+    shown, maneuver = vm.describe(name), component("maneuver", name)
+    assert [row["name"] for row in shown["inputs"]] == list(maneuver.inputs)
+    signals = maneuver.at(maneuver.times)
+    assert [row["largest"] for row in shown["inputs"]] == signals.max(axis=0).tolist()
+    for model in shown["models"]:
+        assert vm.model(model).inputs == maneuver.inputs
+
+
+def test_a_study_shows_its_grid():
+    for name in data_names("studies"):
+        shown, definitions = vm.describe(name), load_studies(name)
+        if name in definitions and definitions[name].grid:
+            assert shown["grid points"] == definitions[name].points
+            assert [row["dimension"] for row in shown["grid"]] == list(definitions[name].grid)
+    members = {row["study"]: row["grid points"] for row in vm.describe("paper")["studies"]}
+    assert members["figure-13-frequency"] == 31 * 5
+    assert vm.describe("paper")["grid points"] == sum(members.values())
+    assert "42 test" in vm.describe("predictive")["protocol independent_suspension_vehicle"]["runs"]
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_schema_of_a_file_has_every_key(name):
+    shown = vm.describe(name)
+    assert [row["name"] for row in shown["keys"]] == list(SCHEMAS[name].model_fields)
+    for fields, rows in (
+        (SCHEMAS[name].model_fields, shown["keys"]),
+        *((part.model_fields, shown[part.__name__]) for part in parts(SCHEMAS[name])),
+    ):
+        for row, field in zip(rows, fields.values(), strict=True):
+            assert row["meaning"] == (field.description or "")
+            assert (row["default"] == "required") is field.is_required()
+
+
+def parts(schema):
+    """Classes of the tables of a file."""
+    classes = {part.__name__: part for part in FileSchema.__subclasses__()}
+    return [classes[name] for name in schema.model_json_schema().get("$defs", ())]
+
+
+def test_words_of_types():
+    class File(BaseModel):
+        values: list[int | float | str]
+        table: dict[str, list[float]] | None = None
+        flag: bool = True
+
+    shown = {key: words(part) for key, part in File.model_json_schema()["properties"].items()}
+    assert shown == {
+        "values": "list of number or text",
+        "table": "table of list of number",
+        "flag": "true or false",
+    }
+
+
+def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, tmp_path):
+    monkeypatch.setattr(object_cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(derivation, "cache_folder", lambda: tmp_path)
+    starts = {name: vm.describe(name)["starts"] for name in names("model")}
+    assert starts["double_wishbone"] == ["equilibrium"]
+    assert starts["independent_suspension_vehicle"] == ["equilibrium", "dropped"]
+    assert starts["high_fidelity_vehicle"] == ["known once the model has been simulated"]
+    assert "pod" in vm.describe("high_fidelity_vehicle")["methods"]
+    assert {row["accepted"] for row in vm.describe("slow_manifold")["models"]} == {"no", "?"}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_parameters_that_are_overridden_are_shown(capsys):
+    assert (
+        main(["show", "double_wishbone", "--parameter", "wheel_centre=0,0.8,-0.1", "--json"]) == 0
+    )
+    rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)["parameters"]}
+    assert rows["wheel_centre"]["value"] == [0.0, 0.8, -0.1]
+    assert rows["wheel_centre"]["source"] == "override"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["pood"], ["unknown name", "pod"]),
+        (["double_wishbon"], ["unknown name", "double_wishbone"]),
+        (["figure_11"], ["unknown name", "figure-11"]),
+        (["study-shema"], ["unknown name", "study-schema"]),
+        (["none.toml"], ["none.toml", "no such file"]),
+        (["double_wishbone", "--parameter", "wheel_centr=1"], ["not a parameter", "wheel_centre"]),
+        (["double_wishbone", "--parameter", "wheel_centre=1"], ["3 components"]),
+        (["double_wishbone", "--parameter", "wheel_centre"], ["key=value"]),
+        (["high_fidelity_vehicle", "--parameter", "gravity=1e3"], ["gravity", "m/s^2", "above"]),
+    ],
+)
+def test_wrong_names_and_parameters(fails, arguments, words):
+    fails(["show", *arguments], *words)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("3", 3),
+        ("-2", -2),
+        ("2.5", 2.5),
+        ("1e-6", 1e-6),
+        ("fast", "fast"),
+        ("", ""),
+        ("3a", "3a"),
+        ("1,2.5", [1.0, 2.5]),
+        ("theta,alpha", "theta,alpha"),
+    ],
+)
+def test_text_of_the_command_line_gets_its_kind(text, value):
+    assert parsed(text) == value
+    assert type(parsed(text)) is type(value)
+
+
+def test_the_handbook_is_where_the_help_says(capsys):
+    assert (handbook_folder() / "add-a-model-or-method.md").is_file()
+    assert main(["--help"]) == 0
+    assert str(handbook_folder())[:20] in capsys.readouterr().out.replace("\n", "")
