@@ -18,7 +18,7 @@ from vehiclemor.report.published import rms_numbers
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.method_settings import accepted, complete_settings, default_settings
+from vehiclemor.study.method_settings import complete_settings, default_settings
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.
@@ -74,7 +74,7 @@ def methods(model: Model) -> dict[str, tuple[str, str]]:
         except InputError:
             # A broken plug-in is named by `vehiclemor list`, and harmless elsewhere.
             continue
-        if accepted(model, method):
+        if method.accepts(model)[0]:
             found[name] = (name, "recommended")
     presets = {label: e for label, e in FIRST.items() if e[0] in found and _has(model, *e)}
     return presets | found

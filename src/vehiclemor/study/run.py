@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,9 @@ from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# Points of a grid that take their time before the first is computed.
+LARGE = 10_000
 
 
 def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
@@ -59,7 +63,8 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
 
 
 def _expanded(name: str, definition: StudyFile) -> Grid:
-    with telling(f"{name}: a grid of {definition.cells} cells"):
+    large = definition.points >= LARGE
+    with telling(f"{name}: a grid of {definition.points} points") if large else nullcontext():
         grid = expand(name, definition)
         # Made here: the keys take most of the time.
         assert grid.unique

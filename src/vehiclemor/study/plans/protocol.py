@@ -11,7 +11,7 @@ from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
-from vehiclemor.study.method_settings import Settings, accepted, complete_settings
+from vehiclemor.study.method_settings import Settings, complete_settings
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
@@ -161,7 +161,7 @@ def _contestant(
         preset = str(settings.pop("preset", "recommended"))
         complete = complete_settings(model, entry.method, settings, preset)
         # Of a method that refuses the model all candidates are empty.
-        if complete in candidates and accepted(model, method):
+        if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)
     known = {scenario.maneuver.name for scenario in sets["training"]}
