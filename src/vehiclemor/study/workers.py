@@ -66,6 +66,7 @@ class Workers:
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
         self._report()
+        faults: list[str] = []
         for left in reversed(range(TRIES)):
             work = self._missing(groups)
             if not work:
