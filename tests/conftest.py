@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from vehiclemor import registry
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.reduction.training import training_runs

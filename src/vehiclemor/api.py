@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vehiclemor.maneuvers import Maneuver
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
 
@@ -164,7 +164,8 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    from vehiclemor.maneuvers import Maneuver
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
+    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
@@ -182,14 +183,11 @@ def simulate(
     chosen = complete_settings(ready, method, settings, preset)
     if start is None:
         start = ready.starts[0]
-    elif not isinstance(start, str):
-        start = tuple(ready.start(start).tolist())
-    test = Scenario(base.perturbed(frequency, amplitude), start)
+    own = start if isinstance(start, str) else tuple(ready.start(start).tolist())
+    test = Scenario(base.perturbed(frequency, amplitude), own)
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
     dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
-    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
-
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError
@@ -276,11 +274,15 @@ def plot(
     VehiclemorError
         If there is no such result, kind or point, or the result holds no histories.
     """
+    import xarray as xr
+
     from vehiclemor.report.accessor import ResultAccessor
     from vehiclemor.report.result_selection import stored_result
 
     if isinstance(result, str | Path):
-        result = stored_result(str(result), Path(results))
+        result = stored_result(str(result), file_path("results", results))
+    if not isinstance(result, xr.Dataset):
+        raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
     return ResultAccessor(result).plot(kind, path, **at)
 
 

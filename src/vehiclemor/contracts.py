@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated

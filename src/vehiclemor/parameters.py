@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import field_validator
+from pydantic import Field, field_validator
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
@@ -48,19 +48,21 @@ def point() -> Declared:
 class Source(FileSchema):
     """Where values come from, and under which licence they are used."""
 
-    text: str
-    licence: str
+    text: str = Field(description="the publication or file, so that it can be found")
+    licence: str = Field(description="under which its values are used")
 
 
 class Parameter(FileSchema):
     """One entry of a parameter file."""
 
-    value: float | list[float]
-    unit: str
-    source: str
-    status: Literal["published", "derived", "assumed"]
-    symbol: str
-    description: str
+    value: float | list[float] = Field(description="a number, or a point [x, y, z]")
+    unit: str = Field(description="the SI unit that the model declares")
+    source: str = Field(description="one of `sources`")
+    status: Literal["published", "derived", "assumed"] = Field(
+        description="as the source has it, computed from that, or chosen"
+    )
+    symbol: str = Field(description="in the notation")
+    description: str = Field(description="what it is")
 
     @field_validator("value")
     @classmethod
@@ -74,10 +76,10 @@ class Parameter(FileSchema):
 class ParameterFile(FileSchema):
     """Schema of `data/parameters/*.toml`."""
 
-    model: str
-    title: str
-    sources: dict[str, Source]
-    parameters: dict[str, Parameter]
+    model: str = Field(description="registered name")
+    title: str = Field(description="one line")
+    sources: dict[str, Source] = Field(description="key -> where values come from")
+    parameters: dict[str, Parameter] = Field(description="name -> value; all that the model needs")
 
 
 @dataclass(frozen=True)

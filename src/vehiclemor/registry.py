@@ -19,9 +19,9 @@ GROUPS = {
 }
 # Class of the components of a kind, named as in an entry point: most stand in a layer above.
 CLASSES = {
-    "model": "vehiclemor.models.definition:ModelDefinition",
+    "model": "vehiclemor.multibody.definition:ModelDefinition",
     "method": "vehiclemor.reduction.interface:Method",
-    "maneuver": "vehiclemor.maneuvers:Maneuver",
+    "maneuver": "vehiclemor.maneuver:Maneuver",
 }
 
 
@@ -67,6 +67,8 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
 
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
+    if kind not in GROUPS:
+        raise unknown("kind of component", kind, GROUPS)
     found: dict[str, EntryPoint] = {}
     # Sorted so that a built-in comes last: no plug-in takes its name away.
     for entry in sorted(entry_points(group=GROUPS[kind]), key=_is_built_in):

@@ -27,8 +27,8 @@ def _short(value: Any) -> str:
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple):
         return f"{type(value).__name__}{shape}"
-    if isinstance(value, ShortRepr) and hasattr(value, "name"):
-        return f"{type(value).__name__} {value.name!r}"
+    if isinstance(value, ShortRepr) and (name := getattr(value, "name", "")):
+        return f"{type(value).__name__} {name!r}"
     if isinstance(value, Mapping):
         return f"{{{', '.join(map(str, [*value][:4]))}{', ...' if len(value) > 4 else ''}}}"
     if callable(value):
@@ -37,7 +37,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
-LONGEST = 80
+LONGEST = 60
 _CUT = reprlib.Repr()
 _CUT.maxtuple = _CUT.maxlist = 4
 _CUT.maxstring = _CUT.maxother = LONGEST

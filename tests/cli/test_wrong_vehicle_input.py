@@ -7,7 +7,7 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.errors import VehiclemorError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 
 NAME = "independent_suspension_vehicle"
 SIMULATE = ("simulate", NAME)

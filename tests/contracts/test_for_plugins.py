@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor import contracts
-from vehiclemor.models.quantities import Quantity
-from vehiclemor.models.report import ModelReport, TimingCase
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.report import ModelReport, TimingCase
 from vehiclemor.registry import component, names
 
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
@@ -69,7 +69,7 @@ def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message:
     ("change", "message"),
     [
         ({"inputs": (Quantity("s0", "m", "one"), Quantity("z", "m", "two"))}, "other inputs"),
-        ({"coordinates": (Quantity("one", "m", "one"),)}, "residual has shape"),
+        ({"coordinates": (Quantity("one", "m", "one"),), "stops": {}}, "residual has shape"),
         ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
         (
             {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component, names
 
 

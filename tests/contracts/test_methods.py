@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import KINDS
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import training_runs

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build

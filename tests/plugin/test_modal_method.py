@@ -12,7 +12,7 @@ import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.contracts import check_method
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import Trajectory

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 import vehiclemor as vm
 from vehiclemor.contracts import check_method, check_model
-from vehiclemor.models import report
+from vehiclemor.multibody import report
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 

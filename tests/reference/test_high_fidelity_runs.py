@@ -19,7 +19,7 @@ from tests.oracles.projected_simulation import (
     simulate_projected,
     without_stabilisation,
 )
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel

@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from sksundae.cvode import CVODE
 
 from tests.oracles import vehicle_lagrange as oracle
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build

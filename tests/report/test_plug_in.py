@@ -9,7 +9,7 @@ import pytest
 
 from vehiclemor import registry
 from vehiclemor.cli import main
-from vehiclemor.models.report import paper_cases
+from vehiclemor.multibody.report import paper_cases
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import legend, nominal, unseen
 from vehiclemor.report.errors import study_tables

@@ -8,7 +8,7 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError, UnreachableError
-from vehiclemor.maneuvers import sine_travel
+from vehiclemor.maneuver import sine_travel
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import evaluate

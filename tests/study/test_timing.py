@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import sine_travel
-from vehiclemor.models.report import TimingCase
+from vehiclemor.maneuver import sine_travel
+from vehiclemor.multibody.report import TimingCase
 from vehiclemor.simulation.build import build
 from vehiclemor.study import timing
 from vehiclemor.study.scenario import Scenario, input_hash

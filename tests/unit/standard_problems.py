@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape

@@ -8,19 +8,20 @@ import pytest
 import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.errors import InputError
+from vehiclemor.registry import component
 
 
 @pytest.fixture
 def plug_in(tmp_path, monkeypatch):
-    """Register a module text as a method, beside the built-ins."""
+    """Register a module text as a method or else, beside the built-ins."""
 
-    def register(name, text, attribute=""):
+    def register(name, text, attribute="", kind="method"):
         # A name of its own in each test: what was imported before stays imported.
         module = f"{name}_{tmp_path.name}"
         (tmp_path / f"{module}.py").write_text(text)
         monkeypatch.syspath_prepend(tmp_path)
         known = {kind: dict(registry._entries(kind)) for kind in registry.GROUPS}
-        known["method"][name] = EntryPoint(name, f"{module}{attribute}", registry.GROUPS["method"])
+        known[kind][name] = EntryPoint(name, f"{module}{attribute}", registry.GROUPS[kind])
         monkeypatch.setattr(registry, "_entries", known.__getitem__)
 
     return register
@@ -166,3 +167,76 @@ def test_a_declaration_that_is_none_is_listed_with_what_is_wrong(faulty, change,
     with pytest.raises(InputError, match="faulty") as error:
         vm.simulate("double_wishbone", "faulty")
     assert "\n" not in str(error.value)
+
+
+CAR = """
+from dataclasses import replace
+import numpy as np
+import sympy as sp
+from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.tape import Tape
+from vehiclemor_quarter_car import quarter_car
+def derived(derivative, outputs):
+    x = sp.symbols("z_s z_u v_s v_u", real=True)
+    u, p = sp.symbols("road", real=True), sp.symbols([f"p_{n}" for n in quarter_car.PARAMETERS])
+    functions = {"derivative": (derivative(x), (4,)), "outputs": (outputs, (len(outputs),))}
+    return lambda: assemble(Tape(), {"x": x, "u": [u]}, p, functions)
+def faulty(**changes):
+    return replace(quarter_car.DEFINITION, name="faulty", **changes)
+"""
+
+
+@pytest.fixture
+def car(plug_in, plug_in_package, tmp_path):
+    """The quarter car with a change, as the model `faulty` of its own parameter file."""
+    source = (
+        component("model", "quarter_car")
+        .parameter_file.read_text()
+        .replace('"quarter_car"', '"faulty"')
+    )
+    (tmp_path / "faulty.toml").write_text(source)
+
+    def build(change):
+        plug_in("faulty", f"{CAR}\nDEFINITION = {change}\n", ":DEFINITION", "model")
+        return vm.model("faulty", parameter_file=tmp_path / "faulty.toml")
+
+    return build
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("faulty(derive=lambda: 1 / 0)", "equations can't be derived: ZeroDivisionError"),
+        ("faulty(derive=lambda: None)", "equations can't be derived: AttributeError"),
+        (
+            "faulty(derive=derived(lambda x: x[:3], [0, 0, 0]))",
+            "can't be derived: ValueError: derivative has 3 results",
+        ),
+        ("faulty(derive=derived(lambda x: x, [0]))", r"outputs has shape \(1,\), not \(3,\)"),
+        ("faulty(check=lambda p: 1 / 0)", "model 'faulty': check: ZeroDivisionError"),
+        ("faulty(starts=lambda p: 1 / 0)", "model 'faulty': starts: ZeroDivisionError"),
+        ("faulty(starts=lambda p: None)", "model 'faulty': starts: AttributeError"),
+        ("faulty(starts=lambda p: {})", "model 'faulty' has no start"),
+        ("faulty(starts=lambda p: {'a': [0.0]})", r"start 'a' has shape \(1,\), faulty needs"),
+        ("faulty(starts=lambda p: {'a': [np.nan] * 4})", r"start 'a'\[0\] is not finite"),
+        ("faulty(solved=('a',))", "model 'faulty': solve_equilibrium: KeyError: 'a'"),
+        ("faulty(summary=None)", "name and summary of a model must be text"),
+        ("faulty(coordinates=('a', 'b'))", "coordinates must be quantities with units"),
+        ("faulty(outputs=())", "outputs are missing or named twice"),
+        ("faulty(parameters={'a': 3})", "parameter 'a' is not declared by a unit"),
+        ("replace(faulty(), name='other')", "names itself 'other': it must be the same name"),
+    ],
+)
+def test_a_model_that_breaks_is_named(car, change, words):
+    with pytest.raises(InputError, match=words) as error:
+        car(change)
+    assert "\n" not in str(error.value)
+    assert "faulty" in vm.models()
+
+
+def test_plain_numbers_among_the_results_of_a_model(car):
+    model = car("faulty(derive=derived(lambda x: [x[2], x[3], 0, -1.5], [0, 1, 2.5]))")
+    np.testing.assert_array_equal(model.derivative([0, 0, 1, 2], 0.0), [1, 2, 0, -1.5])
+    np.testing.assert_array_equal(
+        model.outputs_at(np.zeros((2, 4)), np.zeros((2, 1))), [[0, 1, 2.5]] * 2
+    )

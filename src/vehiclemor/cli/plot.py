@@ -29,7 +29,7 @@ def plot(
         What is drawn.
     select
         dimension=value: a point of the study's grid; may be given several times.  Else factors are
-        1 and the others first; all methods are drawn.
+        1 and the others first, and errors are over the whole grid; all methods are drawn.
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
     results
@@ -37,10 +37,10 @@ def plot(
     """
     picture = picture_file("--out", [] if out is None else [out], f"{Path(result).stem}-{kind}")
     from vehiclemor.report.figures.result_plot import plot_result
-    from vehiclemor.report.result_selection import at_point, stored_result
+    from vehiclemor.report.result_selection import drawn, stored_result
 
     chosen = key_values("--select", select)
-    dataset, point = at_point(stored_result(result, results), chosen)
+    dataset, point = drawn(stored_result(result, results), kind, chosen)
     plot_result(dataset, picture, kind)
     if point:
         print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))

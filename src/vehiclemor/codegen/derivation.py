@@ -23,7 +23,7 @@ from vehiclemor.short_repr import ShortRepr
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
 
-LAYERS = ("models", "symbolic", "codegen")
+LAYERS = ("multibody", "symbolic", "codegen")
 
 
 @dataclass(frozen=True)

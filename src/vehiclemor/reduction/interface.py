@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError, blamed
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr

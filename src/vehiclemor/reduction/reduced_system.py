@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import unknown
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.registry import unknown

@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.files import write_text
-from vehiclemor.models.report import default_rank
+from vehiclemor.multibody.report import default_rank
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.resources import data_names

@@ -34,6 +34,8 @@ LABELS = {
     "vertical_speed": Label("vertical speed", "$v_z$", "v_z"),
 }
 
+PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
+
 
 def label_of(output: str) -> Label:
     """The label of an output; of one that has no symbol its name in words."""
@@ -46,13 +48,26 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
     return str(dataset["output_unit"].sel(output=output).item())
 
 
-def axis_label(dataset: xr.Dataset, output: str) -> str:
-    """Words, symbol and unit of an output."""
+def method_text(label: str) -> str:
+    """A method's label in a study, as a legend says it."""
+    return label.replace("pod", "POD").replace("_", " ")
+
+
+def readable_unit(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and prefixed unit in which values up to `largest` have few digits."""
+    if not unit.startswith(("m", "rad")) or not 0.0 < largest < 0.1:
+        return 1.0, unit
+    factor, prefix = next((f, p) for f, p in PREFIXES if f * largest >= 0.1 or p == "n")
+    return factor, prefix + unit
+
+
+def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
+    """Words, symbol and unit (the output's own by default) of an output."""
     label = label_of(output)
     symbol = "" if label.symbol == label.words else f" {label.symbol}"
-    return f"{label.words}{symbol} ({unit_of(dataset, output)})"
+    return f"{label.words}{symbol} ({unit or unit_of(dataset, output)})"
 
 
-def error_label(dataset: xr.Dataset, kind: str, output: str) -> str:
+def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> str:
     """An error of an output, its symbol and unit, such as `RMS error`."""
-    return f"{kind} of {label_of(output).symbol} ({unit_of(dataset, output)})"
+    return f"{kind} of {label_of(output).symbol} ({unit or unit_of(dataset, output)})"

@@ -6,18 +6,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.files import make_folder, write_text, write_whole
+from vehiclemor.files import make_folder, write_text
 from vehiclemor.study.run import run_studies
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
-
-FORMATS = ("svg", "png")
 
 
 def regenerate_figures(
-    results: Path, out: Path, only: Sequence[str] = (), jobs: int = 1
+    results: Path,
+    out: Path,
+    only: Sequence[str] = (),
+    jobs: int = 1,
+    *,
+    style: str = "",
+    dpi: int | None = None,
 ) -> list[Path]:
     """Draw figures, by default those of the paper and an index of their captions; files written.
 
@@ -28,12 +31,8 @@ def regenerate_figures(
     InputError, FileError
         If a name is unknown or a folder can't be written.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
+    from vehiclemor.report.figures.saving import FORMATS, save_figure, styled
 
     defaults = [name for name, entry in FIGURES.items() if entry.default]
     chosen = {name: find(name, results) for name in only or defaults}
@@ -44,13 +43,10 @@ def regenerate_figures(
     written: list[Path] = []
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
-        with plt.style.context(Path(__file__).with_name("style.mplstyle")):
+        with styled(style, dpi):
             figure = entry.draw(data)
-            for suffix in FORMATS:
-                path = out / f"figure-{name}.{suffix}"
-                _save(figure, path)
-                written.append(path)
-            plt.close(figure)
+            files = [out / f"figure-{name}.{suffix}" for suffix in FORMATS]
+            written += [save_figure(figure, path) for path in files]
         origin = ""
         if entry.studies:
             hashes = sorted({str(data[study].attrs["kernel_hash"]) for study in entry.names})
@@ -67,9 +63,3 @@ def regenerate_all(results: Path, out: Path, jobs: int = 1) -> list[Path]:
 
     written = regenerate_figures(results, out / "figures", (), jobs)
     return written + regenerate_tables(results, out / "tables", jobs)
-
-
-def _save(figure: Figure, path: Path) -> None:
-    # Without a date, two regenerations give the same bytes.
-    metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    write_whole(path, lambda temporary: figure.savefig(temporary, metadata=metadata))

@@ -33,22 +33,26 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
     return read_dataset(path, "source", "vehiclemor")
 
 
-def at_point(dataset: xr.Dataset, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
-    """A result at one point of its grid, all methods beside each other, and the point in words.
+def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
+    """What of a result is drawn: one point of a study's grid with all methods, told in words.
 
-    A dimension that is not chosen is at its nominal or first value.
+    A dimension that is not chosen is at its nominal or first value; errors are drawn over the
+    whole grid where nothing is chosen.
 
     Raises
     ------
     InputError
         If the result has no such dimension or value.
     """
+    if "status" not in dataset or "configuration" not in dataset.attrs:
+        raise InputError("neither a run nor a study that can be drawn")
     grid = [str(d) for d in dataset["status"].dims]
     for key in chosen:
         if key not in grid:
             raise unknown("dimension of the result", key, grid)
     words = []
-    for dimension in grid:
+    # A grid has methods; what has none, such as a timing, is refused where it is drawn.
+    for dimension in grid if "method" in grid and (chosen or kind != "errors") else ():
         values = dataset[dimension].values.tolist()
         if dimension == "method" and dimension not in chosen:
             continue

@@ -10,8 +10,8 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import DESIGN_START
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import unknown
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
@@ -204,6 +204,7 @@ class AlgebraicModel(Model):
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
         check_positive("tolerance", tolerance)
+        times = checked_array(times, np.size(times), "times", self.name)
         inputs = checked_inputs(inputs, times, self.inputs)
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())

@@ -13,7 +13,7 @@ from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
-from vehiclemor.models.definition import DESIGN_START, ModelDefinition, Values
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, Values
 from vehiclemor.parameters import ParameterSet, load_parameters
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component

@@ -7,8 +7,8 @@ import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -109,6 +109,8 @@ def check_resolved(maneuver: Maneuver) -> None:
     straight line, as a sine of three samples a period does; it may leave it once.
     """
     times, between = maneuver.times, 0.38
+    if len(times) == 1:
+        return
     step = times[1]
     values = maneuver.at(times)
     inside = maneuver.at(times[:-1] + between * step)

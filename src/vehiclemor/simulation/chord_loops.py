@@ -104,7 +104,7 @@ def chord_path(
             if taken > 0:
                 break
         if taken < 0:
-            taken = approach(q, u, target, mechanism, 0, iteration, work)
+            taken = approach(q, u, target, mechanism, iteration, work)
             evaluations += abs(taken)
             jacobians += abs(taken)
             if taken < 0:

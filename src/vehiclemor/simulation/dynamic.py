@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import check_inputs, cut_short, left_validity, lifted_wheels
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space

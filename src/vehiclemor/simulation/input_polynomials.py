@@ -13,7 +13,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11

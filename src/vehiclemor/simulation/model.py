@@ -12,8 +12,8 @@ import numpy as np
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
@@ -160,6 +160,7 @@ class Model(ShortRepr):
         finite
             Whether to refuse what is no number, as a trajectory is after it has failed.
         """
+        self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
         return along(self.kernels, function, self.constants, (states, inputs), sizes, finite)
 
@@ -167,7 +168,8 @@ class Model(ShortRepr):
         """Raise `InputError` if the model's equations lack one of these functions."""
         for name in functions:
             if name not in self.equations.shapes:
-                raise InputError(f"{self.name} has no {name}: {NEEDED_FOR[name]}")
+                needed = NEEDED_FOR.get(name, f"it has {', '.join(self.equations.shapes)}")
+                raise InputError(f"{self.name} has no {name}: {needed}")
 
     def evaluated(self, function: str, state: Any, u: Any) -> np.ndarray:
         """Result of a function of the equations at a state (n,) and inputs.
@@ -177,8 +179,7 @@ class Model(ShortRepr):
         InputError
             If the model has no such function, or a value isn't finite.
         """
-        if function in NEEDED_FOR:
-            self.require(function)
+        self.require(function)
         result = np.empty(self.equations.shapes[function])
         state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
         self.kernels.call(function, state, u, self.constants, result)

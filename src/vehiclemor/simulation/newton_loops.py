@@ -231,7 +231,7 @@ def newton(q, u, mechanism, dense, iteration, work):
     return -iteration.limit
 
 
-def moved(q, u, place, target, mechanism, dense, iteration, work):
+def moved(q, u, place, target, mechanism, iteration, work):
     """Move one input of a solved position to a target in steps that stay on the branch.
 
     Returns
@@ -248,7 +248,7 @@ def moved(q, u, place, target, mechanism, dense, iteration, work):
         u[place] = target
         if abs(target - before) > length:
             u[place] = before + math.copysign(length, target - before)
-        taken = newton(q, u, mechanism, dense, iteration, work)
+        taken = newton(q, u, mechanism, 0, iteration, work)
         iterations += abs(taken)
         if taken > 0 and within(q, mechanism.stops):
             length = min(2.0 * length, iteration.largest_increment)
@@ -270,7 +270,7 @@ def within(q, stops):
     return inside
 
 
-def approach(q, u, target, mechanism, dense, iteration, work):
+def approach(q, u, target, mechanism, iteration, work):
     """From the design position to the inputs of a target, one after the other, the height last.
 
     Returns
@@ -284,7 +284,7 @@ def approach(q, u, target, mechanism, dense, iteration, work):
         u[i] = 0.0
     iterations = 0
     for place in range(INPUTS - 1, -1, -1):
-        taken = moved(q, u, place, target[place], mechanism, dense, iteration, work)
+        taken = moved(q, u, place, target[place], mechanism, iteration, work)
         iterations += abs(taken)
         if taken < 0:
             return -iterations
@@ -321,7 +321,7 @@ def newton_path(
             taken = newton(q, u, mechanism, dense, iteration, work)
             iterations += abs(taken)
             if taken < 0:
-                taken = approach(q, u, target, mechanism, dense, iteration, work)
+                taken = approach(q, u, target, mechanism, iteration, work)
                 iterations += abs(taken)
                 if taken < 0:
                     return stopped(counts, iterations, iterations, OFF_BRANCH)
@@ -348,7 +348,7 @@ def travel_limit(
     q, u, _, _, work = scratch(mechanism.start, buffer)
     status = CONVERGED
     for place in range(INPUTS - 1, -1, -1):
-        if moved(q, u, place, target[place], mechanism, 0, iteration, work) < 0 and place:
+        if moved(q, u, place, target[place], mechanism, iteration, work) < 0 and place:
             status = OFF_BRANCH
             break
     for i in range(INPUTS):

@@ -12,7 +12,7 @@ import numpy as np
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Ready, ready
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, loop_array, output_times
 from vehiclemor.simulation.input_polynomials import signal_of

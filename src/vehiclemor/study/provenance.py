@@ -11,10 +11,10 @@ from vehiclemor.registry import component
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
 # Layers whose source determines results; tables, figures and the command line come after them.
-LAYERS = ("models", "symbolic", "codegen", "simulation", "reduction")
+LAYERS = ("multibody", "symbolic", "codegen", "simulation", "reduction")
 FILES = (
     "parameters.py",
-    "maneuvers.py",
+    "maneuver.py",
     "steering_maneuvers.py",
     "metrics.py",
     "study/scenario.py",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import Offline, ReducedModel
 from vehiclemor.simulation.model import Model

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.arguments import count
+from vehiclemor.arguments import count, within
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
@@ -17,6 +17,8 @@ from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
+
+MOST_JOBS = 1024
 
 
 def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
@@ -37,7 +39,7 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
         Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
         is `predictive-<protocol>`.
     """
-    count("jobs", jobs)
+    within("jobs", count("jobs", jobs), (1, MOST_JOBS))
     definitions = load_studies(study)
     protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
     grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import TrainingRun, policy_factors
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.checks import check_inputs, check_resolved

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.report import TimingCase
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.report import TimingCase
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model

@@ -144,7 +144,7 @@ def _sympified(name: str, expressions: Sequence[object], shape: tuple[int, ...])
             sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I
         ):
             raise ValueError(f"{name}: {expression} is no real number")
-    return found
+    return cast("list[sp.Expr]", found)
 
 
 def _share(

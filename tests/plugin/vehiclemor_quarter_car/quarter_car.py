@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.quantities import Quantity
-from vehiclemor.models.vehicle_parameters import DAMPING, LENGTH, MASS, STIFFNESS
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.vehicle_parameters import DAMPING, LENGTH, MASS, STIFFNESS
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
 

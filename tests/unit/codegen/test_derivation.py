@@ -16,7 +16,7 @@ from vehiclemor.codegen import derivation as kept
 from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation, derived
 from vehiclemor.codegen.kernel_text import operation_counts, reference_source
-from vehiclemor.models import definition
+from vehiclemor.multibody import definition
 from vehiclemor.symbolic.program import Program
 
 NAME = standard_problems.NAME

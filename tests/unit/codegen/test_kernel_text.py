@@ -17,7 +17,7 @@ from vehiclemor.codegen.kernel_text import (
     reference_source,
     work_size,
 )
-from vehiclemor.models.double_wishbone.definition import DEFINITION
+from vehiclemor.multibody.double_wishbone.definition import DEFINITION
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape

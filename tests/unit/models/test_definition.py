@@ -10,9 +10,9 @@ import pytest
 from tests.unit import standard_problems
 from vehiclemor import registry
 from vehiclemor.errors import InputError
-from vehiclemor.models.definition import ModelDefinition
-from vehiclemor.models.quantities import Quantity
-from vehiclemor.models.report import ModelReport, TimingCase
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.report import ModelReport, TimingCase
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import load_published
 from vehiclemor.resources import data_names
@@ -131,7 +131,7 @@ def test_declarations_are_read_without_sympy():
     text = (
         "import sys; from vehiclemor.registry import component, names;"
         "[component('model', name) for name in names('model')];"
-        "from vehiclemor.models.high_fidelity import frozen_quantities;"
+        "from vehiclemor.multibody.high_fidelity import frozen_quantities;"
         "print([m for m in ('sympy', 'scipy', 'numba', 'xarray') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)

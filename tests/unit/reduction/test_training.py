@@ -5,7 +5,7 @@ import pytest
 
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import POLICIES, training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vehiclemor.errors import InputError, UnreachableError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
@@ -58,19 +59,10 @@ def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: Algebrai
     assert model.solve_path(times, np.column_stack([heights, racks])).status == "ok"
 
 
-@pytest.mark.parametrize(
-    ("solver", "share"),
-    [
-        ("newton", 0.99),
-        ("newton_dense", 0.99),
-        ("chord", 0.6),
-    ],
-)
-def test_sudden_jumps_of_the_input_stay_on_the_branch(
-    model: AlgebraicModel, solver: str, share: float
-) -> None:
+@pytest.mark.parametrize("solver", ["newton", "newton_dense", "chord"])
+def test_sudden_jumps_of_the_input_stay_on_the_branch(model: AlgebraicModel, solver: str) -> None:
     low, high = model.reach()
-    stops = share * np.array([high, low, high, 0.0])
+    stops = 0.99 * np.array([high, low, high, 0.0])
     inputs = np.column_stack([stops, np.zeros(4)])
     jumps = model.solve_path(np.arange(4.0), inputs, solver).coordinates
     for stop, q in zip(stops, jumps, strict=True):
@@ -114,6 +106,36 @@ def test_chord_solver_needs_one_residual_a_sample(
     assert np.abs(exact.coordinates - full.coordinates).max() < 1e-11
 
 
+def test_chord_solver_goes_as_far_as_newton(model: AlgebraicModel, nominal: Maneuver) -> None:
+    far = nominal.perturbed(amplitude=2.14)
+    newton, chord = model.simulate(far), model.simulate(far, solver="chord")
+    assert np.abs(chord.coordinates - newton.coordinates).max() < 1e-9
+    # Its first inverse, those that it makes anew, and what Newton's method takes.
+    assert 1 < chord.counts["jacobian_evaluations"] < 0.1 * newton.counts["jacobian_evaluations"]
+    assert chord.counts["iterations"] == chord.counts["residual_evaluations"]
+
+
+@pytest.mark.parametrize("solver", ["newton", "newton_dense", "chord"])
+def test_a_run_that_diverges_tells_its_counts(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, solver: str
+) -> None:
+    # No step gets as small as this tolerance.
+    with pytest.raises(ConvergenceError, match="does not contract") as error:
+        model.simulate(nominal, solver=solver, tolerance=1e-30)
+    run = error.value.trajectory
+    assert run.status == "diverged"
+    assert run.counts["iterations"] > 100
+    assert run.counts["linear_solves"] == run.counts["iterations"]
+    diverged = FullOrderModel(model, solver, 1e-30).simulate(nominal, "equilibrium")
+    assert (diverged.status, diverged.counts) == (run.status, run.counts)
+
+
+def test_coordinates_are_no_start(model: AlgebraicModel, nominal: Maneuver) -> None:
+    for start in (np.zeros(8), model.design, [0.0] * 8):
+        with pytest.raises(InputError, match="starts from 'equilibrium' alone"):
+            model.simulate(nominal, start=start)
+
+
 def test_runs_are_bitwise_repeatable(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory
 ) -> None:
@@ -146,7 +168,10 @@ def test_wrong_arguments_are_one_line(
             function(q, u)
 
 
-@pytest.mark.parametrize("times", [[], [0.0, 2.0, 1.0], [0.0, 11.0], 1.0, [[0.0, 1.0]], "abc"])
+@pytest.mark.parametrize(
+    "times",
+    [[], [0.0, 2.0, 1.0], [0.0, 11.0], [-1.0, 0.0], [0.0, np.nan], 1.0, [[0.0, 1.0]], "abc"],
+)
 def test_wrong_output_times_are_one_line(model: AlgebraicModel, nominal: Maneuver, times) -> None:
     with pytest.raises(InputError, match="output times"):
         model.simulate(nominal, times=times)
@@ -162,6 +187,12 @@ def test_a_tolerance_that_means_nothing_is_one_line(model, nominal, tolerance) -
 def test_inputs_of_another_shape_are_one_line(model: AlgebraicModel, shape) -> None:
     with pytest.raises(InputError, match="inputs have shape"):
         model.solve_path(np.zeros(2), np.zeros(shape))
+
+
+@pytest.mark.parametrize("times", [[[0.0, 1.0]], [0.0, np.nan], "abc", None])
+def test_times_that_are_none_are_one_line(model: AlgebraicModel, times) -> None:
+    with pytest.raises(InputError, match="times"):
+        model.solve_path(times, np.zeros((2, 2)))
 
 
 @pytest.mark.parametrize("path", [None, 1.0, "abc", np.zeros(8), np.zeros((2, 3))])

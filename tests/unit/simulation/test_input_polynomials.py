@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
 from vehiclemor.simulation.integrators.structures import Signal

@@ -6,7 +6,7 @@ from itertools import accumulate
 import numpy as np
 import pytest
 
-from vehiclemor.maneuvers import sine_travel
+from vehiclemor.maneuver import sine_travel
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.run_timer import repeated, timed

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.metrics import max_abs, rms, signal_range
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import (
     ALGEBRAIC_COUNTS,

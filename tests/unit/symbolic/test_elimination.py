@@ -9,7 +9,7 @@ import sympy as sp
 from tests.oracles.pivots import choose_pivots
 from tests.unit.programs import function_of, pivot_shares, run
 from vehiclemor.codegen.kernel_text import operation_counts, reference_source
-from vehiclemor.models.double_wishbone.equations import PIVOTS
+from vehiclemor.multibody.double_wishbone.equations import PIVOTS
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.symbolic.elimination import (
     Pivots,

@@ -90,3 +90,25 @@ def test_common_subexpressions_are_evaluated_once() -> None:
 def test_program_without_hoisted_constants_has_a_valid_source() -> None:
     program = assemble(Tape(), {"q": [x, y]}, [p], {"f": ([x * y], (1,))})
     assert run(program, "f", {x: 2.0, y: 3.0, p: 1.0})[0] == 6.0
+
+
+def test_plain_numbers_are_results_too() -> None:
+    x = sp.Symbol("x", real=True)
+    program = assemble(Tape(), {"x": [x]}, [], {"f": ([0, 1.5, x], (3,))})
+    assert program.functions["f"].results == (sp.Integer(0), sp.Float(1.5), x)
+    assert "0" in reference_source(program)
+
+
+@pytest.mark.parametrize(
+    ("results", "shape", "message"),
+    [
+        ([1], (2,), "f has 1 results"),
+        ([sp.nan], (1,), "nan is no real number"),
+        ([sp.Integer(1) / 0], (1,), "zoo is no real number"),
+        ([sp.sqrt(-1)], (1,), "I is no real number"),
+        ([sp.Symbol("y")], (1,), "y is neither an argument nor a parameter"),
+    ],
+)
+def test_results_that_are_none_are_named(results: list, shape: tuple, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        assemble(Tape(), {"x": [sp.Symbol("x")]}, [], {"f": (results, shape)})

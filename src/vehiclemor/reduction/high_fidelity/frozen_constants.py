@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
-from vehiclemor.models.high_fidelity import frozen_quantities as frozen
-from vehiclemor.models.high_fidelity.quantities import PLACES
+from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
+from vehiclemor.multibody.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
 from vehiclemor.simulation.build import compiled, hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -66,7 +66,7 @@ def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
 
 
 def _derive() -> "Program":
-    from vehiclemor.models.high_fidelity import frozen_inertia
+    from vehiclemor.multibody.high_fidelity import frozen_inertia
 
     return frozen_inertia.derive()
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import compiled, hoisted_constants, solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -22,7 +22,7 @@ def independent_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
 
 def _derive() -> "Program":
     # Imported here: equations that were derived before are read from disk, without SymPy.
-    from vehiclemor.models.high_fidelity import independent
+    from vehiclemor.multibody.high_fidelity import independent
 
     return independent.derive()
 

@@ -3,7 +3,7 @@
 In 14 coordinates the mass matrix of the chassis and the arms is taken constant, wheel places and
 axles are cubic in the arm's angle and the rack's displacement; the tires, gravity and the motion of
 the chassis stay nonlinear.  It needs no training: what is left out is small for a car, whatever the
-input.  See `models/high_fidelity/frozen_inertia.py`.
+input.  See `multibody/high_fidelity/frozen_inertia.py`.
 """
 
 import time
@@ -25,7 +25,7 @@ ERROR_SCALE = {"psi": 1.0, "r": 1.0}
 def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> ReducedSystem:
     """Constants from the exact kernels at the design position; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity import frozen_quantities as frozen
+    from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
     from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
 
     began = time.process_time()

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.errors import ConvergenceError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
 from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
 from vehiclemor.reduction.training import Training
@@ -61,9 +61,8 @@ class FullOrderModel(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Full-order trajectory at the maneuver's output times; it may have diverged."""
-        how = {"solver": self.solver, "tolerance": self.tolerance}
         try:
-            return self.model.simulate(maneuver, start, **how)
+            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance)
         except ConvergenceError as error:
             if error.trajectory is None:
                 raise

@@ -3,7 +3,7 @@
 Coordinate partitioning (R. Wehage, E. Haug, J. Mech. Des. 104 (1982), 247-255) with the dependent
 coordinates in closed form: each front corner closes by two equations A cos + B sin = C.  Nothing is
 approximated, and nothing is trained; no constraint is left to be stabilised.  See
-`models/high_fidelity/independent.py`.
+`multibody/high_fidelity/independent.py`.
 """
 
 import time
@@ -22,7 +22,7 @@ from vehiclemor.simulation.system import System
 def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> ReducedSystem:
     """The exact equations; no training run is looked at."""
     # Derived symbolically where they are not on disk.
-    from vehiclemor.models.high_fidelity.quantities import PLACES
+    from vehiclemor.multibody.high_fidelity.quantities import PLACES
     from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 
     began = time.process_time()

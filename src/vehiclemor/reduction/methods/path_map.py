@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import map_loop
 from vehiclemor.reduction.polynomials.map_loops import BLOCK

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from vehiclemor.codegen.loops import Loop
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import (
     derivatives,

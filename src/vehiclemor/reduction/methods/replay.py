@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vehiclemor.maneuvers import Maneuver
-from vehiclemor.models.definition import KINDS
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project

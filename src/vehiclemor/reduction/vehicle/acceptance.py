@@ -1,6 +1,6 @@
 """Why a model can't be reduced as a vehicle; empty where it can."""
 
-from vehiclemor.models.high_fidelity.definition import DEFINITION
+from vehiclemor.multibody.high_fidelity.definition import DEFINITION
 from vehiclemor.simulation.model import Model
 
 # Outputs in which the slow manifold has its nonlinear terms.

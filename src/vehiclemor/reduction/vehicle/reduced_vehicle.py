@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system

@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from vehiclemor.models.report import TimingCase
+from vehiclemor.multibody.report import TimingCase
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.rows import Row, claim_row, number_row
 from vehiclemor.report.criteria.finding import IN_WORDS, PRINTED, Finding

@@ -1,6 +1,6 @@
 """Whether a method reduces a model, as far as that is known without deriving the model."""
 
-from vehiclemor.models.definition import ModelDefinition
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import never_refused
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build_derived

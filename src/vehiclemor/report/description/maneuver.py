@@ -1,6 +1,6 @@
 """A maneuver: its inputs, how long it takes, and what of it can be changed."""
 
-from vehiclemor.maneuvers import FACTORS, Maneuver
+from vehiclemor.maneuver import FACTORS, Maneuver
 from vehiclemor.registry import component, names
 from vehiclemor.report.description.schema import bounds
 

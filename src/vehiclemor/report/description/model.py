@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from vehiclemor.models.definition import DESIGN_START, ModelDefinition
-from vehiclemor.models.quantities import Quantity
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
+from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import ParameterFile, ParameterSet, load_parameters, parameter_path
 from vehiclemor.registry import component, names
 from vehiclemor.report.description.acceptance import UNKNOWN, accepts

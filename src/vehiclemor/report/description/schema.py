@@ -14,7 +14,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "protocol-schema": ProtocolFile,
     "parameter-schema": ParameterFile,
 }
-WORDS = {"string": "text", "boolean": "true or false"}
+WORDS = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
 
 
 def schema_description(name: str) -> dict[str, object]:
@@ -44,16 +44,18 @@ def words(part: Mapping[str, Any]) -> str:
         return part["$ref"].rpartition("/")[2]
     if "enum" in part:
         return ", ".join(map(str, part["enum"]))
-    if "anyOf" in part:
-        choices = [words(choice) for choice in part["anyOf"] if choice != {"type": "null"}]
+    if one := part.get("anyOf") or part.get("oneOf"):
+        choices = [words(choice) for choice in one if choice != {"type": "null"}]
         # Every integer is a number.
         return " or ".join(c for c in choices if c != "integer" or "number" not in choices)
-    if part["type"] == "array":
-        return f"list of {words(part['items'])}"
-    if part["type"] == "object":
-        return f"table of {words(part['additionalProperties'])}"
-    limits = bounds(part.get("exclusiveMinimum"), part.get("minimum"), part.get("maximum"))
-    return f"{WORDS.get(part['type'], part['type'])} {limits}".rstrip()
+    kind = part.get("type", "value")
+    for container, key in (("array", "items"), ("object", "additionalProperties")):
+        if kind == container:
+            inside = part.get(key)
+            return f"{WORDS[kind]} of {words(inside)}" if isinstance(inside, dict) else WORDS[kind]
+    largest = part.get("maximum", part.get("exclusiveMaximum"))
+    limits = bounds(part.get("exclusiveMinimum"), part.get("minimum"), largest)
+    return f"{WORDS.get(kind, kind)} {limits}".rstrip()
 
 
 def bounds(above: float | None, at_least: float | None, at_most: float | None) -> str:

@@ -1,59 +1,58 @@
 """Dependence of Galerkin projection of algebraic equations on how the equations are written."""
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from vehiclemor.report.figures.lines import Results, legend_above, letter
+from vehiclemor.report.figures.lines import Results, Style, legend_outside, letter, panels
 from vehiclemor.report.labels import error_label
 from vehiclemor.report.published import rms_numbers
 
+# Method -> text, colour, marker, offset from the variant's number.
 VARIANTS = {
     "pod_literal": ("Galerkin", "#D55E00", "o", -0.15),
     "pod_literal_reversed_arms": ("Galerkin, arm angles reversed", "#CC79A7", "^", 0.15),
 }
-
-
+CIRCLE: Style = {"marker": "o", "markersize": 10, "markerfacecolor": "none", "linestyle": "none"}
 OUTPUTS = ("spindle_y", "second_euler_angle")
 
 
 def figure_equation_order(results: Results) -> Figure:
-    """Sorted errors of all variants, on a logarithmic axis."""
+    """Sorted errors of all variants, on a logarithmic axis; diverged ones above it."""
     dataset = results["equation-order"]
-    figure, axes = plt.subplots(1, 2, figsize=(6.7, 3.4))
+    figure, axes = panels(1, 2, (6.7, 3.6))
     numbers = rms_numbers(str(dataset.attrs["model"]))
-    for panel, (axis, output) in enumerate(zip(axes, OUTPUTS, strict=True)):
-        published = numbers[output].value
-        for method, (text, color, marker, shift) in VARIANTS.items():
+    for panel, (axis, output) in enumerate(zip(axes.flat, OUTPUTS, strict=True)):
+        for method in VARIANTS:
             chosen = dataset["rms_error"].sel({"method": method, "output": output})
-            values = chosen.squeeze(drop=True).values
-            order = np.argsort(values)
-            finite = int(np.isfinite(values).sum())
-            places = np.arange(1, len(values) + 1) + shift
-            style = {"color": color, "marker": marker, "markersize": 4, "linestyle": "none"}
-            axis.semilogy(places[:finite], values[order[:finite]], label=text, **style)
-            natural = int(np.flatnonzero(order == 0)[0])
-            axis.semilogy(
-                places[natural],
-                values[0],
-                label="natural order" if shift < 0.0 else None,
-                marker="o",
-                markersize=10,
-                markerfacecolor="none",
-                color="black",
-                linestyle="none",
-            )
-            style["marker"] = "x"
-            axis.semilogy(places[finite:], np.full(len(values) - finite, 0.06), **style)
+            _draw_sorted(axis, method, chosen.squeeze(drop=True).values)
         nominal = results["figures-6-7"].sel({"method": "pod", "rank": 3, "output": output})
         least_squares = float(nominal["rms_error"].squeeze())
         axis.axhline(least_squares, color="#0072B2", linestyle="--", label="least squares")
-        axis.axhline(published, color="black", linewidth=0.8)
-        axis.text(0.6, published * 1.2, "published", fontsize=7)
-        axis.set_ylim(1e-7, 0.2)
-        axis.text(25.5, 0.085, "x: diverged, no error", fontsize=7, ha="right")
+        line: Style = {"color": "black", "linewidth": 0.8, "label": "published"}
+        axis.axhline(numbers[output].value, **line)
+        axis.set_ylim(1e-7, 0.1)
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
         axis.set_ylabel(error_label(dataset, "RMS error", output))
         axis.set_xlabel("variant, sorted by error")
-        axis.set_title(letter(panel))
-    legend_above(figure, axes[0])
+        axis.set_title(letter(panel), pad=14)
+    legend_outside(figure, axes.flat, 3)
     return figure
+
+
+def _draw_sorted(axis: Axes, method: str, values: np.ndarray) -> None:
+    """Errors (variants,) of one way to measure the angles, the natural order first among them."""
+    text, color, marker, shift = VARIANTS[method]
+    order = np.argsort(values)
+    finite = int(np.isfinite(values).sum())
+    places = np.arange(1, len(values) + 1) + shift
+    style: Style = {"color": color, "markersize": 4, "linestyle": "none"}
+    axis.semilogy(places[:finite], values[order[:finite]], marker=marker, label=text, **style)
+    natural = places[int(np.flatnonzero(order == 0)[0])]
+    axis.semilogy(natural, values[0], color="black", label="natural order", **CIRCLE)
+    # Above the frame: these have no error.
+    above = {"transform": axis.get_xaxis_transform(), "clip_on": False, "markeredgewidth": 1.2}
+    height = 1.035 if shift < 0.0 else 1.085
+    axis.plot(places[finite:], np.full(len(values) - finite, height), marker="x", **style, **above)
+    axis.plot([], [], "x", color="black", markersize=4, label="diverged: no error")

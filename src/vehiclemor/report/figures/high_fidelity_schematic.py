@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from vehiclemor.models.high_fidelity import quantities as vehicle
-from vehiclemor.models.high_fidelity.definition import DEFINITION
-from vehiclemor.models.high_fidelity.equilibrium import wheel_places
+from vehiclemor.multibody.high_fidelity import quantities as vehicle
+from vehiclemor.multibody.high_fidelity.definition import DEFINITION
+from vehiclemor.multibody.high_fidelity.equilibrium import wheel_places
 from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures.graph import SCHEMATICS, draw_graph
 from vehiclemor.report.figures.space import (

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from itertools import cycle
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,6 +19,8 @@ DEFAULT: Style = {"color": "#0072B2", "linestyle": (0, (3, 3)), "zorder": 2.5}
 LITERAL: Style = {"color": "#D55E00", "linestyle": "-."}
 REPLAY: Style = {"color": "#666666", "linestyle": ":", "linewidth": 1.2}
 OTHER: Style = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
+# Lines differ where they are printed in grey too.
+DASHES = ("--", (0, (8, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2, 2, 2)))
 CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
 # Label of a method in a study -> its style.
 STYLES = {
@@ -32,11 +35,25 @@ STYLES = {
 
 
 def styles(methods: Iterable[str]) -> dict[str, Style]:
-    """Style of each method by its label: its own, or a colour that no other line has."""
+    """Style of each method by its label: its own, or a colour and dashes that no other line has."""
     methods = list(methods)
-    taken = {STYLES[method]["color"] for method in methods if method in STYLES}
-    free = cycle([color for color in COLORS if color not in taken] or list(COLORS))
-    return {m: STYLES.get(m) or {"color": next(free), "linestyle": "--"} for m in methods}
+    own = {STYLES[method]["color"]: method for method in reversed(methods) if method in STYLES}
+    free = cycle([color for color in COLORS if color not in own] or list(COLORS))
+    dashes = cycle(DASHES)
+    return {
+        method: STYLES[method]
+        if method in own.values()
+        else {"color": next(free), "linestyle": next(dashes)}
+        for method in methods
+    }
+
+
+def panels(
+    rows: int, columns: int, size: tuple[float, float], **options: Any
+) -> tuple[Figure, np.ndarray]:
+    """Figure of a size in inches without a window, and its panels (rows, columns)."""
+    figure = Figure(figsize=size)
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def letter(number: int) -> str:
@@ -44,7 +61,10 @@ def letter(number: int) -> str:
     return f"({'abcdefghijklmnopqrstuvwxyz'[number]})"
 
 
-def legend_above(figure: Figure, axis: Axes, columns: int = 4) -> None:
-    """One legend above all panels, of the lines in one of them."""
-    handles, labels = axis.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=columns)
+def legend_outside(
+    figure: Figure, axes: Iterable[Axes], columns: int = 4, place: str = "upper"
+) -> None:
+    """One legend above (or `lower`: below) all panels, of the lines in some of them."""
+    shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
+    columns = min(columns, len(shown))
+    figure.legend(shown.values(), shown, loc=f"outside {place} center", ncols=columns)

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from itertools import cycle
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vehiclemor.report.figures.lines import COLORS, Results, Style
+from vehiclemor.report.figures.lines import COLORS, Results, Style, panels
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -21,7 +20,8 @@ def figure_pareto(results: Results) -> Figure:
     """Score (worst error as a multiple of its bound) over mean online time, one model."""
     (dataset,) = results.values()
     rows = method_rows(dataset, protocol_of(dataset))
-    figure, axis = plt.subplots(figsize=(6.7, 4.2))
+    figure, axes = panels(1, 1, (6.7, 4.2))
+    axis = axes[0, 0]
     finite = [row["score"] for row in rows if np.isfinite(row["score"]) and row["score"] > 0.0]
     top = 10.0 ** np.ceil(np.log10(max(finite)) + 0.5)
     _draw_full_order(axis, [row for row in rows if row["role"] == FULL_ORDER])

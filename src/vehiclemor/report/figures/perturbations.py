@@ -1,53 +1,87 @@
-"""Errors of any model over perturbations of its input: curves and maps."""
+"""Errors of any model over the axes of a study's grid: curves and maps."""
 
 from collections.abc import Mapping, Sequence
 
-import matplotlib.pyplot as plt
+import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
+from matplotlib.colors import Colormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from vehiclemor.report.figures.lines import Results, Style, legend_above, letter, styles
-from vehiclemor.report.labels import error_label
+from vehiclemor.report.figures.lines import Results, Style, legend_outside, letter, panels, styles
+from vehiclemor.report.labels import error_label, readable_unit, unit_of
 from vehiclemor.report.published import rms_numbers
+from vehiclemor.study.plans.study_file import FACTORS
 
 MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
+UNITS = {"control_period": " (s)"}
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
-FACTORS = ("frequency_factor", "amplitude_factor")
+NOTHING: Style = {"marker": 7, "markersize": 7, "linestyle": "none", "clip_on": False}
+# Decades up to which a colour bar has 1, 2 and 5 of each; smallest step of a contour in a cell.
+FEW_DECADES, FINE = 2.5, 8
 
 
 def figure_error_curves(
-    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str]
+    results: Results,
+    *,
+    outputs: Sequence[str],
+    methods: Mapping[str, str],
+    axis: str = "",
+    legend: str = "upper",
 ) -> Figure:
-    """RMS errors against one perturbed factor: a row for each study, a column for each output."""
-    shape = len(results), len(outputs)
-    figure, axes = plt.subplots(*shape, squeeze=False, figsize=(6.7, 2.6 * len(results)))
-    for row, dataset in enumerate(results.values()):
-        factor = max(FACTORS, key=lambda name: dataset.sizes[name])
+    """RMS errors against one axis of the grid: panels for each study and output.
+
+    Parameters
+    ----------
+    axis
+        Dimension; by default the factor that is perturbed.
+    legend
+        `upper` or `lower` edge.
+    """
+    contents = [(dataset, output) for dataset in results.values() for output in outputs]
+    columns = min(2, len(contents))
+    rows = -(-len(contents) // columns)
+    figure, axes = panels(rows, columns, (6.7, 2.6 * rows))
+    for number, (panel, (dataset, output)) in enumerate(zip(axes.flat, contents, strict=False)):
+        dimension = axis or max(FACTORS, key=lambda name: dataset.sizes[name])
+        _draw_curves(panel, dataset.sel(output=output), methods, dimension)
+        panel.set_ylabel(error_label(dataset, "RMS error", output))
         published = rms_numbers(str(dataset.attrs["model"]))
-        percent = 100.0 * (dataset[factor].values - 1.0)
-        for column, output in enumerate(outputs):
-            axis = axes[row, column]
-            chosen = dataset.sel(output=output)
-            for method, style in styles(methods).items():
-                errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
-                # Replay is exact at the nominal input: no point on a logarithmic axis.
-                errors = np.where(errors > 0.0, errors, np.nan)
-                marked = {"label": methods[method], "marker": MARKERS.get(method, "^")}
-                axis.semilogy(percent, errors, markersize=3, **marked, **style)
-            floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
-            axis.semilogy(percent, floor, label="best approximation, control periods", **FLOOR)
-            if output in published:
-                line: Style = {"color": "black", "linewidth": 0.8, "label": "published, nominal"}
-                axis.axhline(published[output].value, **line)
-            axis.set_ylabel(error_label(dataset, "RMS error", output))
-            axis.set_xlabel(f"{factor.split('_')[0]} perturbation (%)")
-            axis.set_title(letter(len(outputs) * row + column))
-    legend_above(figure, axes[0, 0], columns=3)
+        if output in published:
+            line: Style = {"color": "black", "linewidth": 0.8, "label": "published, nominal"}
+            panel.axhline(published[output].value, **line)
+        panel.set_title(letter(number))
+    for panel in axes.flat[len(contents) :]:
+        panel.remove()
+    legend_outside(figure, figure.axes, 3, legend)
     return figure
+
+
+def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], factor: str) -> None:
+    """Errors of one output; a triangle below the logarithmic axis where the error is 0."""
+    places = chosen[factor].values
+    if factor in FACTORS:
+        places = 100.0 * (places - 1.0)
+        axis.set_xlabel(f"{factor.split('_', maxsplit=1)[0]} perturbation (%)")
+    else:
+        axis.set_xlabel(factor.replace("_", " ") + UNITS.get(factor, ""))
+    for method, style in styles(methods).items():
+        errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
+        shown = np.where(errors > 0.0, errors, np.nan)
+        marked = {"label": methods[method], "marker": MARKERS.get(method, "^")}
+        axis.semilogy(places, shown, markersize=3, **marked, **style)
+        none = places[errors == 0.0]
+        if none.size:
+            below = {"color": style["color"], "transform": axis.get_xaxis_transform()}
+            axis.plot(
+                none, np.zeros(none.size), label="no error: below a log axis", **below, **NOTHING
+            )
+    if "pod" in methods:
+        floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
+        if np.isfinite(floor).any():
+            axis.semilogy(places, floor, label="best approximation, control periods", **FLOOR)
 
 
 def figure_error_map(
@@ -68,36 +102,34 @@ def figure_error_map(
     (dataset,) = results.values()
     shape = len(outputs), len(methods)
     size = ((3.35 if len(methods) < 4 else 2.4) * len(methods), 2.8 * len(outputs))
-    figure, axes = plt.subplots(*shape, sharex=True, sharey=True, squeeze=False, figsize=size)
+    figure, axes = panels(*shape, size, sharex=True, sharey=True)
     published = rms_numbers(str(dataset.attrs["model"]))
     frequency, amplitude = (100.0 * (dataset[factor].values - 1.0) for factor in FACTORS)
     nominal = np.isclose(amplitude, 0.0)[:, None] & np.isclose(frequency, 0.0)
     for row, output in enumerate(outputs):
-        errors = {method: _errors(dataset, method, output) for method in methods}
-        shown = np.array([e[~nominal] if values else e for e in errors.values()])
+        errors = np.array([_errors(dataset, method, output) for method in methods])
+        shown = errors[:, ~nominal] if values else errors
+        factor, unit = readable_unit(float(np.nanmedian(shown)), unit_of(dataset, output))
+        if not values:
+            factor, unit = 1.0, unit_of(dataset, output)
+        errors, shown = factor * errors, factor * shown
         norm = LogNorm(float(np.nanmin(shown[shown > 0.0])), float(np.nanmax(shown)))
-        assert norm.vmin is not None
-        assert norm.vmax is not None
         mesh = None
-        for column, (method, found) in enumerate(errors.items()):
-            axis = axes[row, column]
-            cells = np.maximum(found, 0.5 * norm.vmin) if values else found
+        for axis, found in zip(axes[row], errors, strict=True):
+            cells = np.maximum(found, norm.vmin or 0.0)
             style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
             mesh = axis.pcolormesh(frequency, amplitude, cells, norm=norm, **style)
             if values:
-                _write(axis, frequency, amplitude, found, np.sqrt(norm.vmin * norm.vmax))
+                _write(axis, (frequency, amplitude), found, (mesh.get_cmap(), norm))
             elif output in published:
-                bound = [published[output].value]
-                white: Style = {"colors": "white", "linewidths": 1.2}
-                axis.contour(frequency, amplitude, found, levels=bound, **white)
+                _outline(axis, frequency, amplitude, cells, published[output].value)
             axis.grid(visible=False)
-            axis.set_title(f"{letter(len(methods) * row + column)} {methods[method]}")
         axes[row, 0].set_ylabel("amplitude perturbation (%)")
-        assert mesh is not None
-        extend, label = "min" if values else "neither", error_label(dataset, "RMS error", output)
-        bar = figure.colorbar(mesh, ax=axes[row, :], label=label, extend=extend)
-        if values:
-            bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        label = error_label(dataset, "RMS error", output, unit)
+        bar = figure.colorbar(mesh, ax=axes[row, :], label=label, extend="min" if values else None)
+        _tick(bar.ax, norm)
+    for number, axis in enumerate(axes.flat):
+        axis.set_title(f"{letter(number)} {list(methods.values())[number % len(methods)]}")
     for axis in axes[-1]:
         axis.set_xlabel("frequency perturbation (%)")
     return figure
@@ -109,15 +141,56 @@ def _errors(dataset: xr.Dataset, method: str, output: str) -> np.ndarray:
     return chosen.squeeze(drop=True).transpose(*reversed(FACTORS)).values
 
 
-def _write(
-    axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, dark: float
+def _outline(
+    axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, bound: float
 ) -> None:
-    """Errors with two digits, in white where they are below `dark`."""
+    """Where the error has a value: its logarithm is interpolated between the cells."""
+    from scipy.interpolate import RectBivariateSpline
+
+    if not values.min() < bound < values.max():
+        return
+    fine = [np.linspace(a[0], a[-1], FINE * len(a)) for a in (amplitude, frequency)]
+    smooth = RectBivariateSpline(amplitude, frequency, np.log(values), kx=2, ky=2)(*fine)
+    lines: Style = {"colors": "white", "linewidths": 1.2}
+    axis.contour(fine[1], fine[0], smooth, levels=[np.log(bound)], **lines)
+
+
+def _tick(axis: Axes, norm: LogNorm) -> None:
+    """Ticks of a colour bar: 1, 2, 5 of each decade where there are few decades."""
+    assert norm.vmin is not None
+    assert norm.vmax is not None
+    if np.log10(norm.vmax / norm.vmin) < FEW_DECADES:
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.yaxis.set_minor_formatter(NullFormatter())
+
+
+def two_digits(value: float) -> str:
+    """A number with two significant digits, without an exponent."""
+    if value == 0.0:
+        return "0"
+    return f"{value:.{max(0, 1 - int(np.floor(np.log10(abs(value)))))}f}"
+
+
+def _write(
+    axis: Axes,
+    places: tuple[np.ndarray, np.ndarray],
+    values: np.ndarray,
+    colors: tuple[Colormap, LogNorm],
+) -> None:
+    """Errors with two digits, in black or white, whichever has more contrast with the cell."""
+    paint, norm = colors
     for (j, i), value in np.ndenumerate(values):
         if np.isnan(value):
             continue
-        digits = f"{value:#.2g}" if 1e-3 <= value < 100.0 else f"{value:.1g}"
-        place = float(frequency[i]), float(amplitude[j])
-        color = "white" if value < dark else "black"
-        style: Style = {"ha": "center", "va": "center", "fontsize": 5.5, "color": color}
-        axis.text(*place, digits.replace("e-0", "e-").replace("e+0", "e"), **style)
+        lightness = luminance(paint(norm(max(value, norm.vmin or 0.0)))[:3])
+        color = "white" if 1.05 / (lightness + 0.05) > (lightness + 0.05) / 0.05 else "black"
+        style: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
+        axis.text(float(places[0][i]), float(places[1][j]), two_digits(float(value)), **style)
+
+
+def luminance(color: Sequence[float]) -> float:
+    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
+    parts = np.asarray(matplotlib.colors.to_rgb(tuple(color)))
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])

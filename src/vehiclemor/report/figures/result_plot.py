@@ -1,94 +1,240 @@
-"""A picture of any result: histories of outputs, their errors, or a path."""
+"""The picture of any result: histories, paths or errors of one run, or of a study."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from vehiclemor.errors import InputError
-from vehiclemor.files import write_whole
 from vehiclemor.registry import component, unknown
-from vehiclemor.report.figures.lines import FULL, legend_above, styles
-from vehiclemor.report.labels import axis_label, error_label
+from vehiclemor.report.figures.curves import (
+    Curve,
+    Panel,
+    draw_distances,
+    draw_errors,
+    draw_history,
+    draw_largest_errors,
+    positions,
+)
+from vehiclemor.report.figures.lines import CROSS, FULL, legend_outside, panels, styles
+from vehiclemor.report.figures.perturbations import figure_error_curves, figure_error_map
+from vehiclemor.report.figures.saving import save_figure, styled
+from vehiclemor.report.labels import method_text, unit_of
+from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KINDS = ("histories", "errors", "paths")
-# Panels of one picture.
-MOST_OUTPUTS = 4
+# At most so many outputs have panels, and so many cells of a map their number.
+PANELS, WRITTEN = 4, 100
 
 
-def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "histories") -> Figure:
-    """Draw one run, or the runs of all methods at one point of a study's grid.
+def plot_result(
+    dataset: xr.Dataset, path: Path | None = None, kind: str = "histories", style: str = ""
+) -> Figure:
+    """Draw a result: full order and reduced models together, differences below.
 
     Parameters
     ----------
     dataset
-        With histories on `time`, and perhaps on `method`.
+        One run as `vehiclemor.simulate` returns it, or a study at one point of its grid, where the
+        methods are left; errors are drawn over the axes of the grid too.
     path
-        Picture to write.
+        Picture (PDF, SVG or PNG); none is written by default.
     kind
-        `histories` or `errors` of the outputs that tables show; `paths`: the second output over
-        the first, which is the place of a vehicle or of a wheel.
+        `histories` of the outputs over the time, `paths` in the plane, or `errors`: RMS, as shares
+        of the outputs' ranges.
+    style
+        Name or file of a Matplotlib style on top of the package's.
 
     Raises
     ------
-    InputError
-        If the kind is unknown, or the result has no histories.
+    InputError, FileError
+        If the kind or style is unknown, the dataset does not hold what is to be drawn, or the
+        picture can't be written.
     """
-    import matplotlib.style
-    from matplotlib.figure import Figure
-
-    if kind not in KINDS:
+    if kind not in DRAWINGS:
         raise unknown("kind of plot", kind, KINDS)
-    if "time" not in dataset.dims:
-        raise InputError("there are no histories to draw: this study keeps metrics alone")
-    with matplotlib.style.context(Path(__file__).parents[1] / "style.mplstyle"):
-        outputs = _shown(dataset) if kind != "paths" else dataset["output"].values[1:2]
-        figure = Figure(figsize=(6.7, 1.4 + 1.5 * len(outputs)), layout="constrained")
-        axes = figure.subplots(len(outputs), sharex=True, squeeze=False)[:, 0]
-        for axis, output in zip(axes, outputs, strict=True):
-            _draw(axis, dataset, str(output), kind)
-        axes[-1].set_xlabel(
-            axis_label(dataset, str(dataset["output"].values[0])) if kind == "paths" else "time (s)"
-        )
-        legend_above(figure, axes[0])
+    if "output" not in dataset.dims or "rms_error" not in dataset or "row" in dataset.dims:
+        raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
+    with styled(style):
+        figure = DRAWINGS[kind](dataset)
+        figure.suptitle(_title(dataset), fontsize="medium", wrap=True)
         if path is not None:
-            write_whole(path, figure.savefig)
+            save_figure(figure, path)
     return figure
 
 
-def _shown(dataset: xr.Dataset) -> list[str]:
-    model = json.loads(dataset.attrs["configuration"])["model"]
-    return list(component("model", model).shown.outputs)[:MOST_OUTPUTS]
+def _model(dataset: xr.Dataset) -> str:
+    given = dataset.attrs.get("model") or json.loads(dataset.attrs["configuration"])["model"]
+    return str(given)
 
 
-def _draw(axis: Axes, dataset: xr.Dataset, output: str, kind: str) -> None:
-    """One output of the full-order run and of the reduced ones, or their errors."""
-    several = "method" in dataset.dims
-    labels = [str(m) for m in dataset["method"].values] if several else [dataset.attrs["title"]]
-    runs = [dataset.sel({"method": m}) for m in labels] if several else [dataset]
-    first = str(dataset["output"].values[0])
-    full = runs[0]["reference_outputs"]
-    across = full.sel(output=first) if kind == "paths" else dataset["time"]
-    if kind != "errors":
-        axis.plot(across, full.sel(output=output), label="full order", **FULL)
-    for label, run, style in zip(labels, runs, styles(labels).values(), strict=True):
-        if label.startswith("full_order"):
-            continue
-        values = run["outputs"].sel(output=output)
-        if kind == "errors":
-            values = np.abs(values - full.sel(output=output))
-        elif kind == "paths":
-            across = run["outputs"].sel(output=first)
-        axis.plot(across, values, label=label.replace("_", " "), **style)
-    axis.set_ylabel(axis_label(dataset, output))
-    if kind == "errors":
-        axis.set_ylabel(error_label(dataset, "error", output))
-        axis.set_yscale("log", nonpositive="mask")
+def _title(dataset: xr.Dataset) -> str:
+    """Title of the result; of one run with its input and how it has ended."""
+    title = str(dataset.attrs.get("title", ""))
+    (test,) = json.loads(dataset.attrs["configuration"]).get("test", [None])
+    if test:
+        factors = "".join(
+            f", {k} {test[k]:g}" for k in ("frequency", "amplitude") if test[k] != 1.0
+        )
+        title += f": {test['maneuver']}{factors}, from {test['start']}"
+    status = str(dataset["status"].item()) if dataset["status"].size == 1 else "ok"
+    return title if status == "ok" else f"{title}: {status}"
+
+
+def _outputs(dataset: xr.Dataset) -> list[str]:
+    """Outputs that the model shows; of a model that is not installed here, the first."""
+    known = [str(output) for output in dataset["output"].values]
+    try:
+        report = component("model", _model(dataset)).shown
+        printed = list(dict.fromkeys((*report.printed_outputs, *report.outputs)))
+        shown = printed[: max(2, len(report.printed_outputs))]
+    except InputError:
+        shown = known
+    return [output for output in shown if output in known][:PANELS]
+
+
+def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Label of each method -> its run or errors."""
+    if "method" not in dataset.dims:
+        given = dataset.coords.get("method")
+        configuration = json.loads(dataset.attrs["configuration"])
+        return {str(configuration["method"] if given is None else given.item()): dataset}
+    return {
+        str(label): dataset.sel({"method": label}).squeeze(drop=True)
+        for label in dataset["method"].values
+    }
+
+
+def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
+    """A run with the full-order histories, and the reduced runs."""
+    if "time" not in dataset.dims:
+        raise InputError("no histories in this result (keep = metrics); its errors can be drawn")
+    points = _points(dataset)
+    first = next(iter(points.values()))
+    left = [str(name) for name in first["status"].dims]
+    if left:
+        raise InputError(f"choose a point of the grid first: {', '.join(left)}")
+    reduced = [label for label in points if not label.startswith("full_order")]
+    shown = styles(reduced)
+    return first, [Curve(method_text(m), shown[m], points[m]) for m in reduced]
+
+
+def figure_histories(dataset: xr.Dataset) -> Figure:
+    """Outputs over the time, the differences from full order below each."""
+    full, curves = _runs(dataset)
+    outputs = _outputs(dataset)
+    # Up to three panels beside each other, four in two rows.
+    columns = len(outputs) if len(outputs) < 4 else 2
+    blocks, each = -(-len(outputs) // columns), 2 if curves else 1
+    size = (2.0 + 2.8 * columns, (3.4 if curves else 2.4) * blocks + 0.7)
+    heights = {"height_ratios": [2.0, 1.2][:each] * blocks}
+    figure, axes = panels(blocks * each, columns, size, sharex=True, gridspec_kw=heights)
+    ended: dict[str, str] = {}
+    for number, output in enumerate(outputs):
+        block, column = divmod(number, columns)
+        panel = Panel(output, full, curves)
+        ended |= draw_history(axes[each * block, column], panel, reach=1.0)
+        if curves:
+            _draw_differences(axes[each * block + 1, column], panel)
+    for axis in axes[-1]:
+        axis.set_xlabel("time (s)")
+        axis.set_xlim(float(full["time"][0]), float(full["time"][-1]))
+    for text, color in ended.items():
+        axes[0, 0].plot([], [], color=color, label=text, **CROSS)
+    legend_outside(figure, [axes[0, 0]], place="lower")
+    return figure
+
+
+def _draw_differences(axis: Axes, panel: Panel) -> None:
+    """Of one reduced model over the time; of several the largest, on a logarithmic axis."""
+    if len(panel.curves) == 1:
+        draw_errors(axis, panel, floor=False)
+        rms = panel.curves[0].run["rms_error"].sel(output=panel.output).item()
+        axis.set_title(f"RMS error {rms:.2g} {unit_of(panel.full, panel.output)}")
+    else:
+        draw_largest_errors(axis, panel, float(panel.full["time"][-1]) / 50.0)
+
+
+def figure_paths(dataset: xr.Dataset) -> Figure:
+    """Paths in the plane, and the distances from full order at the same time below."""
+    full, curves = _runs(dataset)
+    missing = {"longitudinal_position", "lateral_position"} - set(dataset["output"].values)
+    if missing:
+        raise InputError(f"{_model(dataset)} has no path: no output {', '.join(sorted(missing))}")
+    figure, axes = panels(2 if curves else 1, 1, (7.6, 5.4 if curves else 3.6), sharex=True)
+    upper = axes[0, 0]
+    upper.plot(*positions(full["reference_outputs"]), label="full order", **FULL)
+    for text, style, run in curves:
+        upper.plot(*positions(run["outputs"]), label=text, **style)
+    upper.set_ylabel("Y (m)")
+    if curves:
+        draw_distances(axes[1, 0], curves)
+    axes[-1, 0].set_xlabel("X (m), not to the scale of Y")
+    legend_outside(figure, [upper], place="lower")
+    return figure
+
+
+def figure_errors(dataset: xr.Dataset) -> Figure:
+    """RMS errors: over the grid where there is one, else of all outputs of one point."""
+    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
+    grid = {d: values for d, values in grid.items() if len(values) > 1}
+    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
+    both = set(FACTORS) <= set(axes)
+    drawn = list(FACTORS) if both else sorted(axes, key=lambda d: len(grid[d]))[-1:]
+    for dimension in set(grid) - set(drawn):
+        values = grid[dimension].tolist()
+        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
+        title = f"{dataset.attrs.get('title', '')}; {dimension} {value}"
+        dataset = dataset.sel({dimension: value}).assign_attrs(title=title)
+    if not drawn:
+        return _errors_of_a_point(dataset)
+    if "method" not in dataset.dims:
+        (label,) = _points(dataset)
+        dataset = dataset.expand_dims(method=[label])
+    methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
+    texts = {m: method_text(m) for m in methods}
+    shown = {"outputs": _outputs(dataset), "methods": texts}
+    if not both:
+        return figure_error_curves({"": dataset}, axis=drawn[0], legend="lower", **shown)
+    cells = len(grid[FACTORS[0]]) * len(grid[FACTORS[1]])
+    return figure_error_map({"": dataset}, values=cells <= WRITTEN, **shown)
+
+
+def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
+    """RMS errors of all outputs as shares of their ranges, a mark for each method."""
+    points = {m: p for m, p in _points(dataset).items() if not m.startswith("full_order")}
+    if not points:
+        raise InputError("full order alone: no errors to draw")
+    names = [str(output) for output in dataset["output"].values]
+    figure, axes = panels(1, 1, (6.7, 1.6 + 0.19 * len(names)))
+    axis, places = axes[0, 0], np.arange(len(names))
+    for marker, (label, style) in zip("os^vD<>phP*d" * 9, styles(points).items(), strict=False):
+        ratio = points[label]["rms_error"] / points[label]["signal_range"]
+        share = 100.0 * ratio.where(np.isfinite(ratio) & (ratio > 0.0)).values
+        look = {"color": style["color"], "marker": marker, "linestyle": "none", "markersize": 5}
+        axis.semilogx(share, places, label=method_text(label), **look)
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_yticks(places, [name.replace("_", " ") for name in names], fontsize=7)
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    axis.set_xlabel("RMS error (% of the output's range)")
+    legend_outside(figure, [axis], place="lower")
+    return figure
+
+
+DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
+    "histories": figure_histories,
+    "paths": figure_paths,
+    "errors": figure_errors,
+}
+KINDS = tuple(DRAWINGS)

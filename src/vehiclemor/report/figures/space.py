@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -27,7 +26,7 @@ def symbol(name: str) -> str:
 def space_and_graph(height: float, space: Rectangle, graph: Rectangle) -> tuple[Figure, Any, Axes]:
     """Figure of a height in inches with axes in space and in the plane."""
     # Placed by hand: the style's automatic layout can't deal with axes in space.
-    figure = plt.figure(figsize=(6.7, height))
+    figure = Figure(figsize=(6.7, height))
     figure.set_layout_engine("none")
     return figure, figure.add_axes(space, projection="3d"), figure.add_axes(graph)
 

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vehiclemor.models.independent_suspension import quantities as vehicle
-from vehiclemor.models.independent_suspension.definition import DEFINITION
-from vehiclemor.models.independent_suspension.equilibrium import derived
-from vehiclemor.models.quantities import WHEELS
+from vehiclemor.multibody.independent_suspension import quantities as vehicle
+from vehiclemor.multibody.independent_suspension.definition import DEFINITION
+from vehiclemor.multibody.independent_suspension.equilibrium import derived
+from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
 from vehiclemor.report.figures.graph import draw_graph
 from vehiclemor.report.figures.space import (

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vehiclemor.models.report import paper_cases
+from vehiclemor.multibody.report import paper_cases
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import bounds
 from vehiclemor.report.predictive.targets import Row

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model

@@ -4,7 +4,7 @@ import itertools
 from dataclasses import dataclass
 
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build

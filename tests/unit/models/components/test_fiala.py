@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.unit.programs import function_of
-from vehiclemor.models.components import tilted_wheel, tires
-from vehiclemor.models.components.tire_coefficients import FIALA
+from vehiclemor.multibody.components import tilted_wheel, tires
+from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.symbolic.geometry import vector
 from vehiclemor.symbolic.tape import Tape
 

@@ -14,8 +14,8 @@ from tests.oracles.vehicle_data import (
     magic_formula,
     trail_at_rest,
 )
-from vehiclemor.models.components import tires
-from vehiclemor.models.components.tire_coefficients import MAGIC_FORMULA
+from vehiclemor.multibody.components import tires
+from vehiclemor.multibody.components.tire_coefficients import MAGIC_FORMULA
 from vehiclemor.symbolic.tape import Tape
 
 REFERENCE_LOAD = PARAMETERS["FNOMIN"] * PARAMETERS["LFZO"]

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.unit.programs import function_of, pivot_shares
-from vehiclemor.models.double_wishbone import linkage as double_wishbone_linkage
-from vehiclemor.models.double_wishbone.points import POINTS, tie_rod_angles
-from vehiclemor.models.high_fidelity import linkage_motions
-from vehiclemor.models.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
+from vehiclemor.multibody.double_wishbone import linkage as double_wishbone_linkage
+from vehiclemor.multibody.double_wishbone.points import POINTS, tie_rod_angles
+from vehiclemor.multibody.high_fidelity import linkage_motions
+from vehiclemor.multibody.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.symbolic.geometry import vector

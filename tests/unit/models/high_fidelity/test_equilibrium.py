@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.errors import GeometryError
-from vehiclemor.models.high_fidelity.equilibrium import check
-from vehiclemor.models.quantities import WHEELS
+from vehiclemor.multibody.high_fidelity.equilibrium import check
+from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 

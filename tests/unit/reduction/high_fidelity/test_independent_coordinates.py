@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vehiclemor.models.high_fidelity.quantities import PLACES
+from vehiclemor.multibody.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
 from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 from vehiclemor.simulation.build import build

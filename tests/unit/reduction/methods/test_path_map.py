@@ -7,7 +7,7 @@ import pytest
 
 from tests.reducing import figure_errors, fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.methods import path_map
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.registry import component

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reducing import figure_errors, fitted, floor_errors
 from vehiclemor.errors import InputError
-from vehiclemor.maneuvers import Maneuver
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.methods import polynomial_residual
 from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel

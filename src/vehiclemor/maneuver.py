@@ -1,0 +1,163 @@
+"""Maneuvers: input time histories that studies scale in frequency and amplitude; wheel travel."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vehiclemor.arguments import count, number, quoted, real_array, within
+from vehiclemor.errors import InputError, blamed
+from vehiclemor.short_repr import ShortRepr
+
+# Bounds far beyond anything that is meant.  A maneuver that is a thousand times slower does not
+# begin within its run, one that is a thousand times faster is over between two output times.
+FACTORS = {"frequency": (1e-3, 1e3), "amplitude": (-1e6, 1e6)}
+LONGEST_DURATION = 1e5
+MOST_SAMPLES = 10_000_000
+MOST_CORNERS = 10_000
+
+
+@dataclass(frozen=True)
+class Maneuver(ShortRepr):
+    """Inputs u(t) of a model over a fixed duration.
+
+    Attributes
+    ----------
+    name, summary
+        Registered name and one line.
+    signal
+        (time (n,) in s, frequency factor, amplitude factor) -> inputs (n, number of inputs), SI.
+    inputs
+        Names of the inputs, equal to the model's.
+    duration
+        Length in s; it does not change with the factors.
+    samples
+        Number of equidistant output times, both ends included.
+    corners
+        Frequency factor -> times (s) at which the inputs are not smooth.
+    frequency_factor, amplitude_factor
+        Perturbation; 1 is the nominal maneuver.
+
+    Raises
+    ------
+    InputError
+        If it contradicts this, or its functions give anything else when they are called.
+    """
+
+    repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
+
+    name: str
+    summary: str
+    signal: Callable[[np.ndarray, float, float], np.ndarray]
+    inputs: tuple[str, ...]
+    duration: float
+    samples: int
+    corners: Callable[[float], tuple[float, ...]]
+    frequency_factor: float = 1.0
+    amplitude_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no maneuver, so that its author reads one clear line."""
+        if not isinstance(self.name, str) or not isinstance(self.summary, str):
+            raise InputError("name and summary of a maneuver must be text")
+        for function in ("signal", "corners"):
+            if not callable(getattr(self, function)):
+                raise InputError(f"{self}: {function} is not a function")
+        if isinstance(self.inputs, list):
+            object.__setattr__(self, "inputs", tuple(self.inputs))
+        if not (isinstance(self.inputs, tuple) and all(isinstance(i, str) for i in self.inputs)):
+            raise InputError(f"{self}: inputs is {quoted(self.inputs)}, not a tuple of names")
+        if number(f"{self}: duration", self.duration) <= 0.0:
+            raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
+        within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
+        within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
+        for name, bounds in FACTORS.items():
+            factor = number(f"{name} factor", getattr(self, f"{name}_factor"))
+            if name == "frequency" and factor <= 0.0:
+                raise InputError(f"{name} factor: {factor:g} is not positive")
+            object.__setattr__(self, f"{name}_factor", within(f"{name} factor", factor, bounds))
+
+    def __str__(self) -> str:
+        return f"maneuver {self.name!r}"
+
+    @property
+    def times(self) -> np.ndarray:
+        """Equidistant output times (samples,) in s."""
+        return np.linspace(0.0, self.duration, self.samples)
+
+    @property
+    def break_points(self) -> tuple[float, ...]:
+        """Times in s inside the run at which the inputs are not smooth."""
+        with blamed(f"{self}: corners"):
+            times = real_array([*self.corners(self.frequency_factor)] or np.zeros(0))
+        if times.ndim != 1 or not np.isfinite(times).all():
+            raise InputError(f"{self}: corners are {quoted(times)}, not a list of times in s")
+        within(f"{self}: number of corners", len(times), (0, MOST_CORNERS))
+        return tuple(times.tolist())
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Inputs (n, number of inputs) at the given times (n,) in s."""
+        times = np.asarray(times, dtype=float)
+        with blamed(f"{self}: signal"):
+            values = self.signal(times, self.frequency_factor, self.amplitude_factor)
+            values = real_array(values)
+        if values.shape != (*times.shape, len(self.inputs)):
+            raise InputError(
+                f"{self}: signal gives an array of shape {values.shape} at {times.size} times, "
+                f"not ({times.size}, {len(self.inputs)}): one column for each input"
+            )
+        return values
+
+    def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> "Maneuver":
+        """The maneuver with its factors set.
+
+        Raises
+        ------
+        InputError
+            If a factor is not finite, or out of its bounds.
+        """
+        return replace(self, frequency_factor=frequency, amplitude_factor=amplitude)
+
+
+# Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.
+TRAVEL_AMPLITUDE = 0.1
+TRAVEL_FREQUENCY = 0.1
+CHIRP_LAST_FREQUENCY = 0.4
+
+
+def _travel(times: np.ndarray, phase: np.ndarray, amplitude: float) -> np.ndarray:
+    """Sine of a phase (n,) as wheel travel; the rack is fixed."""
+    return np.column_stack([amplitude * TRAVEL_AMPLITUDE * np.sin(phase), np.zeros_like(times)])
+
+
+def _sine_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    return _travel(times, 2.0 * np.pi * frequency * TRAVEL_FREQUENCY * times, amplitude)
+
+
+def _chirp_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    rate = (CHIRP_LAST_FREQUENCY - TRAVEL_FREQUENCY) / 10.0
+    phase = 2.0 * np.pi * frequency * (TRAVEL_FREQUENCY + 0.5 * rate * times) * times
+    return _travel(times, phase, amplitude)
+
+
+def smooth(frequency: float) -> tuple[float, ...]:
+    """No corners."""
+    del frequency
+    return ()
+
+
+sine_travel = Maneuver(
+    "sine_travel",
+    "wheel travel 0.1 m x sin(2 pi 0.1 Hz t), rack fixed, 10 s (paper, section 3.2)",
+    _sine_travel,
+    ("z", "s0"),
+    duration=10.0,
+    samples=1001,
+    corners=smooth,
+)
+chirp_travel = replace(
+    sine_travel,
+    name="chirp_travel",
+    summary="wheel travel 0.1 m, sine swept from 0.1 to 0.4 Hz, rack fixed, 10 s",
+    signal=_chirp_travel,
+)

@@ -1,0 +1,210 @@
+"""What vehicles share: the free chassis with its coordinates, and wheels in contact with a road.
+
+Chassis frame: origin at the centre of mass of the sprung body, x forward, y left, z up (ISO 8855).
+The speeds are components in this frame.  The road is the plane z = 0.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic.geometry import Rotation, Vector
+from vehiclemor.symbolic.tape import Tape
+
+
+def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
+    """A symbol for each quantity, real."""
+    return [sp.Symbol(quantity.name, real=True) for quantity in quantities]
+
+
+def outputs(q: Sequence[sp.Symbol], nu: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """The outputs `CHASSIS_OUTPUTS`."""
+    return [q[0], q[1], q[3], q[4], q[5], nu[0], nu[1], nu[2], nu[5]]
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """Orientation of the chassis: rotation matrix, sine and cosine of pitch and roll."""
+
+    rotation: Rotation
+    sin_pitch: sp.Expr
+    cos_pitch: sp.Expr
+    sin_roll: sp.Expr
+    cos_roll: sp.Expr
+
+    @property
+    def road_normal(self) -> Vector:
+        """Unit normal of the road, chassis components."""
+        return self.rotation[2]
+
+
+def attitude(tape: Tape, q: Sequence[sp.Symbol]) -> Attitude:
+    """Orientation from yaw, pitch and roll, 3-2-1 Euler angles."""
+    yaw, pitch, roll = q[3], q[4], q[5]
+    return Attitude(
+        g.euler_321(tape, yaw, pitch, roll),
+        *(tape.let(f(angle)) for angle in (pitch, roll) for f in (sp.sin, sp.cos)),
+    )
+
+
+def rates(tape: Tape, chassis: Attitude, nu: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """Rates of X, Y, Z, yaw, pitch and roll from the speeds."""
+    position = g.rotate(tape, chassis.rotation, g.vector(nu[:3]))
+    return [*position, *angle_rates(tape, chassis, g.vector(nu[3:6]))]
+
+
+def angle_rates(tape: Tape, chassis: Attitude, turning: Vector) -> list[sp.Expr]:
+    """Rates of yaw, pitch and roll that go with an angular velocity, chassis components."""
+    p, q, r = turning
+    yaw = tape.let((q * chassis.sin_roll + r * chassis.cos_roll) / chassis.cos_pitch)
+    pitch = tape.let(q * chassis.cos_roll - r * chassis.sin_roll)
+    return [yaw, pitch, tape.let(p + yaw * chassis.sin_pitch)]
+
+
+def angle_bias(tape: Tape, chassis: Attitude, turning: Vector) -> Vector:
+    """Rate of the angular velocity where yaw, pitch and roll have no second derivatives."""
+    yaw, pitch, roll = angle_rates(tape, chassis, turning)
+    s, c, sp_, cp = chassis.sin_roll, chassis.cos_roll, chassis.sin_pitch, chassis.cos_pitch
+    second = yaw * (c * cp * roll - s * sp_ * pitch) - pitch * s * roll
+    third = yaw * (-s * cp * roll - c * sp_ * pitch) - pitch * c * roll
+    return g.named(tape, (-yaw * cp * pitch, second, third))
+
+
+def _speeds_per_rates(chassis: Attitude) -> tuple[Rotation, Rotation]:
+    """Matrices that turn rates of position and of angles into speeds."""
+    turned = g.matrix(lambda i, j: chassis.rotation[j][i])
+    s, c = chassis.sin_roll, chassis.cos_roll
+    angular = (
+        g.vector((-chassis.sin_pitch, 0, 1)),
+        g.vector((s * chassis.cos_pitch, c, 0)),
+        g.vector((c * chassis.cos_pitch, -s, 0)),
+    )
+    return turned, angular
+
+
+def speeds(tape: Tape, chassis: Attitude, rate: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """Chassis speeds (6) from the rates of X, Y, Z, yaw, pitch and roll."""
+    linear, angular = _speeds_per_rates(chassis)
+    return [
+        *g.rotate(tape, linear, g.vector(rate[:3])),
+        *g.rotate(tape, angular, g.vector(rate[3:6])),
+    ]
+
+
+def in_coordinates(
+    tape: Tape,
+    chassis: Attitude,
+    nu: Sequence[sp.Expr],
+    mass: Sequence[Sequence[sp.Expr]],
+    force: Sequence[sp.Expr],
+    velocity_bias: Vector | None = None,
+) -> list[sp.Expr]:
+    """Second-order form M_q q'' = F_q, row by row: n entries of M_q, then F_q.
+
+    Parameters
+    ----------
+    mass, force
+        M and F of M d(nu)/dt = F, the chassis speeds first; the others are rates of coordinates.
+    velocity_bias
+        What d(nu)/dt has in its first three entries where X, Y, Z have no second derivatives;
+        by default that of chassis components, which turn with the chassis.
+    """
+    linear, angular = _speeds_per_rates(chassis)
+    # nu = P q', so that d(nu)/dt = P q'' + bias and P^T (M P q'' + M bias - F) = 0.
+    turning = g.vector(nu[3:6])
+    if velocity_bias is None:
+        swept = turning.cross(g.vector(nu[:3]))
+        velocity_bias = g.named(tape, [-component for component in swept])
+    bias = [*velocity_bias, *angle_bias(tape, chassis, turning)]
+    n = len(mass)
+    free = [
+        tape.let(force[j] - sp.Add(*[mass[j][k] * bias[k] for k in range(6)])) for j in range(n)
+    ]
+
+    def turned(column: Sequence[sp.Expr]) -> list[sp.Expr]:
+        """P^T times a vector of length n."""
+        first = [sp.Add(*[linear[k][i] * column[k] for k in range(3)]) for i in range(3)]
+        second = [sp.Add(*[angular[k][i] * column[3 + k] for k in range(3)]) for i in range(3)]
+        return [*(tape.let(e) for e in [*first, *second]), *column[6:]]
+
+    rows_times_p = [
+        turned([mass[j][k] for k in range(n)]) for j in range(n)
+    ]  # M P: P^T acts on rows, M is symmetric
+    columns = [turned([rows_times_p[j][k] for j in range(n)]) for k in range(n)]
+    # The translational block is the total mass in any axes.
+    for i in range(3):
+        for j in range(3):
+            columns[i][j] = mass[i][j]
+    right = turned(free)
+    return [e for j in range(n) for e in [*(columns[k][j] for k in range(n)), right[j]]]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Wheel on the road, chassis components.
+
+    Attributes
+    ----------
+    height, rise
+        Height of the wheel centre above the road in m and its rate in m/s.
+    heading, leftward
+        Unit vectors along and across the wheel in the road plane.
+    slip_ratio, slip_angle, cos_slip_angle
+        kappa, alpha in rad (sliding to the left is positive), cos alpha.
+    """
+
+    height: sp.Expr
+    rise: sp.Expr
+    heading: Vector
+    leftward: Vector
+    slip_ratio: sp.Expr
+    slip_angle: sp.Expr
+    cos_slip_angle: sp.Expr
+
+
+def contact(
+    tape: Tape,
+    chassis: Attitude,
+    height: sp.Expr,
+    place: Vector,
+    axle: Vector,
+    velocity: Vector,
+    rotation: Vector,
+    slip_speed: sp.Expr,
+) -> Contact:
+    """Contact of a rigid wheel whose effective radius is the height of its centre.
+
+    Parameters
+    ----------
+    height
+        Height of the chassis origin above the road.
+    place, axle
+        Wheel centre and spin axis in the chassis frame.
+    velocity, rotation
+        Velocity of the wheel centre and complete angular velocity of the wheel.
+    slip_speed
+        Speed (m/s) below which slip is regularised.
+    """
+    up = chassis.road_normal
+    above = tape.let(height + tape.let(up @ place))
+    along = g.named(tape, axle.cross(up))
+    inverse = tape.let(1 / g.length(tape, along))
+    heading = g.named(tape, along * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    arm = g.named(tape, up * -above)
+    sliding = g.named(tape, velocity + rotation.cross(arm))
+    forward = tape.let(heading @ velocity)
+    speed = tape.let(sp.sqrt(tape.let(forward**2 + slip_speed**2)))
+    lateral = tape.let(tape.let(leftward @ sliding) / speed)
+    return Contact(
+        above,
+        tape.let(up @ velocity),
+        heading,
+        leftward,
+        tape.let(-tape.let(heading @ sliding) / speed),
+        tape.let(sp.atan(lateral)),
+        tape.let(1 / sp.sqrt(tape.let(1 + lateral**2))),
+    )

@@ -1,0 +1,222 @@
+"""What a model is, in one declaration: built-in models and plug-ins are instances of one class."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.errors import InputError, did_you_mean
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.report import ModelReport, completed
+from vehiclemor.parameters import Declared
+from vehiclemor.short_repr import ShortRepr
+
+if TYPE_CHECKING:
+    from vehiclemor.symbolic.program import Program
+
+# Algebraic equations; ordinary differential equations; those with constraints.
+KINDS = ("ae", "ode", "dae")
+# A mechanism without forces has no equilibrium to find: the name stands for its design position,
+# so that studies can name the same start for every kind of model.
+DESIGN_START = "equilibrium"
+# Values of the parameters by name: scalars as floats, points as arrays (3,).
+Values = Mapping[str, Any]
+# Values of the solved parameters, state (2 n,), inputs -> time derivative (2 n,) of the state.
+Derivative = Callable[[list[float], np.ndarray, np.ndarray], np.ndarray]
+
+
+def _anything(values: Values) -> None:
+    del values
+
+
+def _nothing(values: Values, derivative: Derivative) -> dict[str, float]:
+    del values, derivative
+    return {}
+
+
+def _unset(values: Values) -> Any:
+    raise NotImplementedError(f"not declared for this kind of model: {sorted(values)}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelDefinition(ShortRepr):
+    """Declaration of a model; its entry point names an instance.
+
+    It holds no symbols: `derive` imports what it needs when it is called, so that a model that was
+    derived before starts without SymPy.
+
+    Attributes
+    ----------
+    name, kind, summary
+        Registered name; `ae`, `ode` or `dae` (constraints stabilised); one line.
+    maneuver
+        Name of the nominal maneuver.
+    coordinates, speeds, inputs, outputs
+        Quantities in order.  A state is the coordinates and, after them, as many speeds; models of
+        kind `ae` have no speeds.
+    equations
+        Residual equations with their units (kind `ae`).
+    constraints
+        Constraints with their units (kind `dae`).
+    parameters
+        Name -> unit, size and bounds.
+    parameter_file
+        Values with their sources; the package's own data by default.
+    joints
+        Names of the moving points and directions that the function `joints` returns (kind `ae`).
+    derive
+        Derives the program of the equations; parameters stay symbols.
+    check
+        Raises `GeometryError` where no such vehicle can exist.
+    design_coordinates
+        Parameters -> coordinates (n,) at which all inputs are zero (kind `ae`).
+    travel_limit
+        Wheel travel in m up to which the limits of reach are looked for (kind `ae`).
+    stops
+        Coordinate -> largest magnitude in its unit that the mechanism may reach (kind `ae`).
+    starts
+        Parameters and what was solved -> initial states (2 n,) by name, the default first (`ode`
+        and `dae`).
+    solved
+        Names of kernel parameters that an equilibrium determines; they follow the declared ones.
+    solve_equilibrium
+        (parameters, derivative) -> values of `solved`, and of what else `starts` needs.
+    cyclic
+        States that the right-hand side does not depend on.
+    planar
+        Position on the road (two names) and heading: all else moves alike wherever the vehicle is.
+    heading_pairs
+        Pairs of states that are components in space: they turn with the heading, and so does a
+        frozen Jacobian.  Empty where the states are components in the vehicle.
+    error_scale
+        State -> magnitude in its unit below which its errors count absolutely, 1 by default.
+    validity
+        Output or input -> (smallest, largest) value in its unit at which the model means anything.
+        A run that leaves that of an output has diverged, an input beyond its own is refused.
+    loads
+        Outputs that are zero where a wheel has left the road.
+    report
+        What tables and figures show of it; see `shown`.
+
+    Raises
+    ------
+    InputError
+        If the declaration contradicts itself.
+
+    Notes
+    -----
+    The program of kind `ae` has functions over `q` (n) and `u`: `residual` (n), `residual_jacobian`
+    (n x (n + 1): Jacobian, then residual), `newton_step` (n), `outputs`, and `joints` (points x 3).
+
+    That of the other kinds has functions over `x` (2 n) and `u`: `derivative` (2 n) and `outputs`;
+    for mechanical models also `second_order` (n x (n + 1): mass matrix M and forces F of M q'' = F
+    in the coordinates, forces of constraints included), and `speeds` (n: the speeds where x holds
+    the rates of the coordinates in their place).  Models with c constraints have `descriptor`
+    ((n + c) x (n + 1): mass matrix and applied forces, less inertial ones, below them Jacobian and
+    right side of the stabilised constraints on q'') and `violations` (c x 2: constraints and their
+    rates).
+    """
+
+    repr_fields = ("name", "kind", "summary")
+
+    name: str
+    kind: str
+    summary: str
+    maneuver: str
+    coordinates: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    parameters: Mapping[str, Declared]
+    derive: Callable[[], Program]
+    speeds: tuple[Quantity, ...] = ()
+    equations: tuple[Quantity, ...] = ()
+    joints: tuple[str, ...] = ()
+    constraints: tuple[Quantity, ...] = ()
+    parameter_file: Path | None = None
+    check: Callable[[Values], None] = _anything
+    design_coordinates: Callable[[Values], np.ndarray] = _unset
+    travel_limit: float = 0.5
+    stops: Mapping[str, float] = field(default_factory=dict)
+    starts: Callable[[Values], dict[str, np.ndarray]] = _unset
+    solved: tuple[str, ...] = ()
+    solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = _nothing
+    cyclic: tuple[str, ...] = ()
+    planar: tuple[str, ...] = ()
+    heading_pairs: tuple[tuple[str, str], ...] = ()
+    error_scale: Mapping[str, float] = field(default_factory=dict)
+    validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    loads: tuple[str, ...] = ()
+    report: ModelReport = field(default_factory=ModelReport)
+
+    @cached_property
+    def shown(self) -> ModelReport:
+        """What tables and figures show: as declared or else by the kind."""
+        outputs = tuple(output.name for output in self.outputs)
+        return completed(self.report, self.kind, len(self.coordinates), outputs)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the coordinates and, after them, of the speeds."""
+        return tuple(q.name for q in (*self.coordinates, *self.speeds))
+
+    def __post_init__(self) -> None:
+        """Refuse what contradicts itself, so that a plug-in's author reads one clear line."""
+        if not isinstance(self.name, str) or not isinstance(self.summary, str):
+            raise InputError("name and summary of a model must be text")
+        if self.kind not in KINDS:
+            raise InputError(
+                f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"
+            )
+        for kind in ("coordinates", "speeds", "inputs", "outputs"):
+            quantities = getattr(self, kind)
+            if not all(isinstance(quantity, Quantity) for quantity in quantities):
+                raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
+            names = [quantity.name for quantity in quantities]
+            if len(set(names)) != len(names) or not (names or kind == "speeds"):
+                raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
+        for name, declared in self.parameters.items():
+            if not isinstance(declared, Declared):
+                raise InputError(
+                    f"model {self.name!r}: parameter {name!r} is not declared by a unit"
+                )
+        needed = "design_coordinates" if self.kind == "ae" else "starts"
+        if getattr(self, needed) is _unset:
+            raise InputError(f"model {self.name!r} of kind {self.kind} declares no {needed}")
+        expected = 0 if self.kind == "ae" else len(self.coordinates)
+        if len(self.speeds) != expected:
+            raise InputError(
+                f"model {self.name!r} of kind {self.kind} has {len(self.coordinates)} coordinates "
+                f"and {len(self.speeds)} speeds, not {expected}"
+            )
+        if self.heading_pairs and len(self.planar) != 3:
+            raise InputError(f"model {self.name!r} has heading_pairs, but no heading in planar")
+        outputs = {q.name for q in self.outputs}
+        report = self.report
+        self._known("stops", self.stops, (q.name for q in self.coordinates))
+        self._known("cyclic", self.cyclic, self.states)
+        self._known("planar", self.planar, self.states)
+        self._known("heading_pairs", (n for pair in self.heading_pairs for n in pair), self.states)
+        self._known("error_scale", self.error_scale, self.states)
+        self._known("validity", self.validity, outputs | {q.name for q in self.inputs})
+        self._known("loads", self.loads, outputs)
+        shown = (*report.outputs, *report.printed_outputs, *report.settings_outputs)
+        self._known("report", (*shown, *report.bounds), outputs)
+        cases = [case.id for case in report.timing]
+        if cases:
+            for needed in ("baseline", "strongest"):
+                if needed not in cases:
+                    raise InputError(f"model {self.name!r}: report.timing has no case {needed!r}")
+        if len(set(cases)) != len(cases):
+            raise InputError(f"model {self.name!r}: report.timing has an id twice")
+
+    def _known(self, where: str, names: Iterable[str], known: Iterable[str]) -> None:
+        allowed = set(known)
+        for name in names:
+            if name not in allowed:
+                hint = did_you_mean(name, allowed) or f"known: {', '.join(sorted(allowed))}"
+                raise InputError(f"model {self.name!r}: {where} names {name!r}; {hint}")

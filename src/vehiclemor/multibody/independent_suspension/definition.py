@@ -1,0 +1,68 @@
+"""Vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE).
+
+Masoudi, Uchida, McPhee (2015), section 3.1 and figure 1; structure after Sayers and Han (1996), A
+generic multibody vehicle model for simulating handling and braking, Veh. Syst. Dyn. 25 (sup1),
+599-613: a sprung body, four lumped masses on vertical prismatic joints, four spinning wheels.
+Axes: ISO 8855.  Steering is quasi-static: the rate of the steering angle appears nowhere.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.independent_suspension import quantities
+from vehiclemor.multibody.independent_suspension.equilibrium import check, starts
+from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
+from vehiclemor.multibody.report import DYNAMIC_BASELINES, ModelReport, reduced_case
+
+if TYPE_CHECKING:
+    from vehiclemor.symbolic.program import Program
+
+
+def derive() -> Program:
+    """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
+    from vehiclemor.multibody.independent_suspension import equations
+
+    return equations.derive()
+
+
+REPORT = ModelReport(
+    study="figures-2-4",
+    settings_study="vehicle-settings",
+    settings_outputs=("pitch", "yaw"),
+    outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
+    printed_outputs=("pitch", "yaw", "lateral_position"),
+    timing=(
+        *DYNAMIC_BASELINES,
+        reduced_case("pod", 3),
+        reduced_case("pod", 3, tolerance=1e-4),
+        reduced_case("pod", 1),
+        reduced_case("pod", 3, formulation="state"),
+        reduced_case("pod", 3, "literal"),
+        reduced_case("fixed_basis", 3),
+    ),
+    bounds={"pitch": "gv_rms_pitch", "yaw": "gv_rms_yaw"},
+    paper_fixed={"rank": 3, "control_period": 0.5},
+)
+DEFINITION = ModelDefinition(
+    name="independent_suspension_vehicle",
+    kind="ode",
+    summary="vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)",
+    maneuver="lane_change",
+    coordinates=quantities.COORDINATES,
+    speeds=quantities.SPEEDS,
+    inputs=quantities.INPUTS,
+    outputs=quantities.OUTPUTS,
+    parameters=quantities.PARAMETERS,
+    derive=derive,
+    check=check,
+    starts=starts,
+    cyclic=("X", "Y", *(f"gamma_{wheel}" for wheel in WHEELS)),
+    planar=("X", "Y", "psi"),
+    # Slip needs forward motion, the contact point lies below the wheel centre.
+    # Steering as far as that of the car (CommonRoad, BMW 320i).
+    validity={"longitudinal_speed": FORWARD, **UPRIGHT, "delta": (-1.066, 1.066)},
+    loads=TIRE_LOADS,
+    report=REPORT,
+)

@@ -1,0 +1,112 @@
+"""What follows from the parameters of the 14-DOF vehicle: static loads, heights, starts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.errors import GeometryError
+from vehiclemor.multibody.independent_suspension.quantities import COORDINATES, FRONT, SPEEDS
+from vehiclemor.multibody.vehicle_parameters import check_moments
+
+
+@dataclass(frozen=True)
+class Derived:
+    """What follows from the parameters, numbers or symbols; front first where there are two.
+
+    Attributes
+    ----------
+    total_mass
+        In kg.
+    sprung_distance
+        Sprung centre of mass to the front and rear axle in m.
+    yaw_inertia
+        Of the sprung body in kg m^2.
+    load, preload
+        Static vertical load of a tire, static force of a spring, in N.
+    loaded_radius
+        Static height of a wheel centre above the road in m.
+    depth
+        Sprung centre of mass above the wheel centres at zero travel in m.
+    reference_load
+        F_z0 of the tire in N.
+    """
+
+    total_mass: Any
+    sprung_distance: tuple[Any, Any]
+    yaw_inertia: Any
+    load: tuple[Any, Any]
+    preload: tuple[Any, Any]
+    loaded_radius: tuple[Any, Any]
+    depth: tuple[Any, Any]
+    reference_load: Any
+
+
+def derived(p: Mapping[str, Any]) -> Derived:
+    """Derived parameters of numbers or symbols."""
+    mass, corner = p["sprung_mass"], p["unsprung_mass"]
+    a, b = p["front_axle_distance"], p["rear_axle_distance"]
+    total = mass + 4 * corner
+    sprung_a = (total * a - 2 * corner * (a + b)) / mass
+    load = (total * p["gravity"] * b / (2 * (a + b)), total * p["gravity"] * a / (2 * (a + b)))
+    corners = sum(
+        2 * corner * (distance**2 + track**2 / 4)
+        for distance, track in ((a, p["front_track"]), (b, p["rear_track"]))
+    )
+    radius = tuple(p["tire_radius"] - part / p["tire_stiffness"] for part in load)
+    return Derived(
+        total,
+        (sprung_a, a + b - sprung_a),
+        p["whole_car_yaw_inertia"]
+        - corners
+        - 4 * p["diametral_inertia"]
+        - mass * (a - sprung_a) ** 2,
+        load,
+        (load[0] - corner * p["gravity"], load[1] - corner * p["gravity"]),
+        (radius[0], radius[1]),
+        (p["sprung_height"] - radius[0], p["sprung_height"] - radius[1]),
+        p["nominal_load"] * p["load_scale"],
+    )
+
+
+def check(p: Mapping[str, Any]) -> None:
+    """Raise `GeometryError` if the vehicle can't stand on its four wheels, or be at all."""
+    d = derived(p)
+    for name, distance in zip(("front", "rear"), d.sprung_distance, strict=True):
+        if distance <= 0.0:
+            away = "rear" if name == "front" else "front"
+            raise GeometryError(
+                f"the vehicle can't stand: its sprung mass lies beyond the {name} axle, so that "
+                f"the {away} wheels leave the ground"
+            )
+    for name, radius in zip(("front", "rear"), d.loaded_radius, strict=True):
+        if radius <= 0.0:
+            raise GeometryError(
+                f"the vehicle can't stand: its weight presses the {name} tires flat "
+                f"(tire_stiffness is too small)"
+            )
+    if d.yaw_inertia <= 0.0:
+        raise GeometryError(
+            f"the sprung body has a yaw inertia of {d.yaw_inertia:.4g} kg m^2: "
+            "whole_car_yaw_inertia is smaller than that of the unsprung masses alone"
+        )
+    xx, yy, xz = p["roll_inertia"], p["pitch_inertia"], p["product_of_inertia"]
+    tensor = np.array([[xx, 0.0, xz], [0.0, yy, 0.0], [xz, 0.0, d.yaw_inertia]])
+    check_moments("sprung body", np.linalg.eigvalsh(tensor))
+
+
+def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Initial states (28,) by name: straight running, and the same dropped onto the road."""
+    d, speed = derived(p), float(p["initial_speed"])
+    equilibrium = np.zeros(len(COORDINATES) + len(SPEEDS))
+    equilibrium[2] = p["sprung_height"]
+    equilibrium[14] = speed
+    equilibrium[24:] = [speed / d.loaded_radius[0 if front else 1] for front in FRONT]
+    dropped = equilibrium.copy()
+    dropped[2] += p["drop_height"]
+    dropped[4] += p["drop_pitch"]
+    # The velocity keeps its direction in space.
+    dropped[14] = speed * np.cos(dropped[4])
+    dropped[16] = speed * np.sin(dropped[4])
+    return {"equilibrium": equilibrium, "dropped": dropped}
