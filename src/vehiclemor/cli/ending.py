@@ -15,7 +15,7 @@ from vehiclemor.errors import MachineError, VehiclemorError, machine_reason
 AGAIN = 2.0
 
 
-def ended(run: Callable[[], object]) -> int:
+def ended(run: Callable[[], int | None]) -> int:
     """Exit status of a call; why it has ended early is one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
