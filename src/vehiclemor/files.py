@@ -99,4 +99,8 @@ def _alive(process: int) -> bool:
         return False
     except OSError:
         return True
-    return True
+    try:
+        # A process that has ended stays known until its parent has asked for it.
+        return not Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2].startswith("Z")
+    except OSError:
+        return True

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -128,3 +129,23 @@ def test_every_row_of_its_cost_table_can_be_run():
     for case in component("model", "quarter_car").shown.timing:
         data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
         assert data["status"].item() == "ok", case.id
+
+
+def test_windows_at_rest_have_no_growth_rate_and_the_others_have(car):
+    """The road is flat in the first second; amplitude 0 makes it flat for ever."""
+    road = component("maneuver", "sine_road")
+
+    def later(times, frequency, amplitude):
+        return road.signal(np.maximum(times - 1.0, 0.0), frequency, amplitude)
+
+    bump = replace(road, signal=later, corners=lambda _: (1.0,))
+    for formulation in ("state", "coordinates", "paired"):
+        settings = {"rank": 2, "control_period": 0.5, "formulation": formulation}
+        moved = vm.simulate(car, "pod", maneuver=bump, **settings)
+        assert np.isfinite(moved["growth_rate"])
+        still = vm.simulate(car, "pod", maneuver=bump, amplitude=0.0, **settings)
+        for data in (moved, still):
+            assert data["status"].item() == "ok"
+        assert still["effective_rank"].item() == 0
+        assert np.isnan(still["growth_rate"])
+        assert (still["rms_error"] == 0.0).all()

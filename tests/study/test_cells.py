@@ -14,6 +14,7 @@ from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import make_experiment
 from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.plans import grid as grid_module
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import flattened
 from vehiclemor.study.plans.study_file import load_studies
@@ -205,3 +206,16 @@ def test_wrong_study_names_the_study():
     study = load_studies("figure-11")["figure-11"]
     with pytest.raises(FileError, match="study mine: unknown model"):
         expand("mine", study.model_copy(update={"model": "single_wishbone"}))
+
+
+def test_settings_of_a_grid_are_checked_once_not_at_every_point(monkeypatch):
+    found = []
+
+    def counted(*arguments):
+        found.append(arguments)
+        return complete_settings(*arguments)
+
+    monkeypatch.setattr(grid_module, "complete_settings", counted)
+    study = load_studies("perturbation-grid")["perturbation-grid"]
+    expand("perturbation-grid", study)
+    assert len(found) == len(study.methods)

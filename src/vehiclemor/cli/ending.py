@@ -11,15 +11,18 @@ from cyclopts import CycloptsError
 from vehiclemor.cli.exit_status import FAILED, STOPPED, WRONG_INPUT
 from vehiclemor.errors import MachineError, VehiclemorError, machine_reason
 
+# Seconds until a signal that has been heard by nobody is raised again.
+AGAIN = 2.0
 
-def ended(run: Callable[[], object]) -> int:
+
+def ended(run: Callable[[], int | None]) -> int:
     """Exit status of a call; why it has ended early is one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # A terminal that can't show a name must not end a study.
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _stopped_by_sigterm():
+        with _stopped_by_signals():
             return int(run() or 0)
     except BrokenPipeError:
         sys.stderr.close()
@@ -29,11 +32,11 @@ def ended(run: Callable[[], object]) -> int:
     except (CycloptsError, VehiclemorError) as error:
         return _said(str(error), WRONG_INPUT)
     except (MemoryError, OSError) as error:
-        return _said(machine_reason(error) or str(error), FAILED)
-    except KeyboardInterrupt as stop:
-        number = stop.args[0] if stop.args else signal.SIGINT
+        reason = machine_reason(error)
+        return _said(reason or str(error), FAILED if reason else WRONG_INPUT)
+    except _StopError as stop:
         text = "stopped; finished cells of a study are stored, run again to resume"
-        return _said(text, STOPPED + number)
+        return _said(text, STOPPED + stop.args[0])
 
 
 def _said(text: str, status: int) -> int:
@@ -41,15 +44,26 @@ def _said(text: str, status: int) -> int:
     return status
 
 
+class _StopError(KeyboardInterrupt):
+    """A signal, with its number: a class of its own, since Python ends otherwise after Ctrl-C."""
+
+
 @contextmanager
-def _stopped_by_sigterm() -> Iterator[None]:
+def _stopped_by_signals() -> Iterator[None]:
     """Let SIGTERM end a command as Ctrl-C does: workers ended, partial files removed."""
 
     def stop(number: int, _: object) -> None:
-        raise KeyboardInterrupt(number)
+        if hasattr(signal, "setitimer"):
+            # Libraries in C may drop an exception: it is raised again until the command has ended.
+            signal.signal(signal.SIGALRM, lambda *_: stop(number, None))
+            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+        raise _StopError(number)
 
-    before = signal.signal(signal.SIGTERM, stop)
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,9 +1,12 @@
 """`vehiclemor run`: a study, resumed where an earlier run stopped."""
 
+import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 from vehiclemor import api
+from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.cli.progress import shown_progress
 from vehiclemor.report.printing import wrapped
 
@@ -22,15 +25,27 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
     out
         Results folder.
     """
+    from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
     began = time.perf_counter()
-    with shown_progress():
-        results = run_studies(study, out, jobs)
+    cells: dict[str, int] = {}
+    with shown_progress() as shown:
+
+        def counted(name: str, done: int, total: int) -> None:
+            cells[name] = total
+            shown(name, done, total)
+
+        with listening(counted):
+            results = run_studies(study, out, jobs)
+    errors = 0
     for name, dataset in results.items():
-        statuses = [str(status) for status in dataset["status"].values.ravel()]
-        counted = ", ".join(f"{statuses.count(s)} {s}" for s in sorted(set(statuses)))
-        path = out / "studies" / f"{name}.nc"
-        print(wrapped(f"{name}: {len(statuses)} grid points: {counted}; {path}", 0, 2))
+        count = Counter(str(status) for status in dataset["status"].values.ravel())
+        counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
+        places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
+        print(wrapped(f"{name}: {places}; {out / 'studies' / f'{name}.nc'}", 0, 2))
+        errors += count["error"]
     print(f"{time.perf_counter() - began:.1f} s")
-    return 0
+    if errors:
+        print("cells with the status error are tried again by the next run", file=sys.stderr)
+    return FAILED if errors else 0

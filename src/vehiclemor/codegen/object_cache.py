@@ -14,13 +14,13 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
 from vehiclemor.codegen.process_lock import locked
-from vehiclemor.errors import FileError
+from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 from vehiclemor.progress import making
 
@@ -47,14 +47,15 @@ def kernel_hash(source: str) -> str:
 def cache_folder() -> Path:
     """Folder of the cache: $VEHICLEMOR_CACHE, or the user's cache folder.
 
-    Where it can't be written, or others could write it, a temporary folder of this process: then
-    every process compiles for itself.
+    Where it can't be written, or others could write it, a temporary folder: then every process
+    compiles for itself, with its workers.
     """
-    return _folder(os.environ.get("VEHICLEMOR_CACHE"))
+    return _folders(os.environ.get("VEHICLEMOR_CACHE"))[0]
 
 
 @cache
-def _folder(chosen: str | None) -> Path:
+def _folders(chosen: str | None) -> list[Path]:
+    """Where files are looked for; new ones are kept in the last."""
     import platformdirs
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
@@ -68,11 +69,16 @@ def _folder(chosen: str | None) -> Path:
     except OSError as error:
         reason = error.strerror or "it can't be written"
     if not reason:
-        return folder
+        return [folder]
     _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
-    temporary = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
-    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
-    return temporary
+    return [_temporary()]
+
+
+def _temporary() -> Path:
+    """Folder that is removed when this process ends."""
+    folder = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _distrust(status: os.stat_result) -> str:
@@ -98,18 +104,20 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     make
         Gives the content.
     """
-    path = cache_folder() / name
-    content, reason = _checked(path, name)
-    if reason:
-        _LOG.warning("%s is made again: %s", path, reason)
-    if content is None:
-        what = path.stem.partition("-")[0]
-        derived = name.startswith("derivations")
-        with making(what, derived=derived), locked(path), _no_collection():
-            content, _ = _checked(path, name)
-            if content is None:
-                content = make()
-                _keep(path, _digest(name, content) + b"\n" + content)
+    folders = _folders(os.environ.get("VEHICLEMOR_CACHE"))
+    for folder in folders:
+        content, reason = _checked(folder / name, name)
+        if content is not None:
+            return content
+        if reason:
+            _LOG.warning("%s is made again: %s", folder / name, reason)
+    path, derived = folders[-1] / name, name.startswith("derivations")
+    what = path.stem.partition("-")[0]
+    with making(what, derived=derived), locked(path), _no_collection():
+        content, _ = _checked(path, name)
+        if content is None:
+            content = make()
+            _keep(folders, name, _digest(name, content) + b"\n" + content)
     return content
 
 
@@ -145,8 +153,12 @@ def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
     return None, reason or "the file is damaged"
 
 
-def _keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache that nobody else can write; without room for it, go on."""
+def _keep(folders: list[Path], name: str, content: bytes) -> None:
+    """Write a file of the cache that nobody else can write; where that can't be, go on.
+
+    Without space, a temporary folder is added to those where files are looked for.
+    """
+    path = folders[-1] / name
 
     def write(temporary: Path) -> None:
         temporary.touch(0o600)
@@ -155,5 +167,12 @@ def _keep(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, write)
-    except (OSError, FileError) as error:
-        _LOG.warning("%s is not kept: %s", path, error)
+    except (OSError, FileError, MachineError) as error:
+        full = isinstance(error, MachineError) or machine_reason(error)
+        if not full:
+            _LOG.warning("%s is not kept: %s", path, error)
+        elif len(folders) == 1:
+            _LOG.warning("what is compiled is kept until this process ends: %s", error)
+            with suppress(OSError):
+                folders.append(_temporary())
+                _keep(folders, name, content)

@@ -8,7 +8,6 @@ from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.failure import Failure, attempt
 
 Settings = dict[str, Value]
 
@@ -30,16 +29,10 @@ def complete_settings(
         If the preset, a name or a value is wrong.
     """
     method: Method = component("method", method_name)
-    if not accepted(model, method):
+    if not method.accepts(model)[0]:
         return {}
     coordinates = len(model.coordinates)
     return validated(method, model.kind, given or {}, preset, coordinates).model_dump()
-
-
-def accepted(model: Model, method: Method) -> bool:
-    """Whether a method accepts a model; not if a bug keeps it from telling: that is a result."""
-    answer = attempt(lambda: method.accepts(model)[0])
-    return not isinstance(answer, Failure) and answer
 
 
 def for_method(model: Model, method_name: str, settings: Settings) -> Any:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import count, within
-from vehiclemor.study.plans.grid import expand
+from vehiclemor.progress import telling
+from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.study_file import StudyFile, file_as_stored, studies_and_files
 from vehiclemor.study.store import result_path, stored
 from vehiclemor.study.workers import Workers
 
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_JOBS = 1024
+# Points of a grid that take their time before the first is computed.
+LARGE = 10_000
 
 
 def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
@@ -40,18 +44,29 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
         is `predictive-<protocol>`.
     """
     within("jobs", count("jobs", jobs), (1, MOST_JOBS))
-    definitions = load_studies(study)
-    protocols = [load_protocol(name) for d in definitions.values() for name in d.protocols]
-    grids = [expand(name, d) for name, d in definitions.items() if not d.protocols]
+    files = studies_and_files(study)
+    protocols = [load_protocol(name) for _, d in files.values() for name in d.protocols]
+    grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
     results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
-    for grid in grids:
+    for path, grid in grids:
+        cells = grid.unique
         workers = Workers(grid.name, folder, jobs)
-        workers([[cell] for cell in grid.unique.values()])
+        workers([[cell] for cell in cells.values()])
         results[grid.name] = stored(
             folder / "studies" / f"{grid.name}.nc",
             "cells",
             cells_digest(grid),
             partial(grid_dataset, grid, folder),
-            [result_path(folder, key) for key in grid.unique],
+            [result_path(folder, key) for key in cells],
+            file_as_stored(path, folder),
         )
     return results
+
+
+def _expanded(name: str, definition: StudyFile) -> Grid:
+    large = definition.points >= LARGE
+    with telling(f"{name}: a grid of {definition.points} points") if large else nullcontext():
+        grid = expand(name, definition)
+        # Made here: the keys take most of the time.
+        assert grid.unique
+        return grid

@@ -83,6 +83,7 @@ def own_speed(model: Model) -> float | None:
     return None if entry is None else float(np.asarray(entry.value))
 
 
+@lru_cache(maxsize=16)
 def parameters_of(model: Model) -> dict[str, Any]:
     """Name -> value of a model's parameters, SI units."""
     return {name: entry.value for name, entry in model.parameters.entries.items()}

@@ -32,6 +32,7 @@ def prepare_folder(folder: Path) -> None:
     VehiclemorError
         If it is a file, or can't be made or written.
     """
+    make_folder(folder)
     for part in (folder / "cells", folder / "studies"):
         make_folder(part)
         probe_folder(part)
@@ -170,6 +171,7 @@ def stored(
     key: str,
     make: Callable[[], xr.Dataset],
     sources: Iterable[Path] = (),
+    study_file: str = "",
 ) -> xr.Dataset:
     """What a file holds if it was made for this key, else what `make` gives, stored there.
 
@@ -179,6 +181,13 @@ def stored(
         Global attribute that holds the key.
     sources
         Files that it was made from; if one of them is as new, it is made again.
+    study_file
+        That it comes from, if it is the result of a study.
+
+    Raises
+    ------
+    FileError
+        If the result of another study is stored there.
     """
     if path.exists():
         dataset = read_dataset(path, "source", "vehiclemor")
@@ -186,7 +195,15 @@ def stored(
         current = all(source.stat().st_mtime_ns < written for source in sources)
         if current and dataset.attrs.get(attribute) == key:
             return dataset
+        other = dataset.attrs.get("study_file", study_file)
+        if other != study_file:
+            raise FileError(
+                f"{path}: holds the results of {other}, a study file of the same name; "
+                f"rename one of them, or move the results away"
+            )
     make_folder(path.parent)
     dataset = make().assign_attrs({attribute: key})
+    if study_file:
+        dataset.attrs["study_file"] = study_file
     write_dataset(dataset, path)
     return dataset

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.codegen.object_cache import cache_folder
 from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
@@ -61,16 +62,18 @@ class Workers:
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
         self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
-        if self.finished < self.asked:
+        if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
         self._report()
-        for _ in range(TRIES):
+        faults: list[str] = []
+        for left in reversed(range(TRIES)):
             work = self._missing(groups)
             if not work:
                 return
-            faults = [fault for fault in self._evaluated(work) if fault]
-            if faults:
+            again = left < TRIES - 1
+            faults = [fault for fault in self._evaluated(work, again) if fault]
+            if faults and left:
                 _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
         spoiled = sum(len(group) for group in self._missing(groups))
         if spoiled:
@@ -94,10 +97,11 @@ class Workers:
     def _report(self) -> None:
         tell(self.name, len(self.finished), len(self.asked))
 
-    def _evaluated(self, work: list[list[Experiment]]) -> Iterator[str]:
+    def _evaluated(self, work: list[list[Experiment]], again: bool) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
-        # Starting processes costs seconds: a handful of groups is quicker without.
-        if self.jobs == 1 or len(work) < 2 * self.jobs:
+        # Starting processes costs seconds: a handful of groups is quicker without.  But what has
+        # killed a worker would kill this process too.
+        if self.jobs == 1 or (len(work) < 2 * self.jobs and not again):
             for group in work:
                 yield self._taken(*evaluate_and_store(group, self.folder))
             return
@@ -155,7 +159,10 @@ def evaluated_by_workers(
     warnings.filterwarnings("ignore", "Failed to kill subprocesses")
     # Without the empty value a worker that crashes would print where each of its threads was.
     pool = get_reusable_executor(
-        jobs, initializer=begin, initargs=(os.getpid(),), env={"PYTHONFAULTHANDLER": ""}
+        jobs,
+        initializer=begin,
+        initargs=(os.getpid(), str(cache_folder())),
+        env={"PYTHONFAULTHANDLER": ""},
     )
     waiting: set[Future] = set()
     left = iter(groups)
@@ -177,8 +184,9 @@ def evaluated_by_workers(
         remove_partial(folder)
 
 
-def begin(driver: int) -> None:
-    """Begin a worker: interrupts are the driver's to handle, and the worker ends with it."""
+def begin(driver: int, cache: str) -> None:
+    """Begin a worker: it shares the driver's cache, leaves interrupts to it, and ends with it."""
+    os.environ["VEHICLEMOR_CACHE"] = cache
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:

@@ -1,6 +1,7 @@
 """Files of the cache are checked by content, name and owner; nothing unchecked is executed."""
 
 import ast
+import errno
 import logging
 import os
 import stat
@@ -200,14 +201,36 @@ def test_a_file_that_cannot_be_written_is_made_by_every_process(folder, fetch, m
     assert all("is not kept" in m for m in caplog.messages if "made again" not in m)
 
 
+def test_without_space_a_temporary_folder_keeps_what_is_made(
+    folder, fetch, made, monkeypatch, tmp_path, caplog
+):
+    written = Path.write_bytes
+
+    def full(path: Path, content: bytes) -> int:
+        if folder in path.parents:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return written(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    for _ in range(2):
+        assert fetch() == b"some content"
+        assert fetch("kernels/other-0.o") == b"some content"
+    assert len(made) == 2
+    (message,) = caplog.messages
+    assert message.startswith("what is compiled is kept until this process ends: ")
+    assert message.endswith("can't be written (No space left on device)")
+    assert len(list(tmp_path.glob("vehiclemor-*/kernels/*.o"))) == 2
+
+
 def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
     import platformdirs
 
     monkeypatch.delenv("VEHICLEMOR_CACHE", raising=False)
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
-    object_cache._folder.cache_clear()
+    object_cache._folders.cache_clear()
     assert cache_folder() == tmp_path / "own" / "vehiclemor"
-    object_cache._folder.cache_clear()
+    object_cache._folders.cache_clear()
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "chosen"))
     assert cache_folder() == tmp_path / "chosen"
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from vehiclemor.maneuvers import Maneuver
 
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from vehiclemor.errors import FileError, InputError
@@ -13,7 +14,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.study.evaluate import refusal
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure
-from vehiclemor.study.method_settings import complete_settings, default_settings
+from vehiclemor.study.method_settings import Settings, complete_settings, default_settings
 from vehiclemor.study.plans.study_file import FACTORS, StudyFile, values
 from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
@@ -36,7 +37,7 @@ class Grid:
     dimensions: dict[str, list[Any]]
     cells: dict[tuple[int, ...], Experiment]
 
-    @property
+    @cached_property
     def unique(self) -> dict[str, Experiment]:
         """Key -> experiment, each once, in grid order."""
         return {cell.key: cell for cell in self.cells.values()}
@@ -91,6 +92,7 @@ def _cells(
     tests = _tests(model, study, maneuver, dimensions)
     cells: dict[tuple[int, ...], Experiment] = {}
     made: dict[tuple[Any, ...], Experiment] = {}
+    complete: dict[tuple[Any, ...], Settings] = {}
     for place in itertools.product(*(range(len(v)) for v in dimensions.values())):
         point = {d: dimensions[d][i] for d, i in zip(dimensions, place, strict=True)}
         label = point["method"]
@@ -98,16 +100,18 @@ def _cells(
         given = dict(entry.settings)
         given |= {d: point[d] for d in study.grid if d in declared[label]}
         run = tuple(point[d] for d in (*FACTORS, "start"))
-        identity = (label, run, *given.values())
+        chosen = (label, *given.values())
+        identity = (run, *chosen)
+        if chosen not in complete:
+            complete[chosen] = complete_settings(model, entry.method, given, entry.preset)
         if identity not in made:
-            settings = complete_settings(model, entry.method, given, entry.preset)
             training, test = tests[run]
             made[identity] = make_experiment(
-                model, entry.method, settings, training, (test,), study.keep
+                model, entry.method, complete[chosen], training, (test,), study.keep
             )
         cells[place] = made[identity]
     for label in study.labelled:
-        _some_fits(model, [cell for key, cell in made.items() if key[0] == label])
+        _some_fits(model, [cell for key, cell in made.items() if key[1] == label])
     return cells
 
 

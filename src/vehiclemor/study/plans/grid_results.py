@@ -22,9 +22,11 @@ QUANTITIES = ("output", "coordinate", "speed")
 
 
 def cells_digest(grid: Grid) -> str:
-    """Hash of all cells of a grid at their places: tells whether a combined dataset is current."""
-    text = "\n".join(f"{place} {cell.key}" for place, cell in grid.cells.items())
-    return hashlib.sha256(text.encode()).hexdigest()[:20]
+    """Hash of a study and its cells at their places, for a combined dataset to be current."""
+    digest = hashlib.sha256(grid.definition.model_dump_json().encode())
+    for place, cell in grid.cells.items():
+        digest.update(f"{place} {cell.key}".encode())
+    return digest.hexdigest()[:20]
 
 
 def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:

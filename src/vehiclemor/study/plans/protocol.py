@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import dataclass
+from pathlib import Path
 
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuver import Maneuver
@@ -10,7 +11,7 @@ from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
-from vehiclemor.study.method_settings import Settings, accepted, complete_settings
+from vehiclemor.study.method_settings import Settings, complete_settings
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
@@ -60,7 +61,7 @@ class Protocol:
         Name of `SETS` -> scenarios.
     """
 
-    name: str
+    path: Path
     definition: ProtocolFile
     model: Model
     sets: dict[str, tuple[Scenario, ...]]
@@ -69,7 +70,7 @@ class Protocol:
     @property
     def study(self) -> str:
         """Name of its results."""
-        return f"predictive-{self.name}"
+        return f"predictive-{self.path.stem}"
 
 
 def load_protocol(protocol: str) -> Protocol:
@@ -83,12 +84,12 @@ def load_protocol(protocol: str) -> Protocol:
     path = named_file("protocol", "protocols", protocol)
     definition = read_toml(path, ProtocolFile)
     try:
-        return _resolved(path.stem, definition)
+        return _resolved(path, definition)
     except InputError as error:
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(name: str, definition: ProtocolFile) -> Protocol:
+def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     model = build(definition.model)
     outputs = [*definition.bounds, *definition.reported]
     if definition.straight:
@@ -107,7 +108,7 @@ def _resolved(name: str, definition: ProtocolFile) -> Protocol:
         known = ["equal accuracy", "within bounds", *labels]
         if target.against not in known:
             raise unknown("row that a target is against", target.against, known)
-    return Protocol(name, definition, model, sets, contestants)
+    return Protocol(path, definition, model, sets, contestants)
 
 
 def _scenarios(model: Model, key: str, groups: list[Group]) -> tuple[Scenario, ...]:
@@ -160,7 +161,7 @@ def _contestant(
         preset = str(settings.pop("preset", "recommended"))
         complete = complete_settings(model, entry.method, settings, preset)
         # Of a method that refuses the model all candidates are empty.
-        if complete in candidates and accepted(model, method):
+        if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)
     known = {scenario.maneuver.name for scenario in sets["training"]}

@@ -5,6 +5,7 @@ The stages are functions of what they may see: `validate` gets no scenario of th
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,8 +18,9 @@ from vehiclemor.study.plans.choice import Row, choose, validation_of
 from vehiclemor.study.plans.protocol import FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import protocol_dataset
+from vehiclemor.study.plans.study_file import file_as_stored
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import write_dataset
+from vehiclemor.study.store import result_path, stored
 from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
@@ -44,9 +46,17 @@ def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
     )
     tested = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
     found = test(protocol.model, rows, tested, workers)
-    dataset = protocol_dataset(protocol, rows, found, timed_rows(protocol, rows, found, folder))
-    write_dataset(dataset, folder / "studies" / f"{protocol.study}.nc")
-    return dataset
+    timed = timed_rows(protocol, rows, found, folder)
+    studies, keys = folder / "studies", sorted(workers.asked)
+    parts = [protocol.definition.model_dump_json(), *keys]
+    return stored(
+        studies / f"{protocol.study}.nc",
+        "cells",
+        hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
+        lambda: protocol_dataset(protocol, rows, found, timed),
+        [studies / f"timing-{protocol.study}.nc", *(result_path(folder, key) for key in keys)],
+        file_as_stored(protocol.path, folder),
+    )
 
 
 def validate(

@@ -1,6 +1,7 @@
 """Study files: the grid of a study declared in TOML, validated on loading."""
 
 import math
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -166,14 +167,33 @@ def study_path(study: str) -> Path:
 
 def load_studies(study: str) -> dict[str, StudyFile]:
     """Study name -> definition; a collection gives all of its members."""
+    return {name: definition for name, (_, definition) in studies_and_files(study).items()}
+
+
+def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
+    """As `load_studies`, with the files."""
     path = study_path(study)
     definition = read_toml(path, StudyFile)
     if not definition.studies:
-        return {path.stem: definition}
-    members: dict[str, StudyFile] = {}
+        return {path.stem: (path, definition)}
+    members: dict[str, tuple[Path, StudyFile]] = {}
     for member in definition.studies:
-        content = read_toml(study_path(member), StudyFile)
+        file = study_path(member)
+        content = read_toml(file, StudyFile)
         if content.studies:
             raise FileError(f"{path}: studies.{member} is a collection itself")
-        members[study_path(member).stem] = content
+        if file.stem in members:
+            raise FileError(f"{path}: studies.{member}: another study is named {file.stem} too")
+        members[file.stem] = file, content
     return members
+
+
+def file_as_stored(path: Path, folder: Path) -> str:
+    """How results in a folder name the file that they come from: the package's own by its name."""
+    if data_folder() in path.parents:
+        return path.stem
+    try:
+        return os.path.relpath(path.resolve(), folder.resolve())
+    except ValueError:
+        # Another drive, where there are drives.
+        return str(path.resolve())

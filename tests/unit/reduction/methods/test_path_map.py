@@ -87,7 +87,7 @@ def test_coordinates_depend_on_the_travel_alone(model: AlgebraicModel, nominal: 
     assert set(first.counts.values()) == {0}
 
 
-@pytest.mark.parametrize("samples", [1, 63, 64, 65, 128, 1000])
+@pytest.mark.parametrize("samples", [2, 63, 64, 65, 128, 1000])
 def test_every_number_of_samples_is_computed(
     model: AlgebraicModel, nominal: Maneuver, samples: int
 ) -> None:

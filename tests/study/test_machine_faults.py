@@ -1,0 +1,270 @@
+"""What the machine or a bug does to a study: named, never a finished result, tried again."""
+
+import errno
+import os
+import signal
+from dataclasses import replace
+from multiprocessing import active_children
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+
+from vehiclemor.errors import FileError, MachineError
+from vehiclemor.reduction.methods import fixed_basis, pod
+from vehiclemor.study import evaluate, store, workers
+from vehiclemor.study.progress import listening
+from vehiclemor.study.run import run_studies
+
+GRID = """
+title = "for the tests"
+model = "double_wishbone"
+keep = "metrics"
+
+[grid]
+rank = [2, 3]
+
+[[methods]]
+method = "pod"
+
+[[methods]]
+method = "fixed_basis"
+"""
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.fixture(autouse=True)
+def _nothing_kept():
+    evaluate._kept_fit.cache_clear()
+    yield
+    evaluate._kept_fit.cache_clear()
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run the small study in one folder; gives the statuses of a method by rank."""
+    path = tmp_path / "small.toml"
+    path.write_text(GRID)
+
+    def statuses(method: str, **options) -> list[str]:
+        cells = run_studies(str(path), tmp_path / "out", **options)["small"].squeeze()
+        return list(cells["status"].sel({"method": method}).values)
+
+    return statuses
+
+
+def cells_in(folder: Path) -> list[Path]:
+    return sorted((folder / "out" / "cells").iterdir())
+
+
+@pytest.fixture
+def broken_fit(monkeypatch):
+    """Let every fit of the method `fixed_basis` raise, until `undo`."""
+
+    def set_to(error: Exception) -> pytest.MonkeyPatch:
+        def fit(*_):
+            raise error
+
+        monkeypatch.setattr(fixed_basis, "METHOD", replace(fixed_basis.METHOD, fit=fit))
+        return monkeypatch
+
+    return set_to
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (MemoryError("Unable to allocate 7 TiB"), "not enough memory Unable to allocate 7 TiB"),
+        (OSError(errno.EMFILE, "Too many open files"), "Too many open files"),
+    ],
+    ids=["memory", "files"],
+)
+def test_what_the_machine_does_is_no_result(run, broken_fit, tmp_path, caplog, error, reason):
+    patched = broken_fit(error)
+    with pytest.raises(MachineError, match=f"2 of 4 cells can't be computed .{reason}.*resume"):
+        run("pod")
+    # Each further try names the reason once; the rest of the study is finished.
+    tries = f"small: {reason}; what it has spoiled is tried again"
+    assert caplog.messages == [tries] * (workers.TRIES - 1)
+    assert len(cells_in(tmp_path)) == 2
+    patched.undo()
+    assert run("fixed_basis") == ["ok", "ok"]
+
+
+def test_a_bug_is_tried_again_by_the_next_run(run, broken_fit, tmp_path):
+    patched = broken_fit(ZeroDivisionError("in a plug-in"))
+    assert run("fixed_basis") == ["error", "error"]
+    assert run("pod") == ["ok", "ok"]
+    patched.undo()
+    # In the same process: no failed fit is kept.
+    assert run("fixed_basis") == ["ok", "ok"]
+    assert not [path for path in cells_in(tmp_path) if store.BROKEN in path.name]
+
+
+def raising(*_):
+    raise ZeroDivisionError("in a plug-in")
+
+
+class Broken:
+    """A reduced model that can't tell its residual, after a run that went well."""
+
+    def __init__(self, reduced) -> None:
+        self.reduced = reduced
+
+    def __getattr__(self, name):
+        return raising() if name == "effective_rank" else getattr(self.reduced, name)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"check": raising},
+        {"fit": lambda *a: Broken(fixed_basis.METHOD.fit(*a))},
+    ],
+    ids=["check", "result"],
+)
+def test_a_bug_anywhere_in_a_method_ends_no_study(run, monkeypatch, changed):
+    monkeypatch.setattr(pod, "METHOD", replace(pod.METHOD, **changed))
+    assert run("pod") == ["error", "error"]
+    assert run("fixed_basis") == ["ok", "ok"]
+
+
+def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tmp_path):
+    def full(path, *_):
+        raise FULL
+
+    def dataset(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(netCDF4, "Dataset", dataset)
+        patch.setattr(Path, "write_bytes", full)
+        with pytest.raises(MachineError, match=r"can't be written \(No space left on device\)"):
+            run("pod")
+    assert cells_in(tmp_path) == []
+    assert run("pod") == ["ok", "ok"]
+
+
+def test_an_error_of_the_library_that_is_not_the_disks_is_one_line(run, monkeypatch):
+    def dataset(*_):
+        raise RuntimeError("NetCDF: HDF error")
+
+    monkeypatch.setattr(netCDF4, "Dataset", dataset)
+    with pytest.raises(FileError, match=r"can't be written \(NetCDF: HDF error\)"):
+        run("pod")
+
+
+def test_a_flipped_bit_in_a_result_is_found(run, tmp_path):
+    run("pod")
+    (path, *_) = cells_in(tmp_path)
+    with netCDF4.Dataset(path) as file:
+        value = np.array(file["rms_error"][...])[0].tobytes()
+    content = path.read_bytes()
+    place = content.index(value)
+    path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+    (tmp_path / "out" / "studies" / "small.nc").unlink()
+    with pytest.raises(FileError, match=r"what it holds is not what was written.*move it away"):
+        run("pod")
+
+
+def test_complete_results_are_read_where_nothing_can_be_written(run, monkeypatch):
+    run("pod")
+
+    def read_only(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    for name in ("replace", "mkdir"):
+        monkeypatch.setattr(os, name, read_only)
+    monkeypatch.setattr("tempfile.TemporaryFile", read_only)
+    assert run("pod") == ["ok", "ok"]
+
+
+def test_results_of_another_study_of_the_same_name_stay(run, tmp_path):
+    run("pod")
+    other = tmp_path / "other" / "small.toml"
+    other.parent.mkdir()
+    other.write_text(GRID.replace("[2, 3]", "[4]"))
+    combined = tmp_path / "out" / "studies" / "small.nc"
+    before = combined.read_bytes()
+    with pytest.raises(FileError, match=r"holds the results of \.\./small\.toml, a study file of"):
+        run_studies(str(other), tmp_path / "out")
+    assert combined.read_bytes() == before
+    # A study that was edited in its place is the same study.
+    (tmp_path / "small.toml").write_text(GRID.replace("[2, 3]", "[2, 3, 4]"))
+    assert run("pod") == ["ok"] * 3
+
+
+def test_a_label_that_was_edited_is_in_the_results(run, tmp_path):
+    run("pod")
+    path = tmp_path / "small.toml"
+    path.write_text(GRID.replace('method = "pod"', 'method = "pod"\nlabel = "mine"'))
+    assert run("mine") == ["ok", "ok"]
+
+
+def test_a_collection_with_two_studies_of_one_name_is_refused(tmp_path):
+    paths = [tmp_path / name / "small.toml" for name in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(GRID)
+    both = tmp_path / "both.toml"
+    both.write_text(f'title = "both"\nstudies = ["{paths[0]}", "{paths[1]}"]\n')
+    with pytest.raises(FileError, match="another study is named small too"):
+        run_studies(str(both), tmp_path / "out")
+
+
+def test_results_of_a_protocol_replace_no_foreign_file(tmp_path, protocol_text):
+    (tmp_path / "small.toml").write_text(protocol_text)
+    study = tmp_path / "mine.toml"
+    study.write_text(f'title = "mine"\nprotocols = ["{tmp_path / "small.toml"}"]\n')
+    foreign = tmp_path / "studies" / "predictive-small.nc"
+    foreign.parent.mkdir()
+    foreign.write_text("my notes")
+    with pytest.raises(FileError, match=r"predictive-small\.nc: not a readable result file"):
+        run_studies(str(study), tmp_path)
+    assert foreign.read_text() == "my notes"
+
+
+# Workers
+
+
+def test_workers_that_are_killed_again_and_again_end_the_run(run, monkeypatch):
+    tries = []
+
+    def killed(groups, *_):
+        tries.append(len(groups))
+        yield [], workers.KILLED
+
+    monkeypatch.setattr(workers, "evaluated_by_workers", killed)
+    with pytest.raises(MachineError, match=r"a worker process was killed.*run again to resume"):
+        run("pod", jobs=2)
+    assert tries == [4] * workers.TRIES
+
+
+STUDY = GRID.replace("[2, 3]", "[1, 2, 3, 4, 5, 6, 7, 8]") + "[[methods]]\nmethod = 'full_order'\n"
+
+
+def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(tmp_path, caplog):
+    path = tmp_path / "eight.toml"
+    path.write_text(STUDY)
+    processes = []
+
+    def stop(_, done, __):
+        if done == 5:
+            processes.extend(active_children())
+            raise KeyboardInterrupt
+
+    def kill(_, done, __):
+        if done == 9:
+            os.kill(active_children()[0].pid, signal.SIGKILL)
+
+    with pytest.raises(KeyboardInterrupt), listening(stop):
+        run_studies(str(path), tmp_path, jobs=2)
+    assert len(processes) == 2
+    assert not any(process.is_alive() for process in processes)
+    assert not list((tmp_path / "cells").glob(".partial-*"))
+    with listening(kill):
+        cells = run_studies(str(path), tmp_path, jobs=2)["eight"]
+    assert caplog.messages == [f"eight: {workers.KILLED}; what it has spoiled is tried again"]
+    assert set(cells["status"].values.ravel()) == {"ok"}
+    assert len(list((tmp_path / "cells").iterdir())) == 17
