@@ -56,23 +56,22 @@ class Pair:
         self.model: Model = build(model)
         self.name, self.method = method, component("method", method)
         self.maneuver: Maneuver = component("maneuver", component("model", model).maneuver)
-        self._fitted: dict[tuple[str, str], ReducedModel] = {}
+        self._fitted: dict[str, ReducedModel] = {}
 
-    def fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:
+    def fit(self, preset: str = "recommended") -> ReducedModel:
         # Some fits take seconds; a fit does not change once it is made.
-        key = (preset, policy)
-        if key not in self._fitted:
-            self._fitted[key] = self.fresh_fit(preset, policy)
-        return self._fitted[key]
+        if preset not in self._fitted:
+            self._fitted[preset] = self.fresh_fit(preset)
+        return self._fitted[preset]
 
-    def fresh_fit(self, preset: str = "recommended", policy: str = "matched") -> ReducedModel:
+    def fresh_fit(self, preset: str = "recommended") -> ReducedModel:
         chosen = SETTINGS.get(self.name, {})
         settings = validated(self.method, self.model.kind, chosen, preset)
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)
         start = self.model.starts[0]
         factors = TRAINED_ON.get(self.name, ())
-        policy = "set" if factors else policy
+        policy = "set" if factors else "nominal"
         runs = training_runs(self.model, self.maneuver, start, policy, factors)
         reduced = self.method.fit(self.model, runs, settings)
         assert settings == before
@@ -214,7 +213,7 @@ def test_untrained_inputs_give_a_result_or_say_why_not(
     pair: Pair, factors: tuple[float, float]
 ) -> None:
     perturbed = pair.maneuver.perturbed(*factors)
-    run = pair.run(pair.fit(policy="nominal"), perturbed)
+    run = pair.run(pair.fit(), perturbed)
     assert run.status in STATUSES
     assert np.isfinite(run.outputs).all() == (run.status == "ok")
     assert bool(run.message) == (run.status != "ok")

@@ -2,7 +2,17 @@
 
 import pytest
 
+from vehiclemor.study import timing
 from vehiclemor.study.run import run_studies
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_rounds():
+    """Times are measured, but no test asks how well."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(timing, "CASE_ROUNDS", 3)
+        patch.setattr(timing, "FITS", 2)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -56,7 +56,7 @@ def figure_error_curves(
         panel.set_title(letter(number))
     for panel in axes.flat[len(contents) :]:
         panel.remove()
-    legend_outside(figure, figure.axes, 3, legend)
+    legend_outside(figure, figure.axes, 2, legend)
     return figure
 
 
@@ -79,7 +79,7 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
             axis.plot(
                 none,
                 np.zeros(none.size),
-                label=f"{methods[method]}: no error, not on a log axis",
+                label=f"{methods[method]}: no error, no place on the axis",
                 **below,
                 **NOTHING,
             )

@@ -36,9 +36,7 @@ if TYPE_CHECKING:
 PANELS, WRITTEN = 4, 100
 
 
-def plot_result(
-    dataset: xr.Dataset, path: Path | None = None, kind: str = "histories", style: str = ""
-) -> Figure:
+def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "histories") -> Figure:
     """Draw a result: full order and reduced models together, differences below.
 
     Parameters
@@ -51,20 +49,18 @@ def plot_result(
     kind
         `histories` of the outputs over the time, `paths` in the plane, or `errors`: RMS, as shares
         of the outputs' ranges.
-    style
-        Name or file of a Matplotlib style on top of the package's.
 
     Raises
     ------
     InputError, FileError
-        If the kind or style is unknown, the dataset does not hold what is to be drawn, or the
+        If the kind is unknown, the dataset does not hold what is to be drawn, or the
         picture can't be written.
     """
     if kind not in DRAWINGS:
         raise unknown("kind of plot", kind, KINDS)
     if "output" not in dataset.dims or "rms_error" not in dataset or "row" in dataset.dims:
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
-    with styled(style):
+    with styled():
         figure = DRAWINGS[kind](dataset)
         figure.suptitle(_title(dataset), fontsize="medium", wrap=True)
         if path is not None:

@@ -1,0 +1,290 @@
+"""Every figure as data: what its texts, lines and limits are."""
+
+from itertools import combinations
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
+from matplotlib.text import Text
+from mpl_toolkits.mplot3d.art3d import Text3D
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+from vehiclemor.cli import main
+from vehiclemor.errors import InputError
+from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.figures.lines import panels
+from vehiclemor.report.figures.perturbations import luminance, two_digits
+from vehiclemor.report.figures.saving import save_figure, styled
+from vehiclemor.report.labels import readable_unit
+from vehiclemor.report.regenerate import left_out
+from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.store import write_dataset
+
+FREQUENCY, AMPLITUDE = np.linspace(0.7, 1.3, 7), np.linspace(0.7, 1.3, 7)
+SCHEMATICS = {"1", "5", "8"}
+
+
+def grid_of(entry):
+    """Errors that a study over both factors could have, none at the nominal input of replay."""
+    methods, outputs = list(entry.options["methods"]), entry.options["outputs"]
+    shape = len(AMPLITUDE), len(FREQUENCY), len(methods), len(outputs)
+    errors = 10.0 ** np.random.default_rng(1).uniform(-3.0, 0.5, shape)
+    errors[3, 3] = 4.4e-4
+    errors[3, 3, methods.index("replay")] = 0.0
+    dimensions = ("amplitude_factor", "frequency_factor", "method", "output")
+    units = ["m" if output in ("lateral_position", "spindle_y") else "rad" for output in outputs]
+    places = {
+        "amplitude_factor": AMPLITUDE,
+        "frequency_factor": FREQUENCY,
+        "method": methods,
+        "output": list(outputs),
+        "output_unit": ("output", units),
+    }
+    return xr.Dataset({"rms_error": (dimensions, errors)}, places, {"model": "double_wishbone"})
+
+
+def protocol_results(name):
+    """Results that a protocol could have: rows of every contestant, two test scenarios."""
+    protocol = load_protocol(name.removeprefix("predictive-"))
+    rows = [(label, c.method, c.role) for c in protocol.contestants for label in c.row_labels]
+    outputs = sorted({*protocol.definition.bounds, *protocol.definition.reported})
+    n, scenarios = len(rows), ["a", "b"]
+    shape = n, len(scenarios), len(outputs)
+    rng = np.random.default_rng(2)
+    seconds = 10.0 ** rng.uniform(-5.0, -2.0, shape[:2])
+    labels, methods, roles = zip(*rows, strict=True)
+    by_row = {"method": methods, "role": roles, "settings": ["{}"] * n, "validation": ["[]"] * n}
+    variables = {name: ("row", list(values)) for name, values in by_row.items()}
+    for variable in ("effective_rank", "offline_evaluations"):
+        variables[variable] = ("row", np.ones(n, dtype=int))
+    for variable in ("offline_seconds", "validation_score"):
+        variables[variable] = ("row", np.ones(n))
+    for variable in ("rms_error", "max_error", "largest_output"):
+        errors = 10.0 ** rng.uniform(-6.0, 1.0, shape)
+        variables[variable] = (("row", "scenario", "output"), errors)
+    for variable, factor in (("seconds", 1.0), ("seconds_lower", 0.9), ("seconds_upper", 1.2)):
+        variables[variable] = (("row", "scenario"), factor * seconds)
+    status = np.full(shape[:2], "ok", dtype=object)
+    status[-1, 0] = "diverged"
+    variables["status"] = (("row", "scenario"), status)
+    variables["message"] = (("row", "scenario"), np.full(shape[:2], "", dtype=object))
+    variables["calls"] = (("row", "scenario"), np.ones(shape[:2], dtype=int))
+    places = {
+        "row": list(labels),
+        "scenario": scenarios,
+        "scenario_set": ("scenario", ["test", "test"]),
+        "output": outputs,
+    }
+    attributes = {
+        "configuration": protocol.definition.model_dump_json(),
+        "evaluations": "calls",
+        "study": name,
+        "source": "vehiclemor",
+        "kernel_hash": "0",
+    }
+    return xr.Dataset(variables, places, attributes)
+
+
+def unseen(results):
+    """Runs of the lane change under the names of those on unseen inputs."""
+    runs = results["figures-2-4"].sel(start="equilibrium").isel(amplitude_factor=0, drop=True)
+    parts = [runs.assign_coords(amplitude_factor=factor) for factor in (-1.2, 0.5, 0.0)]
+    dataset = xr.concat(parts, "amplitude_factor", coords="different", compat="equals")
+    manifold = dataset.sel({"method": ["pod_state"]}).assign_coords(method=["slow_manifold"])
+    return {"unseen-inputs": dataset, "unseen-inputs-trained": manifold}
+
+
+@pytest.fixture(scope="session")
+def drawn(results):
+    """Every figure of the catalogue, drawn."""
+    figures = {}
+    for name, entry in FIGURES.items():
+        data = dict(results)
+        if entry.drawing == "error map":
+            data[entry.studies[0]] = grid_of(entry)
+        elif entry.drawing == "pareto":
+            data[entry.studies[0]] = protocol_results(entry.studies[0])
+        elif entry.drawing == "unseen inputs":
+            data = unseen(results)
+        with styled():
+            figures[name] = entry.draw(data)
+            FigureCanvasAgg(figures[name]).draw()
+    return figures
+
+
+def texts_of(figure):
+    """All texts that are seen, with what they take of the canvas."""
+    axes = [
+        getattr(a, f"{name}axis")
+        for a in figure.axes
+        for name in "xyz"
+        if hasattr(a, name + "axis")
+    ]
+    every = {label for axis in axes for label in axis.get_ticklabels(which="both")}
+    ticks = [tick.label1 for axis in axes if axis.axes.axison for tick in axis._update_ticks()]
+    found = [text for text in figure.findobj(Text) if text not in every] + ticks
+    seen = [text for text in found if text.get_visible() and text.get_text().strip()]
+    for text in seen:
+        if isinstance(text, Text3D):
+            # Its place on the canvas is known only while it is drawn.
+            x, y, _ = proj_transform(*text.get_position_3d(), text.axes.get_proj())
+            Text.set_position(text, (x, y))
+    return [(text, Text.get_window_extent(text)) for text in seen]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_texts_are_on_the_canvas_and_apart(drawn, name):
+    figure = drawn[name]
+    texts = texts_of(figure)
+    canvas = figure.bbox.padded(1.0)
+    for text, box in texts:
+        assert canvas.x0 <= box.x0, text
+        assert canvas.y0 <= box.y0, text
+        assert box.x1 <= canvas.x1, text
+        assert box.y1 <= canvas.y1, text
+    for (one, first), (other, second) in combinations(texts, 2):
+        assert not first.padded(-1.0).overlaps(second.padded(-1.0)), (one, other)
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - SCHEMATICS))
+def test_axes_are_labelled_with_units_and_no_label_is_longer_than_its_axis(drawn, name):
+    figure = drawn[name]
+    for axis in figure.axes:
+        label = axis.yaxis.label
+        if label.get_text():
+            units = ("(", "/", "energy")
+            assert any(unit in label.get_text() for unit in units)
+            assert label.get_window_extent().height <= axis.bbox.height
+        if axis.get_xlabel():
+            assert axis.xaxis.label.get_window_extent().width <= 1.1 * axis.bbox.width
+
+
+@pytest.mark.parametrize("name", sorted(set(FIGURES) - SCHEMATICS))
+def test_lines_differ_in_grey_too(drawn, name):
+    for axis in drawn[name].axes:
+        looks = {}
+        for line in axis.lines:
+            label = line.get_label()
+            if label and not label.startswith("_") and line.get_linestyle() != "None":
+                dashes = line._dash_pattern
+                face = line.get_markerfacecolor() if line.get_marker() not in ("None", None) else ""
+                grey = round(luminance(to_rgb(line.get_color())), 1), line.get_linewidth()
+                look = str((dashes, line.get_marker(), face, grey))
+                assert looks.setdefault(look, label) == label
+    assert drawn[name].axes
+
+
+def test_wheels_are_round(drawn):
+    for name in ("1", "8"):
+        lines = drawn[name].axes[0].lines
+        wheels = [line for line in lines if np.size(line.get_data_3d()[0]) > 100]
+        assert len(wheels) == 4
+        for wheel in wheels:
+            points = np.transpose(wheel.get_data_3d())
+            away = np.linalg.norm(points - points[:-1].mean(axis=0), axis=1)
+            np.testing.assert_allclose(away, away[0], rtol=1e-9)
+
+
+def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, results):
+    run = results["figures-2-4"].sel({"method": "pod", "start": "equilibrium", "output": "pitch"})
+    axis = drawn["4"].axes[0]
+    marks = [
+        line.get_ydata()[0]
+        for line in axis.lines
+        if line.get_marker() == "<" and line.get_ydata().size
+    ]
+    assert run["rms_error"].item() in marks
+    assert "largest error\nin each 0.5 s" in axis.get_ylabel()
+
+
+def test_maps_hold_the_nominal_input_and_read_well(drawn):
+    cells = [t for t in drawn["vehicle-map"].axes[0].texts if t.get_text()]
+    assert len(cells) == 49
+    assert {t.get_fontsize() for t in cells} == {7.0}
+    assert not [t for t in cells if "e" in t.get_text()]
+    mesh = drawn["vehicle-map"].axes[0].collections[0]
+    colors = mesh.to_rgba(mesh.get_array()).reshape(-1, 4)
+    for text, color in zip(cells, colors, strict=True):
+        one, other = sorted((luminance(to_rgb(text.get_color())), luminance(color[:3])))
+        assert (other + 0.05) / (one + 0.05) > 4.5
+
+
+def test_the_grid_of_figure_13_holds_the_nominal_input():
+    from vehiclemor.study.plans.grid import expand
+    from vehiclemor.study.plans.study_file import load_studies
+
+    grid = expand("perturbation-grid", load_studies("perturbation-grid")["perturbation-grid"])
+    for factor in ("frequency_factor", "amplitude_factor"):
+        assert 1.0 in np.round(grid.dimensions[factor], 12)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (5.23, "5.2"), (9.97, "10"), (0.056, "0.056"), (4.4e-4, "0.0004"), (123.0, "123")],
+)
+def test_numbers_of_maps(value, text):
+    assert two_digits(value) == text
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "expected"),
+    [
+        (0.03, "m", (1e3, "mm")),
+        (3.5, "m", (1.0, "m")),
+        (2e-5, "rad", (1e6, "µrad")),
+        (0.0, "m", (1.0, "m")),
+        (1e-3, "N", (1.0, "N")),
+        (1e-14, "m/s", (1e9, "nm/s")),
+    ],
+)
+def test_readable_units(largest, unit, expected):
+    assert readable_unit(largest, unit) == expected
+
+
+def test_styles_and_resolution(tmp_path):
+    def drawn_with(style="", dpi=None):
+        with styled(style, dpi):
+            figure, _ = panels(1, 1, (1.0, 1.0))
+            path = save_figure(figure, tmp_path / "a.png")
+        return imread(path)
+
+    plain = drawn_with()
+    assert plain.shape == (200, 200, 4)
+    assert drawn_with(dpi=50).shape == (50, 50, 4)
+    assert drawn_with("dark_background").mean() < plain.mean()
+    mine = tmp_path / "mine.mplstyle"
+    mine.write_text("figure.facecolor: black\n")
+    assert drawn_with(str(mine)).mean() < plain.mean()
+    assert matplotlib.rcParams["savefig.dpi"] == matplotlib.rcParamsDefault["savefig.dpi"]
+    with pytest.raises(InputError, match="a figure is one of pdf, svg, png"):
+        save_figure(panels(1, 1, (1.0, 1.0))[0], tmp_path / "a.gif")
+
+
+@pytest.mark.parametrize("option", [["--style", "no-such-style"], ["--dpi", "5"]])
+def test_wrong_styles_and_resolutions_are_one_line(option, tmp_path, capsys):
+    assert main(["figures", "--only", "5", "--out", str(tmp_path), *option]) == 2
+    assert option[1] in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_pareto_figures_are_drawn_where_their_study_is_stored(tmp_path, capsys, monkeypatch):
+    everything = dict(FIGURES)
+    chosen = {"5": everything["5"], "pareto-suspension": everything["pareto-suspension"]}
+    monkeypatch.setattr("vehiclemor.report.figures.catalogue.FIGURES", chosen)
+    folders = ["--results", str(tmp_path), "--out", str(tmp_path / "figures")]
+    assert main(["figures", *folders]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 5
+    assert "pareto-suspension; vehiclemor run predictive" in printed[-1]
+    (tmp_path / "studies").mkdir(exist_ok=True)
+    study = "predictive-double_wishbone"
+    write_dataset(protocol_results(study), tmp_path / "studies" / f"{study}.nc")
+    assert left_out(tmp_path) == {}
+    assert main(["figures", *folders]) == 0
+    printed = capsys.readouterr().out
+    assert "figure-pareto-suspension.pdf" in printed
+    assert "left out" not in printed
