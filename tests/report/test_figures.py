@@ -18,6 +18,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.figures.lines import panels
 from vehiclemor.report.figures.perturbations import luminance, two_digits
+from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.regenerate import left_out
@@ -138,7 +139,10 @@ def texts_of(figure):
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_texts_are_on_the_canvas_and_apart(drawn, name):
-    figure = drawn[name]
+    check_texts(drawn[name])
+
+
+def check_texts(figure):
     texts = texts_of(figure)
     canvas = figure.bbox.padded(1.0)
     for text, box in texts:
@@ -279,7 +283,7 @@ def test_pareto_figures_are_drawn_where_their_study_is_stored(tmp_path, capsys, 
     assert main(["figures", *folders]) == 0
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 5
-    assert "pareto-suspension; vehiclemor run predictive" in printed[-1]
+    assert "left out: pareto-suspension (vehiclemor run predictive" in printed[-1]
     (tmp_path / "studies").mkdir(exist_ok=True)
     study = "predictive-double_wishbone"
     write_dataset(protocol_results(study), tmp_path / "studies" / f"{study}.nc")
@@ -288,3 +292,64 @@ def test_pareto_figures_are_drawn_where_their_study_is_stored(tmp_path, capsys, 
     printed = capsys.readouterr().out
     assert "figure-pareto-suspension.pdf" in printed
     assert "left out" not in printed
+
+
+@pytest.mark.parametrize(
+    ("study", "place", "kind"),
+    [
+        ("figures-2-4", {"start": "dropped"}, "histories"),
+        ("figures-2-4", {"start": "dropped"}, "paths"),
+        ("figures-2-4", {"start": "dropped"}, "errors"),
+        ("figures-2-4", {"start": "equilibrium", "method": "pod"}, "histories"),
+        ("figures-6-7", {"rank": 3, "method": "full_order"}, "histories"),
+        ("figures-6-7", {}, "errors"),
+        ("figure-13-frequency", {}, "errors"),
+        ("vehicle-control-period", {}, "errors"),
+    ],
+)
+def test_pictures_of_results(results, study, place, kind):
+    figure = plot_result(results[study].sel(place), None, kind)
+    FigureCanvasAgg(figure).draw()
+    check_texts(figure)
+    assert figure.get_suptitle().startswith(results[study].attrs["title"][:20])
+    assert figure.axes[-1].get_xlabel()
+
+
+def test_a_picture_shows_both_runs_and_their_difference(results):
+    run = results["figures-6-7"].sel({"method": "pod", "rank": 3}).squeeze(drop=False)
+    figure = plot_result(run)
+    upper, lower = figure.axes[0], figure.axes[2]
+    full, reduced = (
+        1e3 * run[name].sel(output="second_euler_angle")
+        for name in ("reference_outputs", "outputs")
+    )
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), full)
+    np.testing.assert_array_equal(upper.lines[1].get_ydata(), reduced)
+    error = (
+        1e-3
+        * lower.lines[0].get_ydata()
+        / readable_unit(float(abs(full - reduced).max()) * 1e-3, "rad")[0]
+    )
+    np.testing.assert_allclose(error, 1e-6 * (reduced - full), atol=1e-18)
+    assert "mrad" in upper.get_ylabel()
+    assert "rad" in lower.get_ylabel()
+
+
+@pytest.mark.parametrize(
+    ("study", "kind", "words"),
+    [
+        ("figure-13-frequency", "histories", "no histories"),
+        ("figures-2-4", "histories", "choose a point of the grid first: start"),
+        ("figures-6-7", "path", "unknown kind of plot 'path'"),
+        ("figure-11", "paths", "double_wishbone has no path"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said(results, study, kind, words):
+    with pytest.raises(InputError, match=words):
+        plot_result(results[study].isel(rank=0), None, kind)
+
+
+def test_full_order_alone_has_no_errors(results):
+    alone = results["figures-6-7"].sel({"method": ["full_order"], "rank": 3}).squeeze("start")
+    with pytest.raises(InputError, match="full order alone"):
+        plot_result(alone, None, "errors")

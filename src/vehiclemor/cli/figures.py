@@ -22,7 +22,8 @@ def figures(
     ----------
     only
         Names of figures, separated by commas: those of the paper, such as 6, or histories-,
-        errors-, map- or pareto- and the name of a model.  The paper's by default.
+        errors-, map- or pareto- and the name of a model.  All by default, but Pareto figures only
+        where their study is stored.
     out
         Folder of the figures.
     results
@@ -45,6 +46,6 @@ def figures(
 
     missing = {} if chosen else left_out(results)
     if missing:
-        print(f"left out, for their studies are not stored: {', '.join(missing)}", end="; ")
-        print("vehiclemor run predictive makes them")
+        made = "vehiclemor run predictive makes their studies"
+        print(f"left out: {', '.join(missing)} ({made})")
     return 0

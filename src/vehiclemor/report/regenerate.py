@@ -40,6 +40,8 @@ def regenerate_figures(
     from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
     from vehiclemor.report.figures.saving import FORMATS, save_figure, styled
 
+    # What is wrong is named before anything is computed.
+    styled(style, dpi)
     missing = left_out(results)
     chosen = {name: find(name, results) for name in only or FIGURES if only or name not in missing}
     make_folder(out)

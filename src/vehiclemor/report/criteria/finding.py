@@ -56,7 +56,13 @@ class Finding:
 def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
     """One method at one place of the grid."""
     # A dictionary: `method` is also the name of an argument of `sel`.
-    return dataset.sel({"method": label, **place}).squeeze(drop=True)
+    return without_single(dataset.sel({"method": label, **place}))
+
+
+def without_single(dataset: xr.Dataset) -> xr.Dataset:
+    """Without dimensions of the grid that have one value; a model may have a single output."""
+    single = [d for d in dataset["status"].dims if dataset.sizes[d] == 1 and d != "method"]
+    return dataset.squeeze(single, drop=True)
 
 
 def deviation_history(point: xr.Dataset, output: str) -> xr.DataArray:

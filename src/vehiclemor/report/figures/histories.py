@@ -18,7 +18,15 @@ from vehiclemor.report.figures.curves import (
     draw_history,
     draw_largest_errors,
 )
-from vehiclemor.report.figures.lines import CROSS, Results, legend_outside, letter, panels, styles
+from vehiclemor.report.figures.lines import (
+    CROSS,
+    Results,
+    Style,
+    legend_outside,
+    letter,
+    panels,
+    styles,
+)
 from vehiclemor.report.published import rms_numbers
 
 STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
@@ -115,7 +123,7 @@ def _draw(axis: Axes, content: str, panel: Panel, look: Look) -> dict[str, str]:
         ended = draw_largest_errors(axis, panel, period, look.limits)
         axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
         if published:
-            line = {"color": "black", "linestyle": ":", "label": "published RMS error"}
+            line: Style = {"color": "black", "linestyle": ":", "label": "published RMS error"}
             axis.axhline(published.value, **line)
     for number, moment in enumerate(look.marks):
         axis.axvline(moment, label="" if number else "end of a control period", **BREAK)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import cycle
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -62,9 +62,13 @@ def letter(number: int) -> str:
 
 
 def legend_outside(
-    figure: Figure, axes: Iterable[Axes], columns: int = 4, place: str = "upper"
+    figure: Figure,
+    axes: Iterable[Axes],
+    columns: int = 4,
+    place: Literal["upper", "lower"] = "upper",
 ) -> None:
     """One legend above (or `lower`: below) all panels, of the lines in some of them."""
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
     columns = min(columns, len(shown))
-    figure.legend(shown.values(), shown, loc=f"outside {place} center", ncols=columns)
+    where = "outside upper center" if place == "upper" else "outside lower center"
+    figure.legend(shown.values(), shown, loc=where, ncols=columns)

@@ -12,7 +12,7 @@ from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
-MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "*", "X")
+MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "H", "8")
 GREYS = (("#000000", "-"), ("#777777", "-"), ("#AAAAAA", "-"), ("#444444", "--"))
 
 

@@ -1,14 +1,15 @@
 """Errors of any model over the axes of a study's grid: curves and maps."""
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import Colormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from vehiclemor.report.figures.lines import Results, Style, legend_outside, letter, panels, styles
 from vehiclemor.report.labels import error_label, readable_unit, unit_of
@@ -30,7 +31,7 @@ def figure_error_curves(
     outputs: Sequence[str],
     methods: Mapping[str, str],
     axis: str = "",
-    legend: str = "upper",
+    legend: Literal["upper", "lower"] = "upper",
 ) -> Figure:
     """RMS errors against one axis of the grid: panels for each study and output.
 
@@ -79,7 +80,7 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
             axis.plot(
                 none,
                 np.zeros(none.size),
-                label=f"{methods[method]}: no error, no place on the axis",
+                label=f"{methods[method]}: error 0, off the log axis",
                 **below,
                 **NOTHING,
             )
@@ -118,10 +119,10 @@ def figure_error_map(
         if not values:
             factor, unit = 1.0, unit_of(dataset, output)
         errors, shown = factor * errors, factor * shown
-        norm = LogNorm(float(np.nanmin(shown[shown > 0.0])), float(np.nanmax(shown)))
-        mesh = None
+        limits = float(np.nanmin(shown[shown > 0.0])), float(np.nanmax(shown))
+        norm = LogNorm(*limits)
         for axis, found in zip(axes[row], errors, strict=True):
-            cells = np.maximum(found, norm.vmin or 0.0)
+            cells = np.maximum(found, limits[0])
             style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
             mesh = axis.pcolormesh(frequency, amplitude, cells, norm=norm, **style)
             if values:
@@ -131,8 +132,13 @@ def figure_error_map(
             axis.grid(visible=False)
         axes[row, 0].set_ylabel("amplitude perturbation (%)")
         label = error_label(dataset, "RMS error", output, unit)
-        bar = figure.colorbar(mesh, ax=axes[row, :], label=label, extend="min" if values else None)
-        _tick(bar.ax, norm)
+        bar = figure.colorbar(
+            axes[row, 0].collections[0],
+            ax=axes[row, :],
+            label=label,
+            extend="min" if values else None,
+        )
+        tick_decades(bar.ax.yaxis, *limits)
     for number, axis in enumerate(axes.flat):
         axis.set_title(f"{letter(number)} {list(methods.values())[number % len(methods)]}")
     for axis in axes[-1]:
@@ -160,14 +166,12 @@ def _outline(
     axis.contour(fine[1], fine[0], smooth, levels=[np.log(bound)], **lines)
 
 
-def _tick(axis: Axes, norm: LogNorm) -> None:
-    """Ticks of a colour bar: 1, 2, 5 of each decade where there are few decades."""
-    assert norm.vmin is not None
-    assert norm.vmax is not None
-    if np.log10(norm.vmax / norm.vmin) < FEW_DECADES:
-        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.yaxis.set_minor_formatter(NullFormatter())
+def tick_decades(axis: Axis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis: 1, 2, 5 of each decade where there are few decades."""
+    if np.log10(high / low) < FEW_DECADES:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
 
 
 def two_digits(value: float) -> str:
@@ -198,6 +202,6 @@ def _write(
 
 def luminance(color: Sequence[float]) -> float:
     """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
-    parts = np.asarray(matplotlib.colors.to_rgb(tuple(color)))
+    parts = np.asarray(color, dtype=float)
     linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from vehiclemor.errors import InputError
 from vehiclemor.registry import component, unknown
+from vehiclemor.report.criteria.finding import at_point, without_single
 from vehiclemor.report.figures.curves import (
     Curve,
     Panel,
@@ -22,7 +22,11 @@ from vehiclemor.report.figures.curves import (
     positions,
 )
 from vehiclemor.report.figures.lines import CROSS, FULL, legend_outside, panels, styles
-from vehiclemor.report.figures.perturbations import figure_error_curves, figure_error_map
+from vehiclemor.report.figures.perturbations import (
+    figure_error_curves,
+    figure_error_map,
+    tick_decades,
+)
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import method_text, unit_of
 from vehiclemor.study.plans.study_file import FACTORS
@@ -100,14 +104,11 @@ def _outputs(dataset: xr.Dataset) -> list[str]:
 
 def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
     """Label of each method -> its run or errors."""
-    if "method" not in dataset.dims:
-        given = dataset.coords.get("method")
-        configuration = json.loads(dataset.attrs["configuration"])
-        return {str(configuration["method"] if given is None else given.item()): dataset}
-    return {
-        str(label): dataset.sel({"method": label}).squeeze(drop=True)
-        for label in dataset["method"].values
-    }
+    if "method" in dataset.dims:
+        return {str(label): at_point(dataset, label) for label in dataset["method"].values}
+    given = dataset.coords.get("method")
+    label = json.loads(dataset.attrs["configuration"])["method"] if given is None else given.item()
+    return {str(label): without_single(dataset)}
 
 
 def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
@@ -218,9 +219,7 @@ def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
         share = 100.0 * ratio.where(np.isfinite(ratio) & (ratio > 0.0)).values
         look = {"color": style["color"], "marker": marker, "linestyle": "none", "markersize": 5}
         axis.semilogx(share, places, label=method_text(label), **look)
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    tick_decades(axis.xaxis, *axis.get_xlim())
     axis.set_yticks(places, [name.replace("_", " ") for name in names], fontsize=7)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlabel("RMS error (% of the output's range)")

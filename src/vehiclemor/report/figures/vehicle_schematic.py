@@ -114,7 +114,7 @@ def _draw_sizes(axis: Any, p: dict[str, float]) -> None:
     for ends, away, label_at, label in (
         ((front_right, whole), side, [-0.1, -0.35, 0.0], "$a$ = {}"),
         ((whole, rear), side, [-0.1, -0.35, 0.0], "$b$ = {}"),
-        ((front_left, front_right), [0.75, 0.0, 0.0], [0.35, -0.15, 0.0], "$T_f$ = {}"),
+        ((front_left, front_right), [0.75, 0.0, 0.0], [0.5, -0.3, 0.0], "$T_f$ = {}"),
         ((rear_left, rear_right), [0.35, 0.0, 0.0], [0.31, 0.0, -0.09], "$T_r$ = {}"),
         ((0.0 * above, above), [0.0, 0.0, 0.0], [-0.48, 0.0, -0.50], "$h_s$ = {}"),
     ):
