@@ -143,7 +143,7 @@ def test_progress_without_a_terminal_is_lines(capsys, monkeypatch):
 
 @pytest.mark.parametrize("command", ["run", "compare", "figures"])
 def test_every_long_command_tells_of_cells(capsys, monkeypatch, tmp_path, command):
-    def long(*_, **_options):
+    def long(*_, **__):
         Workers("mine", tmp_path, asked={"a", "b", "c"}, finished={"a"})._report()
         return pd.DataFrame({"verdict": []}) if command == "compare" else {}
 

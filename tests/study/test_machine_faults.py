@@ -3,6 +3,8 @@
 import errno
 import os
 import signal
+import subprocess
+import sys
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
@@ -14,6 +16,7 @@ import pytest
 from vehiclemor.errors import FileError, MachineError
 from vehiclemor.reduction.methods import fixed_basis, pod
 from vehiclemor.study import evaluate, store, workers
+from vehiclemor.study.failure import Failure
 from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
 
@@ -106,26 +109,21 @@ def raising(*_):
     raise ZeroDivisionError("in a plug-in")
 
 
-class Broken:
-    """A reduced model that can't tell its residual, after a run that went well."""
-
-    def __init__(self, reduced) -> None:
-        self.reduced = reduced
-
-    def __getattr__(self, name):
-        return raising() if name == "effective_rank" else getattr(self.reduced, name)
+def test_a_bug_in_a_check_ends_no_study(run, monkeypatch):
+    monkeypatch.setattr(pod, "METHOD", replace(pod.METHOD, check=raising))
+    assert run("pod") == ["error", "error"]
+    assert run("fixed_basis") == ["ok", "ok"]
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [
-        {"check": raising},
-        {"fit": lambda *a: Broken(fixed_basis.METHOD.fit(*a))},
-    ],
-    ids=["check", "result"],
-)
-def test_a_bug_anywhere_in_a_method_ends_no_study(run, monkeypatch, changed):
-    monkeypatch.setattr(pod, "METHOD", replace(pod.METHOD, **changed))
+def test_a_bug_after_a_run_that_went_well_ends_no_study(run, monkeypatch):
+    measured = evaluate.metrics_dataset
+
+    def broken(model, experiment, outcome, reduced):
+        if experiment.method == "pod" and not isinstance(outcome, Failure):
+            raising()
+        return measured(model, experiment, outcome, reduced)
+
+    monkeypatch.setattr(evaluate, "metrics_dataset", broken)
     assert run("pod") == ["error", "error"]
     assert run("fixed_basis") == ["ok", "ok"]
 
@@ -239,6 +237,12 @@ def test_workers_that_are_killed_again_and_again_end_the_run(run, monkeypatch):
     with pytest.raises(MachineError, match=r"a worker process was killed.*run again to resume"):
         run("pod", jobs=2)
     assert tries == [4] * workers.TRIES
+
+
+def test_a_worker_without_its_driver_ends():
+    text = "import sys, time; from vehiclemor.study.workers import begin; begin(0, ''); "
+    command = [sys.executable, "-c", text + "time.sleep(60)"]
+    assert subprocess.run(command, timeout=50, check=False).returncode == 1
 
 
 STUDY = GRID.replace("[2, 3]", "[1, 2, 3, 4, 5, 6, 7, 8]") + "[[methods]]\nmethod = 'full_order'\n"

@@ -65,7 +65,7 @@ def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_pa
         assert time.monotonic() < deadline
         time.sleep(0.01)
     process.kill()
-    # Workers hold this end of the pipe for as long as they live, which was minutes.
+    # Workers hold this end of the pipe for as long as they live, which was 330 s.
     process.communicate(timeout=60)
     finished = {path.name: path.stat().st_mtime_ns for path in cells.glob("[!.]*.nc")}
     (cells / f"{TEMPORARY}{process.pid}-left.nc").write_bytes(b"half a file")
