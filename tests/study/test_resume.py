@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 from vehiclemor.files import TEMPORARY
+from vehiclemor.study import workers
 from vehiclemor.study.run import run_studies
 
 STUDY = """
@@ -106,3 +107,35 @@ def test_stored_dataset_round_trips(study, tmp_path):
     written = run_studies(str(study), tmp_path)["small"]
     with xr.open_dataset(tmp_path / "studies" / "small.nc") as read:
         xr.testing.assert_identical(written, read.load())
+
+
+LITERAL = """[[methods]]
+method = "pod"
+preset = "literal"
+
+[[methods]]
+method = "pod"
+label = "another"
+
+"""
+
+
+def test_workers_begin_with_different_methods(tmp_path: Path, monkeypatch):
+    class EnoughError(Exception):
+        pass
+
+    sent = []
+
+    def by_workers(groups, folder, jobs):
+        sent.extend(group[0].method for group in groups)
+        raise EnoughError
+
+    monkeypatch.setattr(workers, "evaluated_by_workers", by_workers)
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY.replace("[[methods]]", f"{LITERAL}[[methods]]", 1))
+    with pytest.raises(EnoughError):
+        run_studies(str(path), tmp_path / "results", jobs=2)
+    # Their loops are then compiled side by side.
+    methods = set(sent)
+    assert len(sent) > len(methods) > 1
+    assert set(sent[: len(methods)]) == methods
