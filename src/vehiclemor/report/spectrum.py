@@ -79,8 +79,8 @@ def spectrum_table(model: str) -> pd.DataFrame:
 def spectrum_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """Rows of `spectrum_table` as text, presets side by side."""
     shown = {
-        "median_singular_value": "median s. value",
-        "largest_singular_value": "largest s. value",
+        "median_singular_value": "median",
+        "largest_singular_value": "largest",
         "largest_left_out": "left out",
     }
     presets = list(dict.fromkeys(row["preset"] for row in rows))

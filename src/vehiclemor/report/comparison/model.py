@@ -1,6 +1,9 @@
 """One model, whatever it declares: errors of every method, costs, unseen inputs, paper's terms."""
 
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -21,7 +24,8 @@ from vehiclemor.simulation.build import build
 LEGEND = (
     "RMS errors, SI units; nom.: in the nominal run, on which the methods are trained (replay is "
     "exact there); pert.: the largest over perturbations of frequency and amplitude by up to 20 %, "
-    "with the training unchanged; -: exactly zero, or none"
+    "with the training unchanged, from the model's first start; failed: in some of them; "
+    "-: exactly zero, or none"
 )
 
 
@@ -45,6 +49,13 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True).assign(model=name)
 
 
+def _largest(rows: Sequence[Mapping[str, Any]], column: str) -> str:
+    """The largest error; a run that has failed leaves none, and then there is no largest one."""
+    if any(row["status"] != "ok" for row in rows):
+        return "failed"
+    return power(max((row[column] for row in rows), default=math.nan))
+
+
 def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
     """The comparison of a model as text."""
     shown = component("model", name).shown.printed_outputs
@@ -55,12 +66,15 @@ def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
     for start in dict.fromkeys(row["start"] for row in nominal_runs):
         heading = f"start {start}"
         for row in [row for row in nominal_runs if row["start"] == start]:
-            # A run that has failed leaves no error, and then there is no largest one.
-            same = [r for r in records if r["kind"] == "perturbed" and r["method"] == row["method"]]
-            moved = {c: max((r[c] for r in same), key=lambda e: (e != e, e)) for c in columns}
+            same = [
+                r
+                for r in records
+                if r["kind"] == "perturbed"
+                and (r["method"], r["start"]) == (row["method"], row["start"])
+            ]
             told = notes.marks("" if row["status"] == "ok" else row["message"])
             cells = [f"{row['method']} {told}".rstrip(), str(int(row["effective_rank"]))]
-            cells += [power(errors[column]) for column in columns for errors in (row, moved)]
+            cells += [cell for c in columns for cell in (power(row[c]), _largest(same, c))]
             lines.append(Line(cells, heading=heading))
             heading = ""
     heads = ["method", "rank"]
