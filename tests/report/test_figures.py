@@ -349,6 +349,20 @@ def test_what_cannot_be_drawn_is_said(results, study, kind, words):
         plot_result(results[study].isel(rank=0), None, kind)
 
 
+def test_errors_over_one_axis_name_the_value_of_the_other(results):
+    study = results["figure-14"].sel({"method": ["pod"]})
+    moved = study.assign_coords(frequency_factor=[2.0])
+    both = xr.concat([study.assign_coords(frequency_factor=[1.0]), moved], "frequency_factor")
+    figure = plot_result(both, None, "errors")
+    assert figure.get_suptitle().endswith("; frequency_factor 1.0")
+    assert all(float(tick).is_integer() for tick in figure.axes[0].get_xticks())
+
+
+def test_marks_of_rms_errors_are_named(results):
+    (legend,) = plot_result(results["figure-11"].isel(rank=0)).legends
+    assert "RMS error over the run" in [text.get_text() for text in legend.get_texts()]
+
+
 def test_full_order_alone_has_no_errors(results):
     alone = results["figures-6-7"].sel({"method": ["full_order"], "rank": 3}).squeeze("start")
     with pytest.raises(InputError, match="full order alone"):

@@ -12,6 +12,8 @@ from vehiclemor.report.labels import axis_label, error_label, readable_unit, uni
 
 LARGEST = "largest error in each {period:.2g} s"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
+# Longer labels need two lines beside a low panel.
+LONG = 22
 BREAK: Style = {"color": "#777777", "linewidth": 0.8}
 
 
@@ -114,7 +116,8 @@ def draw_errors(axis: Axes, panel: Panel, kind: str = "error", floor: bool = Tru
         if best is not None:
             shade = {"color": "#BBBBBB", "alpha": 0.5, "label": "RMS of the best approximation"}
             axis.axhspan(-best, best, **shade)
-    axis.set_ylabel(error_label(panel.full, kind, panel.output, unit))
+    label = error_label(panel.full, kind, panel.output, unit)
+    axis.set_ylabel(label if len(label) <= LONG else label.replace(" of ", " of\n", 1))
 
 
 def draw_largest_errors(
@@ -137,6 +140,7 @@ def draw_largest_errors(
             last = int(np.flatnonzero(np.isfinite(largest))[-1])
             ended["has diverged"] = color
             axis.plot(edges[last + 1], largest[last], color=color, **CROSS)
+    axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
     if limits:
         axis.set_ylim(*limits)
     else:

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures.curves import (
     BREAK,
-    RMS_MARK,
     Curve,
     Panel,
     draw_errors,
@@ -121,7 +120,6 @@ def _draw(axis: Axes, content: str, panel: Panel, look: Look) -> dict[str, str]:
         last = float(panel.full["time"][-1])
         period = (published.control_period if published else None) or last / 50.0
         ended = draw_largest_errors(axis, panel, period, look.limits)
-        axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
         if published:
             line: Style = {"color": "black", "linestyle": ":", "label": "published RMS error"}
             axis.axhline(published.value, **line)

@@ -69,6 +69,7 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
         axis.set_xlabel(f"{factor.split('_', maxsplit=1)[0]} perturbation (%)")
     else:
         axis.set_xlabel(factor.replace("_", " ") + UNITS.get(factor, ""))
+        axis.locator_params(axis="x", integer=places.dtype.kind == "i")
     for method, style in styles(methods).items():
         errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
         shown = np.where(errors > 0.0, errors, np.nan)

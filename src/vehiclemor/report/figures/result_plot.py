@@ -66,7 +66,7 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     with styled():
         figure = DRAWINGS[kind](dataset)
-        figure.suptitle(_title(dataset), fontsize="medium", wrap=True)
+        figure.suptitle(figure.get_suptitle() or _title(dataset), fontsize="medium", wrap=True)
         if path is not None:
             save_figure(figure, path)
     return figure
@@ -114,7 +114,7 @@ def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
 def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
     """A run with the full-order histories, and the reduced runs."""
     if "time" not in dataset.dims:
-        raise InputError("no histories in this result (keep = metrics); its errors can be drawn")
+        raise InputError("no histories in this result (keep = metrics); choose the kind `errors`")
     points = _points(dataset)
     first = next(iter(points.values()))
     left = [str(name) for name in first["status"].dims]
@@ -147,7 +147,7 @@ def figure_histories(dataset: xr.Dataset) -> Figure:
         axis.set_xlim(float(full["time"][0]), float(full["time"][-1]))
     for text, color in ended.items():
         axes[0, 0].plot([], [], color=color, label=text, **CROSS)
-    legend_outside(figure, [axes[0, 0]], place="lower")
+    legend_outside(figure, axes[:each, 0], place="lower")
     return figure
 
 
@@ -200,10 +200,13 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
     methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
     texts = {m: method_text(m) for m in methods}
     shown = {"outputs": _outputs(dataset), "methods": texts}
-    if not both:
-        return figure_error_curves({"": dataset}, axis=drawn[0], legend="lower", **shown)
-    cells = len(grid[FACTORS[0]]) * len(grid[FACTORS[1]])
-    return figure_error_map({"": dataset}, values=cells <= WRITTEN, **shown)
+    if both:
+        cells = len(grid[FACTORS[0]]) * len(grid[FACTORS[1]])
+        figure = figure_error_map({"": dataset}, values=cells <= WRITTEN, **shown)
+    else:
+        figure = figure_error_curves({"": dataset}, axis=drawn[0], legend="lower", **shown)
+    figure.suptitle(str(dataset.attrs.get("title", "")))
+    return figure
 
 
 def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
