@@ -49,6 +49,6 @@ def test_compiled_arctangents_are_the_arctangents_and_do_not_disturb_each_other(
     states[::7, 2] = np.nan
     states[1::7, 1] = np.inf
     states[2::7, 3] = -0.0
-    found = model.outputs_at(states, np.zeros((400, 3)))
+    found = model.along("outputs", states, np.zeros((400, 3)))
     np.testing.assert_array_equal(found[:, :4], states)
     np.testing.assert_allclose(found[:, 4:], np.arctan(states), rtol=3.4e-16, atol=0.0)
