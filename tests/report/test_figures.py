@@ -15,6 +15,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
+from vehiclemor.report.accessor import ResultAccessor
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.figures.lines import panels
 from vehiclemor.report.figures.pareto import figure_pareto
@@ -381,7 +382,7 @@ def test_results_that_lack_what_is_drawn(results, change, kind):
 
 def test_a_picture_needs_a_path(results):
     with pytest.raises(InputError, match="path: 3 is not a path"):
-        results["figure-11"].vehiclemor.plot(path=3)
+        ResultAccessor(results["figure-11"]).plot(path=3)
 
 
 def test_pareto_figure_of_methods_that_all_fail():
