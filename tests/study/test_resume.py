@@ -110,13 +110,14 @@ def test_stored_dataset_round_trips(study, tmp_path):
         xr.testing.assert_identical(written, read.load())
 
 
-LITERAL = """[[methods]]
+TWO_OF_A_KIND = """[[methods]]
 method = "pod"
-preset = "literal"
+label = "first"
 
 [[methods]]
 method = "pod"
-label = "another"
+label = "second"
+preset = "literal"
 
 """
 
@@ -133,7 +134,7 @@ def test_workers_begin_with_different_methods(tmp_path: Path, monkeypatch):
 
     monkeypatch.setattr(workers, "evaluated_by_workers", by_workers)
     path = tmp_path / "study.toml"
-    path.write_text(STUDY.replace("[[methods]]", f"{LITERAL}[[methods]]", 1))
+    path.write_text(STUDY.replace("[[methods]]", f"{TWO_OF_A_KIND}[[methods]]", 1))
     with pytest.raises(EnoughError):
         run_studies(str(path), tmp_path / "results", jobs=2)
     # Their loops are then compiled side by side.

@@ -80,9 +80,7 @@ def assemble(
         If a name of the model begins with an underscore: those are the generated names.  If results
         are no real expressions of the arguments and parameters, or don't fill their shape.
     """
-    for symbol in [*parameters, *(s for group in arguments.values() for s in group)]:
-        if symbol.name.startswith("_"):
-            raise ValueError(f"{symbol.name}: names that begin with an underscore are reserved")
+    _check_names([*parameters, *(s for group in arguments.values() for s in group)])
     parameter_set = frozenset(parameters)
     results = {name: (_sympified(name, *result), result[1]) for name, result in results.items()}
     wanted = [expression for expressions, _ in results.values() for expression in expressions]
@@ -132,6 +130,12 @@ def assemble(
         symbols,
         functions,
     )
+
+
+def _check_names(symbols: Sequence[sp.Symbol]) -> None:
+    for symbol in symbols:
+        if symbol.name.startswith("_"):
+            raise ValueError(f"{symbol.name}: names that begin with an underscore are reserved")
 
 
 def _sympified(name: str, expressions: Sequence[object], shape: tuple[int, ...]) -> list[sp.Expr]:
