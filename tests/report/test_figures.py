@@ -15,10 +15,12 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
+from vehiclemor.report.accessor import ResultAccessor
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.figures.lines import panels
+from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.perturbations import luminance, two_digits
-from vehiclemor.report.figures.result_plot import plot_result
+from vehiclemor.report.figures.result_plot import _outputs, plot_result
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.regenerate import left_out
@@ -367,3 +369,53 @@ def test_full_order_alone_has_no_errors(results):
     alone = results["figures-6-7"].sel({"method": ["full_order"], "rank": 3}).squeeze("start")
     with pytest.raises(InputError, match="full order alone"):
         plot_result(alone, None, "errors")
+
+
+def test_chosen_outputs_are_drawn_though_the_model_shows_others(results):
+    point = results["figure-11"].isel(rank=0)
+    others = [name for name in point["output"].values if name not in _outputs(point)][:1]
+    figure = plot_result(point.sel(output=others))
+    assert others == ["spindle_x"]
+    assert figure.axes[0].get_ylabel().startswith("spindle displacement\nx")
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (lambda d: d.isel(output=slice(0)), "errors"),
+        (lambda d: d.isel(time=slice(0)), "histories"),
+        (lambda d: d.drop_vars("reference_outputs"), "histories"),
+        (lambda d: d.drop_vars("signal_range"), "errors"),
+        (lambda d: d, ["errors"]),
+    ],
+)
+def test_results_that_lack_what_is_drawn(results, change, kind):
+    with pytest.raises(InputError):
+        plot_result(change(results["figure-11"].isel(rank=0)), None, kind)
+
+
+def test_a_picture_needs_a_path(results):
+    with pytest.raises(InputError, match="path: 3 is not a path"):
+        ResultAccessor(results["figure-11"]).plot(path=3)
+
+
+def test_pareto_figure_of_methods_that_all_fail():
+    study = "predictive-double_wishbone"
+    dataset = protocol_results(study)
+    dataset["status"][:] = "diverged"
+    dataset["rms_error"][:] = dataset["max_error"][:] = np.inf
+    assert figure_pareto({study: dataset}).axes
+
+
+def test_a_study_stored_by_other_source_is_named(tmp_path, capsys, monkeypatch):
+    chosen = {"pareto-suspension": FIGURES["pareto-suspension"]}
+    monkeypatch.setattr("vehiclemor.report.figures.catalogue.FIGURES", chosen)
+    (tmp_path / "studies").mkdir()
+    study = "predictive-double_wishbone"
+    old = protocol_results(study).drop_vars("seconds_upper")
+    write_dataset(old, tmp_path / "studies" / f"{study}.nc")
+    assert main(["figures", "--results", str(tmp_path), "--out", str(tmp_path / "figures")]) == 2
+    printed = capsys.readouterr().err
+    assert f"{study}.nc: lacks" in printed
+    assert "seconds_upper" in printed
+    assert "vehiclemor figures --only pareto-suspension" in printed

@@ -12,6 +12,7 @@ import xarray as xr
 from vehiclemor.files import TEMPORARY
 from vehiclemor.study import workers
 from vehiclemor.study.run import run_studies
+from vehiclemor.study.store import write_dataset
 
 STUDY = """
 title = "for the tests"
@@ -140,3 +141,14 @@ def test_workers_begin_with_different_methods(tmp_path: Path, monkeypatch):
     methods = set(sent)
     assert len(sent) > len(methods) > 1
     assert set(sent[: len(methods)]) == methods
+
+
+def test_a_dataset_laid_out_by_other_source_is_combined_again(study, uninterrupted, tmp_path):
+    run_studies(str(study), tmp_path)
+    path = tmp_path / "studies" / "small.nc"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("vehiclemor.study.plans.grid_results.layout_digest", lambda: "older")
+        path.unlink()
+        older = run_studies(str(study), tmp_path)["small"]
+    write_dataset(older.drop_vars("rms_error"), path)
+    assert_same(uninterrupted, run_studies(str(study), tmp_path)["small"])

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.store import read_dataset
@@ -56,7 +57,16 @@ def regenerate_figures(
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
         with styled(style, dpi):
-            figure = entry.draw(data)
+            try:
+                figure = entry.draw(data)
+            except KeyError as error:
+                if only or entry.default:
+                    raise
+                # Read as it was stored, perhaps by other source.
+                raise FileError(
+                    f"{_stored(results, entry.names[0])}: lacks {error}; vehiclemor figures "
+                    f"--only {name} makes it again"
+                ) from None
             files = [out / f"figure-{name}.{suffix}" for suffix in FORMATS]
             written += [save_figure(figure, path) for path in files]
         origin = ""

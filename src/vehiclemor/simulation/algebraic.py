@@ -176,6 +176,7 @@ class AlgebraicModel(Model):
             If an iteration fails; time and reachable range are named.
         """
         self.start(start)
+        check_inputs(maneuver, self.definition)
         times = output_times(times, maneuver, repeats=True)
         return self.solve_path(
             times,

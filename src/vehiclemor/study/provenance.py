@@ -74,3 +74,10 @@ def code_digest(model: str, method: str) -> str:
     """
     parts = (component("model", model), component("method", method))
     return source_digest(LAYERS, FILES, parts)
+
+
+@cache
+def layout_digest() -> str:
+    """Hash of the source that combines cells: a dataset laid out by other source is made again."""
+    files = [f"study/{name}.py" for name in ("plans/grid_results", "plans/protocol_results")]
+    return source_digest((), (*files, "study/variables.py"), ())

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from vehiclemor.arguments import quoted
+from vehiclemor.errors import InputError
 from vehiclemor.registry import names, unknown
 from vehiclemor.report.description.maneuver import maneuver_description
 from vehiclemor.report.description.method import method_description
@@ -26,6 +28,8 @@ def description(
     InputError
         If nothing has that name, or a parameter is wrong.
     """
+    if not isinstance(name, str):
+        raise InputError(f"name is {quoted(name)}, not a text")
     if name in names("model"):
         return model_description(name, parameters, parameter_file)
     known = {

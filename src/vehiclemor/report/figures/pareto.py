@@ -23,7 +23,7 @@ def figure_pareto(results: Results) -> Figure:
     figure, axes = panels(1, 1, (6.7, 4.2))
     axis = axes[0, 0]
     finite = [row["score"] for row in rows if np.isfinite(row["score"]) and row["score"] > 0.0]
-    top = 10.0 ** np.ceil(np.log10(max(finite)) + 0.5)
+    top = 10.0 ** np.ceil(np.log10(max(finite, default=1.0)) + 0.5)
     _draw_full_order(axis, [row for row in rows if row["role"] == FULL_ORDER])
     styles = zip(cycle(COLORS), cycle(MARKERS), strict=False)
     for row in rows:

@@ -60,9 +60,10 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
         If the kind is unknown, the dataset does not hold what is to be drawn, or the
         picture can't be written.
     """
-    if kind not in DRAWINGS:
+    if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
-    if "output" not in dataset.dims or "rms_error" not in dataset or "row" in dataset.dims:
+    errors = {"rms_error", "signal_range"} <= set(dataset)
+    if not dataset.sizes.get("output") or not errors or "row" in dataset.dims:
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     with styled():
         figure = DRAWINGS[kind](dataset)
@@ -98,8 +99,9 @@ def _outputs(dataset: xr.Dataset) -> list[str]:
         printed = list(dict.fromkeys((*report.printed_outputs, *report.outputs)))
         shown = printed[: max(2, len(report.printed_outputs))]
     except InputError:
-        shown = known
-    return [output for output in shown if output in known][:PANELS]
+        shown = []
+    # Of outputs that a user has chosen none may be among them.
+    return ([output for output in shown if output in known] or known)[:PANELS]
 
 
 def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
@@ -113,7 +115,7 @@ def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
 
 def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
     """A run with the full-order histories, and the reduced runs."""
-    if "time" not in dataset.dims:
+    if not dataset.sizes.get("time") or not {"outputs", "reference_outputs"} <= set(dataset):
         raise InputError("no histories in this result (keep = metrics); choose the kind `errors`")
     points = _points(dataset)
     first = next(iter(points.values()))

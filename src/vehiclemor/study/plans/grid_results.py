@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.study.plans.grid import Grid
-from vehiclemor.study.provenance import attributes, versions
+from vehiclemor.study.provenance import attributes, layout_digest, versions
 from vehiclemor.study.store import read_arrays, read_dataset, result_path
 from vehiclemor.study.variables import meaning_of
 
@@ -24,6 +24,7 @@ QUANTITIES = ("output", "coordinate", "speed")
 def cells_digest(grid: Grid) -> str:
     """Hash of a study and its cells at their places, for a combined dataset to be current."""
     digest = hashlib.sha256(grid.definition.model_dump_json().encode())
+    digest.update(layout_digest().encode())
     for place, cell in grid.cells.items():
         digest.update(f"{place} {cell.key}".encode())
     return digest.hexdigest()[:20]

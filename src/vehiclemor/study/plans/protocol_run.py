@@ -19,6 +19,7 @@ from vehiclemor.study.plans.protocol import FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.study_file import file_as_stored
+from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.store import result_path, stored
 from vehiclemor.study.workers import Workers
@@ -48,7 +49,7 @@ def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
     found = test(protocol.model, rows, tested, workers)
     timed = timed_rows(protocol, rows, found, folder)
     studies, keys = folder / "studies", sorted(workers.asked)
-    parts = [protocol.definition.model_dump_json(), *keys]
+    parts = [layout_digest(), protocol.definition.model_dump_json(), *keys]
     return stored(
         studies / f"{protocol.study}.nc",
         "cells",
