@@ -57,6 +57,16 @@ def test_an_installed_plug_in_is_listed_in_a_new_process():
     assert done.stdout == "quarter car, 2 degrees of freedom\n"
 
 
+@pytest.mark.parametrize("frequency", [0.88, 0.9, 0.92])
+def test_loose_steps_from_rest_do_not_pass_over_the_road(car, frequency):
+    # The W-method's error estimate of one step over the whole run is zero by chance at 0.9.
+    road = component("maneuver", car.definition.maneuver).perturbed(frequency, 1.0)
+    run = car.simulate(road, solver="ros34pw2", tolerance=2e-3)
+    expected = exact(car, np.zeros(4), frequency, run.time)
+    assert run.counts["steps"] > 50
+    np.testing.assert_allclose(run.states, expected, atol=0.05 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("start", ["equilibrium", "dropped"])
 @pytest.mark.parametrize("frequency", [1.0, 1.7])
 def test_runs_are_those_of_the_linear_system(car, start, frequency):

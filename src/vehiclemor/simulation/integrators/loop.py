@@ -142,7 +142,8 @@ def over_span(problem, times, h, method, control, work, output, sample):
         size = error_norm(problem, f, y, 1.0)
         if not math.isfinite(size):
             return NOT_FINITE, t, h, sample
-        h = control.longest
+        # At rest it says nothing of the input, and a long step could pass over all of it.
+        h = min(control.longest, 0.02 * (end - t))
         if not size <= 1e-10:
             h = max(control.shortest_first, 0.01 / size)
     tried = h
