@@ -8,15 +8,12 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import InputError
-
-# Longest representation of a value that an error quotes.
-LONGEST_QUOTE = 60
+from vehiclemor.short_repr import shortened
 
 
 def quoted(value: object) -> str:
     """A value as an error shows it: one line, cut short."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}..."
+    return shortened(repr(value))
 
 
 def real_array(value: Any) -> np.ndarray:

@@ -5,6 +5,15 @@ import reprlib
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+# Longest text that is shown of one value.
+LONGEST = 60
+
+
+def shortened(text: str) -> str:
+    """A text in one line, cut short."""
+    line = " ".join(text.split())
+    return line if len(line) <= LONGEST else f"{line[:LONGEST]}..."
+
 
 class ShortRepr:
     """Base of dataclasses that hold arrays, functions or whole models."""
@@ -33,11 +42,9 @@ def _short(value: Any) -> str:
         return f"{{{', '.join(map(str, [*value][:4]))}{', ...' if len(value) > 4 else ''}}}"
     if callable(value):
         return getattr(value, "__name__", type(value).__name__)
-    text = " ".join(_CUT.repr(value).split())
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return shortened(_CUT.repr(value))
 
 
-LONGEST = 60
 _CUT = reprlib.Repr()
 _CUT.maxtuple = _CUT.maxlist = 4
 _CUT.maxstring = _CUT.maxother = LONGEST

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.key_values import key_values
-from vehiclemor.cli.picture import picture_file
+from vehiclemor.cli.output_file import picture_file
 from vehiclemor.report.printing import wrapped
 
 

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.cli.key_values import key_values
-from vehiclemor.cli.picture import picture_file
+from vehiclemor.cli.output_file import picture_file, result_file
 from vehiclemor.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def simulate(
     chosen = _settings(settings)
     picture = None if plot is None else picture_file("--plot", plot, f"{model}-{method}")
     if out is not None:
-        _check_writable(out)
+        out = result_file("--out", out)
     ready = api.model(model, key_values("--parameter", parameter), parameters)
     dataset = api.simulate(
         ready,
@@ -114,18 +114,3 @@ def _keep(dataset: xr.Dataset, out: Path | None, picture: Path | None) -> None:
         print(f"written: {picture}")
     if out is None and picture is None:
         print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
-
-
-def _check_writable(out: Path) -> None:
-    from vehiclemor.study.store import read_dataset
-
-    try:
-        if out.is_dir():
-            raise InputError(f"--out {out}: is a folder, not a file")
-        if not out.parent.is_dir():
-            raise InputError(f"--out {out}: the folder {out.parent} does not exist")
-        exists = out.exists()
-    except OSError as error:
-        raise InputError(f"--out {out}: can't be written ({error.strerror})") from None
-    if exists:
-        read_dataset(out, "source", "vehiclemor")
