@@ -19,6 +19,7 @@ from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import FINISHED
 
 
 def _definition(name: str) -> ModelDefinition:
@@ -121,9 +122,9 @@ def check_method(name: str, model_name: str) -> None:
             ):
                 shape = (samples, len(labels))
                 assert history.shape == shape, f"{where}: a history has a wrong shape"
-            assert first.status in ("ok", "diverged"), f"{where}: status {first.status!r}"
-            if first.status == "ok":
-                assert np.isfinite(first.states).all(), f"{where}: ok, but not finite"
+            assert first.status in (*FINISHED, "diverged"), f"{where}: status {first.status!r}"
+            if first.finished:
+                assert np.isfinite(first.states).all(), f"{where}: finished, but not finite"
             assert set(first.counts) == set(model.counts), f"{where}: counts are incomplete"
             same = np.array_equal(first.states, again.states, equal_nan=True)
             assert same, f"{where}: two runs differ"

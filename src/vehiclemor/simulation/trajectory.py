@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from vehiclemor.short_repr import ShortRepr
 
 # A named initial condition of a model, or a state (n,).
 Start = str | tuple[float, ...] | np.ndarray
-STATUSES = ("ok", "diverged", "unreachable", "rejected", "error")
+STATUSES = ("ok", "untrusted", "diverged", "unreachable", "rejected", "error")
+# Of a run that has come to its end; `untrusted` it has left what its model knows, and says so.
+FINISHED = ("ok", "untrusted")
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {
     "iterations": "solver iterations",
@@ -32,6 +34,25 @@ EVALUATIONS = {"ae": "residual_evaluations", "ode": "rhs_calls", "dae": "rhs_cal
 
 
 @dataclass(frozen=True)
+class Trust:
+    """What a reduced model tells of its own run.
+
+    Attributes
+    ----------
+    indicator
+        Largest value in the run of what tells how far it goes: 1 is the edge of what it knows.
+    until
+        Time in s at which the indicator has first passed 1; infinite if it never has.
+    reason
+        By what it leaves, empty if it does not.
+    """
+
+    indicator: float
+    until: float = np.inf
+    reason: str = ""
+
+
+@dataclass(frozen=True)
 class Trajectory(ShortRepr):
     """Result of one simulation.
 
@@ -48,9 +69,11 @@ class Trajectory(ShortRepr):
     status
         One of `STATUSES`; from the failure on, a diverged trajectory is not a number.
     message
-        Why it diverged, empty if it did not.
+        Why it is not ok, empty if it is.
     remark
         What else there is to know, such as wheels that leave the ground.
+    trust
+        What a reduced model tells of this run; none of a model that is the full one.
     """
 
     time: np.ndarray
@@ -63,6 +86,19 @@ class Trajectory(ShortRepr):
     status: str = "ok"
     message: str = ""
     remark: str = ""
+    trust: Trust | None = None
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has come to its end, trusted or not."""
+        return self.status in FINISHED
+
+    def judged(self, trust: Trust | None) -> Trajectory:
+        """The same with what its model tells of it; untrusted if that is that it has left."""
+        if trust is None or self.status != "ok" or not trust.reason:
+            return replace(self, trust=trust)
+        message = f"from t = {trust.until:.4g} s on {trust.reason}"
+        return replace(self, trust=trust, status="untrusted", message=message)
 
     @property
     def states(self) -> np.ndarray:

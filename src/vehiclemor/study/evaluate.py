@@ -204,6 +204,6 @@ def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start
     """A run; what ends without complaint, but in values that are no numbers, diverged."""
     run = reduced.simulate(scenario.maneuver, start)
     trajectory = checked_run(model, scenario.maneuver, reduced, run)
-    if trajectory.status != "ok" or np.isfinite(trajectory.outputs).all():
+    if not trajectory.finished or np.isfinite(trajectory.outputs).all():
         return trajectory
     return replace(trajectory, status="diverged", message="an output is not finite")

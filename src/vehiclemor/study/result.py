@@ -121,7 +121,7 @@ def errors_dataset(
 
     ends = [o if isinstance(o, Failure) else o.trajectory for o in outcomes]
     compared = [None if isinstance(o, Failure) else o for o in outcomes]
-    finished = [o if o and o.trajectory.status == "ok" else None for o in compared]
+    finished = [o if o and o.trajectory.finished else None for o in compared]
     missing = (np.full(len(model.outputs), np.nan),) * 3
     errors = zip(*[_errors(o) if o else missing for o in finished], strict=True)
     names = ("rms_error", "max_error", "largest_output")
@@ -129,6 +129,9 @@ def errors_dataset(
     found["seconds"] = np.array([o.trajectory.seconds if o else np.nan for o in finished])
     for name in ("status", "message"):
         found[name] = np.array([getattr(end, name) for end in ends], dtype=object)
+    trusted = [o.trajectory.trust if o else None for o in finished]
+    found["trust_indicator"] = np.array([t.indicator if t else np.nan for t in trusted])
+    found["trusted_until"] = np.array([t.until if t else np.inf for t in trusted])
     described = variables(found, "scenario") | variables(_of_fit(reduced))
     for name, text in model.counts.items():
         values = np.array([o.trajectory.counts.get(name, 0) if o else 0 for o in finished])

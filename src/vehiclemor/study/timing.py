@@ -200,7 +200,7 @@ def _rounds(
                 short = turn > 0 and seconds[0, index, place] < LONG_RUN
                 with repeated(REPEATS if short else 1):
                     run = attempt(partial(reduced.simulate, *test))
-                if isinstance(run, Failure) or run.status != "ok":
+                if isinstance(run, Failure) or not run.finished:
                     timed[index, place] = False
                 else:
                     seconds[turn, index, place] = run.seconds

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.protocol import Contestant
 from vehiclemor.study.plans.protocol_file import Bound
 
@@ -57,7 +58,7 @@ class Row:
 def validation_of(dataset: xr.Dataset, bounds: Mapping[str, Bound], count: str) -> Validation:
     """Validation result of a candidate from its stored file; `count` is `Model.evaluations`."""
     return Validation(
-        float(np.mean(dataset["status"].values == "ok")),
+        float(np.isin(dataset["status"].values, FINISHED).mean()),
         float(scores(dataset, bounds).max()),
         float(dataset[count].mean()),
     )
@@ -70,7 +71,8 @@ def scores(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> np.ndarray:
         for output, bound in bounds.items()
     ]
     worst = np.max(parts, axis=0)
-    return np.where((dataset["status"].values == "ok") & np.isfinite(worst), worst, np.inf)
+    ended = np.isin(dataset["status"].values, FINISHED)
+    return np.where(ended & np.isfinite(worst), worst, np.inf)
 
 
 def choose(results: Sequence[Validation]) -> int:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
 from vehiclemor.study.plans.choice import Row, choose, validation_of
 from vehiclemor.study.plans.protocol import FULL_ORDER, Contestant, Protocol
@@ -113,7 +114,7 @@ def timed_rows(
         row.label: row.contestant.experiment(protocol.model, row.candidate, protocol.sets["test"])
         for row in rows
     }
-    finished = np.array([found["status"].values == "ok" for found in tested["test"]])
+    finished = np.array([np.isin(found["status"].values, FINISHED) for found in tested["test"]])
     content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(
         folder,
