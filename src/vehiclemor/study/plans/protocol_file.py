@@ -13,6 +13,7 @@ class Bound(FileSchema):
 
     measure: Literal["rms", "max"]
     bound: float = Field(gt=0.0, allow_inf_nan=False, description="in the output's unit")
+    reason: str = Field("ours", min_length=1, description="where the number comes from")
 
 
 class Group(FileSchema):
