@@ -60,16 +60,22 @@ class ReducedSystem(ShortRepr):
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
-    def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
-        """Path of the reduced states."""
+    def run(
+        self,
+        maneuver: Maneuver,
+        start: Start,
+        times: np.ndarray | None = None,
+        begin: float = 0.0,
+    ) -> Run:
+        """Path of the reduced states, from a full state at the time `begin` in s."""
         check_inputs(maneuver, self.model.definition)
-        state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
-        how = Solver(self.solver, self.tolerance, times)
+        state = self.encode(self.model.start(start), maneuver.at(np.array([begin]))[0])
+        how = Solver(self.solver, self.tolerance, times, begin=begin)
         return self.system.run(maneuver, state, self.spaces, how)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Integrate, then lift to full states at the maneuver's output times."""
-        run = self.run(maneuver, start)
+    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
+        """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+        run = self.run(maneuver, start, begin=begin)
         inputs = maneuver.at(run.times)
         states = self.lift(run, inputs, self.model.start(start))
         return self.model.recorded(maneuver, run, inputs, states)

@@ -144,7 +144,7 @@ class ReducedVehicle(ShortRepr):
         shapes = self.shape.reference + columns @ self.lifting
         if len(self.transient.rates):
             deviation = self.shape.of(start[None])[0] - self.shape.reference
-            shapes += self.transient.at(run.times, deviation)
+            shapes += self.transient.at(run.times - run.begin, deviation)
         return self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
 
     def path(
