@@ -258,9 +258,7 @@ class System(ShortRepr):
         output = arguments.output
         status, seconds = timed(loop.prepared(*arguments), output.counts)
         failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
-        return Run(
-            output.samples, output.path, output.counts, seconds, failure, solver.begin
-        )
+        return Run(output.samples, output.path, output.counts, seconds, failure, solver.begin)
 
     def prepared(
         self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
