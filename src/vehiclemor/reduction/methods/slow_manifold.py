@@ -42,6 +42,8 @@ from vehiclemor.simulation.trajectory import Trajectory
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
 REFIT_RIDGE = 1e-9
+# Sweeps with all terms, and the part of them that is left by each round of elimination.
+FIRST_SWEEPS, SHRINKING = 2, 0.4
 
 
 class SlowManifoldSettings(OnlineSettings):
@@ -88,8 +90,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         reduced = _with_heading(reduced, training, runs, table.odd, len(modes.rates) + 1)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
-        slow = np.column_stack(modes.coordinates(samples.deviations, samples.inputs))
-        reduced = _fitted_on_runs(reduced, table, slow, goals, settings)
+        reduced = _fitted_on_runs(reduced, table, goals, settings)
     return replace(
         reduced,
         offline=offline_cost(began, model, runs, len(samples.inputs)),
@@ -143,18 +144,23 @@ def _fitted_on_rates(
 def _fitted_on_runs(
     reduced: ReducedVehicle,
     table: FeatureTable,
-    slow: np.ndarray,
     goals: Sequence[Target],
     settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
     """Coefficients improved on whole runs; then with as few terms as the settings allow."""
-    reduced = improved(reduced, goals, table.free, settings.sweeps)
-    if not settings.terms or not finishes(reduced, goals):
+    if not finishes(reduced, goals):
         return reduced
-    fewer, kept = pruned(reduced, table, goals, slow, settings.terms)
-    fewer = improved(fewer, goals, kept.free, settings.sweeps)
-    # With too few terms a training run may fail.
-    return fewer if finishes(fewer, goals) else reduced
+    reduced = improved(reduced, goals, table.free, FIRST_SWEEPS)
+    count = len(table.odd_nonlinear) + len(table.even_nonlinear)
+    while settings.terms and count > settings.terms:
+        count = max(settings.terms, round(SHRINKING * count))
+        fewer, table = pruned(reduced, table, goals, count)
+        fewer = improved(fewer, goals, table.free, 1)
+        # With too few terms a training run may fail.
+        if not finishes(fewer, goals):
+            return reduced
+        reduced = fewer
+    return improved(reduced, goals, table.free, settings.sweeps)
 
 
 def _with_heading(

@@ -48,7 +48,8 @@ class FeatureTable:
         """(features, column of C) of the coefficients that whole runs may change."""
         k = self.features.states - 1
         lateral = [(self.odd_nonlinear, column) for column in range(k)]
-        return [*lateral, (self.odd, k + 1), (self.odd, k + 3)]
+        symmetric = [(self.even_nonlinear, column) for column in (k, k + 2)]
+        return [*lateral, (self.odd, k + 1), (self.odd, k + 3), *symmetric]
 
     def with_only(self, kept: Sequence[int]) -> "FeatureTable":
         """Some of the features, by their numbers in order."""
