@@ -13,11 +13,15 @@ from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 
 def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
     return state
+
+
+def _nothing_told(_: Run, __: np.ndarray) -> None:
+    return
 
 
 def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
@@ -45,6 +49,8 @@ class ReducedSystem(ShortRepr):
     lift
         (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
         default the run's own.
+    judge
+        (run of the system, inputs) -> what the model tells of it; nothing by default.
     project
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     """
@@ -58,21 +64,29 @@ class ReducedSystem(ShortRepr):
     tolerance: float
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
+    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
-    def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
-        """Path of the reduced states."""
+    def run(
+        self,
+        maneuver: Maneuver,
+        start: Start,
+        times: np.ndarray | None = None,
+        begin: float = 0.0,
+    ) -> Run:
+        """Path of the reduced states, from a full state at the time `begin` in s."""
         check_inputs(maneuver, self.model.definition)
-        state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
-        how = Solver(self.solver, self.tolerance, times)
+        state = self.encode(self.model.start(start), maneuver.at(np.array([begin]))[0])
+        how = Solver(self.solver, self.tolerance, times, begin=begin)
         return self.system.run(maneuver, state, self.spaces, how)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Integrate, then lift to full states at the maneuver's output times."""
-        run = self.run(maneuver, start)
+    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
+        """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+        run = self.run(maneuver, start, begin=begin)
         inputs = maneuver.at(run.times)
         states = self.lift(run, inputs, self.model.start(start))
-        return self.model.recorded(maneuver, run, inputs, states)
+        found = self.model.recorded(maneuver, run, inputs, states)
+        return found.judged(self.judge(run, inputs))
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Projection of full states (samples, 2 n), if there is a subspace."""
@@ -85,6 +99,7 @@ def transformed_system(
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
     offline: Offline,
     settings: OnlineSettings,
+    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told,
 ) -> ReducedSystem:
     """Equations in other states than the model's.
 
@@ -94,6 +109,8 @@ def transformed_system(
         The equations; its kernel `full_state` gives the full state of a transformed one.
     encode
         (full state (2 n,), inputs) -> transformed state (dim,).
+    judge
+        See `ReducedSystem`.
     """
     dim = len(system.reference)
 
@@ -110,4 +127,5 @@ def transformed_system(
         settings.tolerance,
         encode,
         lift,
+        judge,
     )

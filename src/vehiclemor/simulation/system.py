@@ -64,6 +64,8 @@ class Run:
         Time spent in the compiled loop.
     failure
         Why the run has ended early, empty if it has not.
+    begin
+        Time in s at which it has begun.
     """
 
     times: np.ndarray
@@ -71,6 +73,7 @@ class Run:
     counts: np.ndarray
     seconds: float
     failure: str
+    begin: float = 0.0
 
 
 class Solver(NamedTuple):
@@ -86,12 +89,15 @@ class Solver(NamedTuple):
         Output times (samples,) in s, the maneuver's by default.
     longest_step
         In s; unlimited by default.
+    begin
+        Time in s at which the run begins with its state, in mid-maneuver if it isn't 0.
     """
 
     name: str
     tolerance: float
     times: np.ndarray | None = None
     longest_step: float | None = None
+    begin: float = 0.0
 
 
 class RunArguments(NamedTuple):
@@ -252,7 +258,7 @@ class System(ShortRepr):
         output = arguments.output
         status, seconds = timed(loop.prepared(*arguments), output.counts)
         failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
-        return Run(output.samples, output.path, output.counts, seconds, failure)
+        return Run(output.samples, output.path, output.counts, seconds, failure, solver.begin)
 
     def prepared(
         self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
@@ -266,7 +272,7 @@ class System(ShortRepr):
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
-        times = output_times(solver.times, maneuver)
+        times = output_times(solver.times, maneuver, begin=solver.begin)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
         fused = self.fused.get(name, "") if full else ""
@@ -278,7 +284,7 @@ class System(ShortRepr):
             loop_array(state),
             self.called(formulation, fused),
             signal,
-            windows.spans(signal.bundle.edges, end),
+            windows.spans(signal.bundle.edges, end, solver.begin),
             windows.subspaces,
             self.method(name, active),
             catalogue.control_of(name, float(solver.tolerance), float(longest or np.inf)),

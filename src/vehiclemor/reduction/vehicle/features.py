@@ -37,6 +37,8 @@ class Features:
     diagonal
         Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
         Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
+    limits
+        (expression, what it is): beyond 1 in absolute value the fit knows nothing.
     """
 
     states: int
@@ -45,6 +47,7 @@ class Features:
     terms: tuple[str, ...]
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
     diagonal: tuple[int, ...] = ()
+    limits: tuple[tuple[str, str], ...] = ()
 
     @property
     def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:

@@ -1,6 +1,6 @@
 """Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -15,7 +16,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Run, System
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
@@ -127,6 +128,7 @@ class ReducedVehicle(ShortRepr):
             self.tolerance,
             self.encoded,
             self.lifted,
+            self.trust,
         )
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -144,8 +146,17 @@ class ReducedVehicle(ShortRepr):
         shapes = self.shape.reference + columns @ self.lifting
         if len(self.transient.rates):
             deviation = self.shape.of(start[None])[0] - self.shape.reference
-            shapes += self.transient.at(run.times, deviation)
+            shapes += self.transient.at(run.times - run.begin, deviation)
         return self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+
+    def trust(self, run: Run, inputs: np.ndarray) -> Trust | None:
+        """How far a run goes in the ranges of its features, if they have limits."""
+        if not self.features.limits:
+            return None
+        terms, names = zip(*self.features.limits, strict=True)
+        limits = replace(self.features, terms=terms, groups=())
+        z = run.path[:, : self.features.states]
+        return trust_of(run.times, feature_columns(limits, z, inputs, self.parameters), names)
 
     def path(
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None

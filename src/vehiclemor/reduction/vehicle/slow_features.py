@@ -17,6 +17,7 @@ from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
+MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of roll", "steering")
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,8 @@ def feature_table(
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
-    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks)
+    limits = (("raw", "change of speed"), *((f"raw{i}", m) for i, m in enumerate(MEANINGS)))
+    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, limits)
     return FeatureTable(features, parameters, list(lateral), list(symmetric), k + inputs)
 
 

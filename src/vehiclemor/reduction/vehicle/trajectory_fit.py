@@ -188,9 +188,7 @@ def _sensitivities(
         width = DIFFERENCE * max(1.0, float(np.abs(z[:, j]).max()))
         shifted = z.copy()
         shifted[:, j] += width
-        change = (
-            feature_columns(reduced.features, shifted, inputs, reduced.parameters) @ c - values
-        )
+        change = feature_columns(reduced.features, shifted, inputs, reduced.parameters) @ c - values
         jacobian[:, :, j] = np.einsum("nij,nj->ni", spread, change / width)
     forward, sideward = values[:, k + 1], values[:, k + 2]
     jacobian[:, k + 1, k] = -forward * sine - sideward * cosine
