@@ -48,7 +48,13 @@ class TwoTrackSettings(OnlineSettings):
         6, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
     hull: float = Field(
-        1.15, gt=0.0, description="arguments are held beyond this multiple of their training range"
+        1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
+    )
+    saturation: float = Field(
+        1.3,
+        gt=0.0,
+        description="a run with a tire beyond this multiple of the slip at which all of its "
+        "contact slides is not trusted",
     )
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
@@ -97,7 +103,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         of_shape.deviations @ encoding.T, of_shape.inputs, of_shape.rates @ encoding.T, of_shape
     )
     outputs = np.concatenate([run.outputs for run in runs])
-    text = tire_text(model, shape.speed, samples, outputs, settings.hull)
+    text = tire_text(model, shape.speed, samples, outputs, settings)
     reduced = _fitted_on_rates(shape, modes, encoding, text, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
@@ -113,15 +119,15 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
 
 
 def tire_text(
-    model: DynamicModel, speed: float, samples: Samples, outputs: np.ndarray, hull: float
+    model: DynamicModel, speed: float, samples: Samples, outputs: np.ndarray, settings: TwoTrackSettings
 ) -> tf.Text:
     """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
     z, u = samples.z, samples.inputs
     part = 1.0 / (speed + z[:, tf.SPEED])
     values = np.column_stack([z[:, 0] * part, z[:, 1] * part, z[:, 2], z[:, 3] * part, u[:, 0]])
-    reach = hull * largest(np.column_stack([values, z[:, tf.SPEED]]))
+    ranges = largest(np.column_stack([values, z[:, tf.SPEED]]))
     inputs = u.shape[1]
-    text = tf.arguments(speed, reach, inputs)
+    text = tf.arguments(speed, ranges, settings.hull, inputs)
     odd = [*tf.linear_terms(inputs), *tf.CUBIC]
     even = ["1.0", "m", *tf.SQUARE]
 
@@ -129,6 +135,7 @@ def tire_text(
         return outputs[:, model.outputs.index(f"{kind}_{wheel}")]
 
     parameters = {name: float(model.parameters[name]) for name in FIALA}
+    parameters["saturation"] = settings.saturation
     full = text.copy()
     tables = {}
     for name, terms in (("odd", odd), ("even", even)):

@@ -37,6 +37,7 @@ class Text:
 
     lines: list[tuple[str, str]] = field(default_factory=list)
     values: list[float] = field(default_factory=list)
+    limits: list[tuple[str, str]] = field(default_factory=list)
 
     def parameter(self, value: float) -> str:
         """Text of a new parameter."""
@@ -55,24 +56,27 @@ class Text:
 
     def copy(self) -> Text:
         """A copy that can grow on its own."""
-        return Text(list(self.lines), list(self.values))
+        return Text(list(self.lines), list(self.values), list(self.limits))
 
     def features(self, inputs: int, terms: Sequence[str], odd: int = 0) -> Features:
         """Features of these terms; the first ones are the odd ones."""
         numbers = tuple(range(len(terms)))
         groups = ((numbers[:odd], (0, 1, 2, 3, 5, 7)), (numbers[odd:], (SPEED, 6))) if odd else ()
-        return Features(STATES, inputs, tuple(self.lines), tuple(terms), groups, (4, 1))
+        lines, limits = tuple(self.lines), tuple(self.limits)
+        return Features(STATES, inputs, lines, tuple(terms), groups, (4, 1), limits)
 
 
-def arguments(speed: float, reach: np.ndarray, inputs: int) -> Text:
+def arguments(speed: float, ranges: np.ndarray, hull: float, inputs: int) -> Text:
     """Lines of the arguments, in [-1, 1], `raw` where they are not held.
 
     Parameters
     ----------
     speed
         Of straight running in m/s.
-    reach
-        What each argument (6,) reaches at most, in the order of `NAMES`.
+    ranges
+        Largest value of each argument (6,) in the training runs, in the order of `NAMES`.
+    hull
+        Multiple of it beyond which nothing is known.
     inputs
         Number of inputs.
     """
@@ -80,7 +84,8 @@ def arguments(speed: float, reach: np.ndarray, inputs: int) -> Text:
     text.let("part", f"1.0 / ({text.parameter(speed)} + z{SPEED})")
     kinds = ("part * z0", "part * z1", "z2", "part * z3", "u0", f"z{SPEED}")
     for i, kind in enumerate(kinds):
-        text.let(f"raw{i}", f"{text.parameter(1.0 / reach[i])} * {kind}")
+        text.let(f"raw{i}", f"{text.parameter(1.0 / (hull * ranges[i]))} * {kind}")
+        text.limits.append((f"raw{i}", NAMES[i]))
         text.let("m" if i == 5 else f"a{i}", held(f"raw{i}"))
     for j in range(1, inputs):
         text.let(f"d{j}", f"u{j}")
@@ -107,6 +112,7 @@ def fiala(text: Text, wheel: str, slip: str, load: str, p: Mapping[str, float]) 
     limit = text.let(f"limit_{wheel}", f"{load} * ({most} - {fall} * abs({slip}))")
     drive = text.parameter(p["cornering_stiffness"] / 3.0)
     text.let(f"y_{wheel}", f"{drive} * {slip} / {limit}")
+    text.limits.append((f"{text.parameter(1.0 / p['saturation'])} * y_{wheel}", f"saturation of the {wheel} tire"))
     y = text.let(f"c_{wheel}", held(f"y_{wheel}"))
     left = text.let(f"left_{wheel}", f"1.0 - abs({y})")
     text.let(f"G_{wheel}", f"{left} * {left}")
