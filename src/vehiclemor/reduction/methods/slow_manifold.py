@@ -29,6 +29,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.landing import landed, starts_still
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
@@ -80,9 +81,12 @@ class SlowManifoldSettings(OnlineSettings):
 def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.process_time()
-    runs = [run.recorded() for run in training]
+    everything = [(run, run.recorded()) for run in training]
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest)
+    still = [starts_still(modes.symmetric, shape, true) for _, true in everything]
+    training = [run for (run, _), quiet in zip(everything, still, strict=True) if quiet]
+    runs = [true for (_, true), quiet in zip(everything, still, strict=True) if quiet]
     samples = shape_samples(shape, runs)
     table = feature_table(shape, modes, samples, settings.hull, settings.nonlinearity)
     reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
@@ -92,8 +96,8 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         goals = targets(reduced, training, runs)
         reduced = _fitted_on_runs(reduced, table, goals, settings)
     return replace(
-        reduced,
-        offline=offline_cost(began, model, runs, len(samples.inputs)),
+        landed(reduced, [true for _, true in everything]),
+        offline=offline_cost(began, model, [true for _, true in everything], len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
     )

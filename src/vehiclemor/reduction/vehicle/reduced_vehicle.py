@@ -145,7 +145,10 @@ class ReducedVehicle(ShortRepr):
         if len(self.transient.rates):
             deviation = self.shape.of(start[None])[0] - self.shape.reference
             shapes += self.transient.at(run.times, deviation)
-        return self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+        states = self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+        # The start is known better than its slow part.
+        states[run.times == 0.0] = start
+        return states
 
     def path(
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
