@@ -12,6 +12,7 @@ import numpy as np
 
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle, Transient
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Time (s) after which a car has landed; modes that have decayed by then, to exp(-DECAYED), are
@@ -19,39 +20,58 @@ from vehiclemor.simulation.trajectory import Trajectory
 LANDED, DECAYED = 0.1, 4.0
 # Starts whose symmetric deviation is below this (in units of the states) are straight running.
 STILL = 1e-6
+# Longest time (s) for which a run is looked at.
+LONGEST = 1.0
+# Histories of a trajectory.
+PATHS = ("time", "inputs", "coordinates", "speeds", "outputs")
 # Relative singular values of the starts' deviations below this are rounding.
 RANK = 1e-7
 
 
-def starts_still(transient: Transient, shape: VehicleShape, run: Trajectory) -> bool:
-    """Whether a run starts without motion that the reduced coordinates leave out."""
+def after_landing(transient: Transient, shape: VehicleShape, run: Trajectory) -> Trajectory:
+    """A run without what its car does in the air; the same if it starts on the ground."""
     deviation = shape.of(run.states[:1])[0] - shape.reference
-    return bool(np.abs(transient.left @ deviation).max(initial=0.0) < STILL)
+    if np.abs(transient.left @ deviation).max(initial=0.0) < STILL:
+        return run
+    later = run.time > 2.0 * LANDED
+    return replace(run, **{name: getattr(run, name)[later] for name in PATHS})
 
 
-def landed(reduced: ReducedVehicle, runs: Sequence[Trajectory]) -> ReducedVehicle:
-    """The reduced vehicle with the transients and the speed of runs before they are steered."""
-    transient, shape = reduced.transient, reduced.shape
+def landed(
+    reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
+) -> ReducedVehicle:
+    """The reduced vehicle with the transients and coordinates of runs before they are steered."""
+    from scipy.linalg import expm
+
+    transient, shape, k = reduced.transient, reduced.shape, modes.lateral
     slow = np.abs(transient.rates.real) * LANDED < DECAYED
-    speed = reduced.encoding[-1]
     starts, changes = [], []
     for run in runs:
-        steered = np.flatnonzero(run.inputs.any(axis=1))
-        last = int(steered[0]) if len(steered) else len(run.time)
-        deviations = shape.of(run.states[:last]) - shape.reference
-        after = run.time[:last] >= LANDED
-        if not after.any():
+        steered = run.time[run.inputs.any(axis=1)]
+        seen = (run.time >= LANDED) & (run.time < np.append(steered, LONGEST)[0])
+        if not seen.any():
             continue
-        decays = np.exp(np.outer(run.time[:last][after], transient.rates[slow]))
-        seen = deviations[after] @ transient.left[slow].T
-        found = (decays.conj() * seen).sum(axis=0) / (np.abs(decays) ** 2).sum(axis=0)
-        lost = np.mean(deviations[after] @ speed) - deviations[0] @ speed
-        starts.append(deviations[0])
-        changes.append([*(found - transient.left[slow] @ deviations[0]), lost])
+        deviations, start = shape.of(run.states[seen]) - shape.reference, shape.of(run.states[:1])[0]
+        start = start - shape.reference
+        decays = np.exp(np.outer(run.time[seen], transient.rates[slow]))
+        found = (decays.conj() * (deviations @ transient.left[slow].T)).sum(axis=0)
+        found = found / (np.abs(decays) ** 2).sum(axis=0)
+        moving = [expm(modes.rates[k:, k:] * time) for time in run.time[seen]]
+        own = deviations @ reduced.encoding[k:].T
+        parts = [np.linalg.lstsq(np.vstack(moving), own[:, :-1].ravel())[0], [own[:, -1].mean()]]
+        starts.append(start)
+        changes.append(
+            np.concatenate(
+                [
+                    found - transient.left[slow] @ start,
+                    np.concatenate(parts) - reduced.encoding[k:] @ start,
+                ]
+            )
+        )
     if not starts:
         return reduced
     change = (np.linalg.pinv(np.array(starts), rcond=RANK) @ np.array(changes)).T
     left, encoding = transient.left.copy(), reduced.encoding.copy()
-    left[slow] += change[:-1]
-    encoding[-1] += change[-1].real
+    left[slow] += change[: slow.sum()]
+    encoding[k:] += change[slow.sum() :].real
     return replace(reduced, transient=replace(transient, left=left), encoding=encoding)
