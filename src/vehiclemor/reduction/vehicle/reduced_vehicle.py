@@ -147,7 +147,10 @@ class ReducedVehicle(ShortRepr):
         if len(self.transient.rates):
             deviation = self.shape.of(start[None])[0] - self.shape.reference
             shapes += self.transient.at(run.times - run.begin, deviation)
-        return self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+        states = self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+        # The start is known better than its slow part.
+        states[run.times == run.begin] = start
+        return states
 
     def trust(self, run: Run, inputs: np.ndarray) -> Trust | None:
         """How far a run goes in the ranges of its features, if they have limits."""
