@@ -36,6 +36,8 @@ from vehiclemor.simulation.model import Model
 
 # The states that are coordinates.
 COORDINATES = ("y_dot", "psi_dot", "phi", "phi_dot")
+# Symmetric states for which the lifting has terms of its own.
+SEEN = ("theta", "z_dot")
 RIDGE = 1e-12
 
 
@@ -44,6 +46,9 @@ class TwoTrackSettings(OnlineSettings):
 
     terms: int = Field(14, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(12, ge=0, description="chosen products in those of the speed")
+    lifted_terms: int = Field(
+        12, ge=0, description="products chosen for pitch and heave, beside those of the equations"
+    )
     sweeps: int = Field(
         6, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
@@ -185,14 +190,16 @@ def _fitted_on_rates(
 
     odd = chosen(odd_terms, rates[:, [0, 1, 3]], len(given_odd), settings.terms)
     forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
-    pitch, heave = (shape.names.index(name) for name in ("theta", "z_dot"))
-    symmetric = np.column_stack(
-        [rates[:, tf.SPEED], forward, of_shape.deviations[:, [pitch, heave]]]
-    )
+    symmetric = np.column_stack([rates[:, tf.SPEED], forward])
     even = chosen(even_terms, symmetric, 1, settings.even_terms)
     terms = [*odd, "1.0", *even]
     features = text.features(inputs, terms, len(odd))
     columns = feature_columns(features, z, u, parameters)
+    seen = [shape.names.index(name) for name in SEEN]
+    lifting_terms = [*terms, *(term for term in even_terms if term not in even)]
+    lifted_terms = chosen(
+        lifting_terms, of_shape.deviations[:, seen], len(terms), settings.lifted_terms
+    )
     k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
     lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
     c[:k, [0, 1, 2, 3, 5, 7]] = ridge_fit(columns[:, :k], lateral, RIDGE)
@@ -207,7 +214,7 @@ def _fitted_on_rates(
         features,
         parameters,
         c,
-        ridge_fit(columns, of_shape.deviations, RIDGE),
+        ridge_fit(columns_of(lifted_terms), of_shape.deviations, RIDGE),
         encoding,
         np.zeros((tf.STATES, inputs)),
         np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
@@ -215,6 +222,7 @@ def _fitted_on_rates(
         "dopri5",
         1e-6,
         modes.symmetric,
+        text.features(inputs, lifted_terms),
     )
 
 
