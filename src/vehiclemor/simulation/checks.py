@@ -10,6 +10,8 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 
+OFF_GROUND = "off the ground for a time"
+
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
     """A finite array (size,) of floats, as compiled functions want it; a number is one entry.
@@ -221,7 +223,7 @@ def lifted_wheels(
     if not off:
         return ""
     wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
-    return f"off the ground for a time: {wheels}"
+    return f"{OFF_GROUND}: {wheels}"
 
 
 def loop_array(values: Any) -> np.ndarray:
