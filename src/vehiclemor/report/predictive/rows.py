@@ -21,6 +21,7 @@ from vehiclemor.study.plans.protocol_results import judged_part
 from vehiclemor.study.run import run_studies
 
 STUDY = "predictive"
+OUTSIDE = ("outside", "drawn_outside")
 # Column of seconds -> what is timed.
 CLOCKS = {"seconds": "whole call", "loop_seconds": "compiled loop"}
 
@@ -91,8 +92,8 @@ def method_rows(
 def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: ProtocolFile) -> Row:
     part, bounds = judged.sel(row=label), protocol.bounds
     found = outcomes(part, bounds)
-    beyond = dataset.isel(scenario=dataset["scenario_set"].values == "drawn_outside").sel(row=label)
-    outside = outcomes(beyond, bounds)
+    beyond = np.isin(dataset["scenario_set"].values, OUTSIDE)
+    outside = outcomes(dataset.isel(scenario=beyond).sel(row=label), bounds)
     # What has come to its end, trusted or not, is timed.
     ok = np.isfinite(found.scores)
     runs, misses = part.sizes["scenario"], int(found.missed.sum())
