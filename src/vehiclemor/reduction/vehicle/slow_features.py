@@ -121,8 +121,8 @@ def feature_table(
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    limits = (("raw", "change of speed"), *((f"raw{i}", m) for i, m in enumerate(MEANINGS)))
-    features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, limits)
+    watched = (("raw", "change of speed"), *((f"raw{i}", m) for i, m in enumerate(MEANINGS)))
+    features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, watched)
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
 
