@@ -36,14 +36,21 @@ from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable, feature_table
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import Target, finishes, improved, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import (
+    Target,
+    finishes,
+    improved,
+    spread,
+    targets,
+)
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
-# Sweeps with all terms, and the part of them that is left by each round of elimination.
-FIRST_SWEEPS, SHRINKING = 2, 0.4
+# The part of the terms that is left by each round of elimination, and for how many of them all
+# training runs are looked at; with more terms it is fewer runs.
+SHRINKING, WANTED = 0.4, 60
 
 
 class SlowManifoldSettings(OnlineSettings):
@@ -154,12 +161,12 @@ def _fitted_on_runs(
     """Coefficients improved on whole runs; then with as few terms as the settings allow."""
     if not finishes(reduced, goals):
         return reduced
-    reduced = improved(reduced, goals, table.free, FIRST_SWEEPS)
     count = len(table.odd_nonlinear) + len(table.even_nonlinear)
     while settings.terms and count > settings.terms:
+        some = spread(goals, WANTED / count)
+        reduced = improved(reduced, some, table.free, 1)
         count = max(settings.terms, round(SHRINKING * count))
-        fewer, table = pruned(reduced, table, goals, count)
-        fewer = improved(fewer, goals, table.free, 1)
+        fewer, table = pruned(reduced, table, some, count)
         # With too few terms a training run may fail.
         if not finishes(fewer, goals):
             return reduced
