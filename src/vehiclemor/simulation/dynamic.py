@@ -203,7 +203,8 @@ class DynamicModel(Model):
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step, begin)
         run = self.system.run(maneuver, state, windows, how)
-        inputs = recorded_inputs(maneuver)[1] if times is None else maneuver.at(run.times)
+        whole = times is None and not begin
+        inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
         return self.recorded(maneuver, run, inputs, run.path)
 
     def recorded(

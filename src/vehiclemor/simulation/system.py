@@ -287,10 +287,11 @@ class System(ShortRepr):
         if longest is not None:
             check_positive("longest_step", longest)
         key = maneuver, id(windows), solver.name
-        plan = self._plans.get(key) if solver.times is None else None
+        whole = solver.times is None and not solver.begin
+        plan = self._plans.get(key) if whole else None
         if plan is None:
             plan = self._plan(maneuver, windows, solver)
-            if solver.times is None:
+            if whole:
                 if len(self._plans) >= MOST_PLANS:
                     self._plans.clear()
                 self._plans[key] = plan
