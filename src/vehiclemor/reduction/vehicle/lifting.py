@@ -83,8 +83,21 @@ class Lifting(ShortRepr):
             self._made[modes] = Kernels(kernel_sources(text)), constants
         return self._made[modes]
 
+    def excited(self, deviation: np.ndarray) -> np.ndarray:
+        """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
+
+        Parameters
+        ----------
+        deviation
+            Of the start's shape from straight running (n,); m is zero if there is none.
+        """
+        rates = self.transient.rates if deviation.any() else self.transient.rates[:0]
+        amplitudes = self.transient.left[: len(rates)] @ deviation if len(rates) else rates
+        found = np.array([rates, amplitudes], dtype=complex)
+        return np.stack([found.real, found.imag], axis=2)
+
     def states(
-        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, deviation: np.ndarray
+        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, excited: np.ndarray
     ) -> np.ndarray:
         """Full states, and behind them what is watched (samples, 2 n + watched).
 
@@ -92,16 +105,13 @@ class Lifting(ShortRepr):
         ----------
         times, path, inputs
             Of the samples: in s, reduced states (samples, states + 3), inputs (samples, inputs).
-        deviation
-            Of the start's shape from straight running (n,).
+        excited
+            By the start, as `excited` gives it.
         """
-        rates = self.transient.rates
-        amplitudes = self.transient.left @ deviation if deviation.any() else rates[:0]
-        modes = len(amplitudes)
+        modes = excited.shape[1]
         if modes:
             given = np.empty((len(times), inputs.shape[1] + 2 * modes))
-            parts = [np.column_stack([a.real, a.imag]) for a in (rates, amplitudes)]
-            _loops()["with_decay"](times, inputs, *parts, np.empty((modes, 2)), given)
+            _loops()["with_decay"](times, inputs, *excited, np.empty((modes, 2)), given)
             inputs = given
         kernels, constants = self._kernel(modes)
         size = self.layout.size + len(self.features.watched)

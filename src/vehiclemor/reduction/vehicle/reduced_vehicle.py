@@ -128,10 +128,23 @@ class ReducedVehicle(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
         run, inputs = self.equations.run(maneuver, start), recorded_inputs(maneuver)[1]
-        deviation = self.shape.of(self.model.start(start)[None])[0] - self.shape.reference
-        states = self.lift.states(run.times, run.path, inputs, deviation)
+        states = self.lift.states(run.times, run.path, inputs, self._excited(start))
         trust = self.lift.trust(run.times, states)
         return self.model.recorded(maneuver, run, inputs, states).judged(trust)
+
+    def _excited(self, start: Start) -> np.ndarray:
+        """What of the transient a start excites; kept where it is a named one."""
+        if isinstance(start, str) and start in self._starts:
+            return self._starts[start]
+        state = self.model.start(start)
+        found = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+        if isinstance(start, str):
+            self._starts[start] = found
+        return found
+
+    @cached_property
+    def _starts(self) -> dict[str, np.ndarray]:
+        return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002
         """Lifted shapes lie on no subspace."""
