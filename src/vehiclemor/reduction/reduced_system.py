@@ -65,13 +65,19 @@ class ReducedSystem(ShortRepr):
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
-    def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
-        """Path of the reduced states."""
+    def run(
+        self,
+        maneuver: Maneuver,
+        start: Start,
+        times: np.ndarray | None = None,
+        direct_until: float = np.inf,
+    ) -> Run:
+        """Path of the reduced states; see `System.run`."""
         check_inputs(maneuver, self.model.definition)
         # Output times begin with zero.
         state = self._encoded(start, recorded_inputs(maneuver)[1][0])
         how = Solver(self.solver, self.tolerance, times)
-        return self.system.run(maneuver, state, self.spaces, how)
+        return self.system.run(maneuver, state, self.spaces, how, direct_until)
 
     def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """State of a start; kept where it is a named one."""

@@ -17,6 +17,9 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import results
 from vehiclemor.simulation.trajectory import Trust
 
+# Part of a transient below which it needs no samples of its own.
+NEGLIGIBLE = 1e-4
+
 
 @dataclass(frozen=True)
 class Transient:
@@ -130,6 +133,12 @@ class Lifting(ShortRepr):
         place = int(first.argmin())
         reason = f"{watched[place][1]} leaves what the training runs have covered"
         return Trust(float(largest.max()), float(times[first[place]]), reason)
+
+
+def decayed(excited: np.ndarray) -> float:
+    """Time in s at which the modes of a transient have decayed; 0 if there are none."""
+    slowest = excited[0, :, 0].max(initial=-np.inf)
+    return float(np.log(NEGLIGIBLE) / slowest) if slowest < 0.0 else np.inf
 
 
 def _loops() -> Mapping[str, Loop]:
