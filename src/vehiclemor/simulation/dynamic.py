@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, ready
-from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
@@ -22,9 +20,8 @@ from vehiclemor.simulation.checks import (
     loop_array,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
-from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.paths import address_of, path_loops
+from vehiclemor.simulation.paths import path_loops, results
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
@@ -202,7 +199,7 @@ class DynamicModel(Model):
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step, begin)
-        run = self.system.run(maneuver, state, windows, how)
+        run = self.system.run(maneuver, state, windows, how, 0.0)
         whole = times is None and not begin
         inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
         return self.recorded(maneuver, run, inputs, run.path)
@@ -212,10 +209,23 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to the model's states.
 
-        They are the first 2 n columns, nothing else is read.
+        Parameters
+        ----------
+        inputs
+            At the output times (samples, inputs).
+        states
+            Where the run is recorded: 2 n columns, and what may follow them.
         """
-        arguments = run.times, inputs, states, run.counts, run.seconds, run.failure
-        return self.trajectory(*arguments, cut_short(maneuver))
+        outputs, points = None, run.points
+        if points is not None:
+            at_points = self._outputs(states, points.inputs)
+            n, samples = 2 * len(self.coordinates), len(run.times)
+            full, outputs = np.empty((samples, n)), np.empty((samples, at_points.shape[1]))
+            path_loops()["at_samples"](states, points.places, full)
+            path_loops()["at_samples"](at_points, points.places, outputs)
+            states = full
+        arguments = run.times, inputs, states, run.counts, run.seconds
+        return self.trajectory(*arguments, run.failure, cut_short(maneuver), outputs)
 
     def trajectory(
         self,
@@ -226,9 +236,12 @@ class DynamicModel(Model):
         seconds: float,
         failure: str = "",
         remark: str = "",
+        outputs: np.ndarray | None = None,
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        outputs, first = self._observed(loop_array(states), loop_array(inputs), bool(failure))
+        if outputs is None:
+            outputs = self._outputs(loop_array(states), loop_array(inputs))
+        first = self._first_outside(states, outputs, bool(failure))
         message, sample, names = failure, len(times), self._limits[0]
         if not failure:
             of_outputs = first[: len(names)]
@@ -251,34 +264,24 @@ class DynamicModel(Model):
             "; ".join(text for text in (lifted, remark) if text),
         )
 
+    def _outputs(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        paths = states, inputs
+        return results(self.kernels, "outputs", self.constants, paths, len(self.outputs))
+
     @cached_property
     def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
         return limits_of(self.definition)
 
-    @cached_property
-    def _observers(self) -> dict[int, Ready]:
-        return {}
-
-    def _observed(
-        self, states: np.ndarray, inputs: np.ndarray, failed: bool
-    ) -> tuple[np.ndarray, list[int]]:
-        """Outputs, and the first sample at which each is out of its limits; samples if it never is.
+    def _first_outside(self, states: np.ndarray, outputs: np.ndarray, failed: bool) -> list[int]:
+        """First sample at which each output is out of its limits; the number of all if it never is.
 
         Parameters
         ----------
         failed
             Whether the states are no numbers from a failure on, which says nothing of the limits.
         """
-        samples, (_, places, ranges) = len(states), self._limits
-        lanes = LANES if samples >= LANES else 1
-        if lanes not in self._observers:
-            kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
-            self._observers[lanes] = ready(Observer(kernel, self.constants, places, ranges))
-        outputs = np.empty((samples, len(self.outputs)))
-        passed = np.empty(len(places), dtype=np.int64)
-        path_loops()["observed"](states, inputs, self._observers[lanes], outputs, passed)
-        first = passed.tolist()
-        if failed:
-            reached = int(np.isfinite(states).all(axis=1).sum())
-            first = [samples if sample == reached else sample for sample in first]
-        return outputs, first
+        samples, (_, places, ranges) = len(outputs), self._limits
+        first = np.empty(len(places), dtype=np.int64)
+        reached = int(np.isfinite(states).all(axis=1).sum()) if failed else samples
+        path_loops()["outside"](outputs[:reached], places, ranges, first)
+        return [samples if sample == reached else sample for sample in first.tolist()]

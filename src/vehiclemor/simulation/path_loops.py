@@ -1,8 +1,15 @@
 """Kernels along a path of states, and Jacobians by differences, compiled."""
 
+import math
+
 from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel, call_lanes
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.integrators.structures import DERIVATIVE, Equations, Observer
+from vehiclemor.simulation.integrators.structures import (
+    DERIVATIVE,
+    NODE_1,
+    NODE_2,
+    Equations,
+)
 
 
 def kernel_path(
@@ -25,22 +32,45 @@ def lane_path(
     return 0
 
 
-def observed(
-    path: Matrix, inputs: Matrix, observer: Observer, outputs: Matrix, first: IntVector
-) -> Int:
-    """Outputs along a path, and the first sample at which each of the limits is passed, if any."""
-    if len(path) < LANES:
-        kernel_path(path, inputs, observer.kernel, observer.constants, outputs)
-    else:
-        lane_path(path, inputs, observer.kernel, observer.constants, outputs)
-    for k in range(len(observer.places)):
-        place, low, high = observer.places[k], observer.ranges[k, 0], observer.ranges[k, 1]
+def outside(outputs: Matrix, places: IntVector, ranges: Matrix, first: IntVector) -> Int:
+    """First sample at which outputs (limits,) are out of their ranges (limits, 2), if any."""
+    for k in range(len(places)):
         first[k] = len(outputs)
         for sample in range(len(outputs)):
             # What is no number lies outside too.
-            if not low <= outputs[sample, place] <= high:
+            if not ranges[k, 0] <= outputs[sample, places[k]] <= ranges[k, 1]:
                 first[k] = sample
                 break
+    return 0
+
+
+def at_samples(points: Matrix, places: Matrix, result: Matrix) -> Int:
+    """What is known at the points of a run, at its samples; see `structures.Output`."""
+    columns = result.shape[1]
+    for sample in range(len(places)):
+        row, z = int(places[sample, 0]), places[sample, 1]
+        into = result[sample]
+        if row < 0:
+            for i in range(columns):
+                into[i] = math.nan
+        elif z < 0.0:
+            for i in range(columns):
+                into[i] = points[row, i]
+        else:
+            # Lagrange's polynomials at the points.
+            a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
+            outer = (NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0)
+            inner = (NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0)
+            p, q, r, s = (
+                b * c * d / outer,
+                a * c * d / inner,
+                -a * b * d / inner,
+                -a * b * c / outer,
+            )
+            for i in range(columns):
+                into[i] = (p * points[row, i] + q * points[row + 1, i]) + (
+                    r * points[row + 2, i] + s * points[row + 3, i]
+                )
     return 0
 
 

@@ -17,6 +17,9 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import results
 from vehiclemor.simulation.trajectory import Trust
 
+# Part of a transient below which it needs no samples of its own.
+NEGLIGIBLE = 1e-4
+
 
 @dataclass(frozen=True)
 class Transient:
@@ -74,7 +77,7 @@ class Lifting(ShortRepr):
         """Kernel and constants; without modes for a start that excites none."""
         if modes not in self._made:
             right = self.transient.right[:modes]
-            pairs = np.stack([right.real, -right.imag], axis=1).reshape(-1, right.shape[1])
+            pairs = np.stack([right.real, -right.imag], axis=1).reshape(2 * modes, right.shape[1])
             shared = [self.coefficients, self.reference[None]]
             rows = np.vstack([*shared, pairs] if modes else shared)
             rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
@@ -83,8 +86,21 @@ class Lifting(ShortRepr):
             self._made[modes] = Kernels(kernel_sources(text)), constants
         return self._made[modes]
 
+    def excited(self, deviation: np.ndarray) -> np.ndarray:
+        """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
+
+        Parameters
+        ----------
+        deviation
+            Of the start's shape from straight running (n,); m is zero if there is none.
+        """
+        rates = self.transient.rates if deviation.any() else self.transient.rates[:0]
+        amplitudes = self.transient.left[: len(rates)] @ deviation if len(rates) else rates
+        found = np.array([rates, amplitudes], dtype=complex)
+        return np.stack([found.real, found.imag], axis=2)
+
     def states(
-        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, deviation: np.ndarray
+        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, excited: np.ndarray
     ) -> np.ndarray:
         """Full states, and behind them what is watched (samples, 2 n + watched).
 
@@ -92,16 +108,13 @@ class Lifting(ShortRepr):
         ----------
         times, path, inputs
             Of the samples: in s, reduced states (samples, states + 3), inputs (samples, inputs).
-        deviation
-            Of the start's shape from straight running (n,).
+        excited
+            By the start, as `excited` gives it.
         """
-        rates = self.transient.rates
-        amplitudes = self.transient.left @ deviation if deviation.any() else rates[:0]
-        modes = len(amplitudes)
+        modes = excited.shape[1]
         if modes:
             given = np.empty((len(times), inputs.shape[1] + 2 * modes))
-            parts = [np.column_stack([a.real, a.imag]) for a in (rates, amplitudes)]
-            _loops()["with_decay"](times, inputs, *parts, np.empty((modes, 2)), given)
+            _loops()["with_decay"](times, inputs, *excited, np.empty((modes, 2)), given)
             inputs = given
         kernels, constants = self._kernel(modes)
         size = self.layout.size + len(self.features.watched)
@@ -120,6 +133,12 @@ class Lifting(ShortRepr):
         place = int(first.argmin())
         reason = f"{watched[place][1]} leaves what the training runs have covered"
         return Trust(float(largest.max()), float(times[first[place]]), reason)
+
+
+def decayed(excited: np.ndarray) -> float:
+    """Time in s at which the modes of a transient have decayed; 0 if there are none."""
+    slowest = excited[0, :, 0].max(initial=-np.inf)
+    return float(np.log(NEGLIGIBLE) / slowest) if slowest < 0.0 else np.inf
 
 
 def _loops() -> Mapping[str, Loop]:
