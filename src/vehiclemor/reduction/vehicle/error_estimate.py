@@ -42,33 +42,37 @@ def estimated_errors(
     run
         At equidistant times, five at least.
     instants
-        How often the full equations are evaluated, twice each.
+        At how many the full equations are evaluated, twice each.
     """
     shape, propagator = _prepared(model)
-    shapes = shape.of(run.states)
-    planar = run.states[:, model.planar]
-    chosen = _instants(shapes, instants)
-    t, u, x = run.time[chosen], run.inputs[chosen], shapes[chosen]
+    shapes, planar = shape.of(run.states), run.states[:, model.planar]
     step = run.time[1] - run.time[0]
-    slopes = _slopes(np.hstack([shapes, planar]), step)[chosen]
-    heading = planar[chosen, 2]
+    slopes = _slopes(np.hstack([shapes, planar]), step)
+    chosen = _instants(shapes, instants)
+    x, u = shapes[chosen], run.inputs[chosen]
+
+    def everywhere(values: np.ndarray) -> np.ndarray:
+        # What the equations leave changes slowly, unlike the run.
+        return np.array([np.interp(run.time, run.time[chosen], column) for column in values.T]).T
+
     rates, _ = shape.motion(x, u)
-    residual = rates - slopes[:, :-3]
-    linear = shape.linearised
-    e = propagator.driven(t, residual)
-    moved_rates, moved = shape.motion(x + e, u)
-    e = propagator.driven(t, residual + moved_rates - rates - e @ linear.a.T)
+    residual = rates - slopes[chosen, :-3]
+    e = propagator.driven(step, everywhere(residual))
+    moved_rates, moved = shape.motion(x + e[chosen], u)
+    further = moved_rates - rates - e[chosen] @ shape.linearised.a.T
+    nonlinear = moved - e[chosen] @ shape.linearised.motion_a.T
+    e = propagator.driven(step, everywhere(residual + further))
     # Motion of the run itself, in its own frame.
-    sine, cosine = np.sin(heading), np.cos(heading)
-    forward = cosine * slopes[:, -3] + sine * slopes[:, -2]
-    sideways = cosine * slopes[:, -2] - sine * slopes[:, -3]
-    turn, along, across = (moved - np.column_stack([slopes[:, -1], forward, sideways])).T
-    off = _integral(t, turn)
-    x_off = _integral(t, along * cosine - across * sine - off * slopes[:, -2])
-    y_off = _integral(t, along * sine + across * cosine + off * slopes[:, -3])
-    errors = e @ linear.output_a.T + np.column_stack([x_off, y_off, off]) @ _of_planar(model).T
-    squares = _integral(t, errors**2)[-1] / (t[-1] - t[0])
-    return ErrorEstimate(np.sqrt(squares), np.abs(errors).max(axis=0))
+    x_rate, y_rate, turn = slopes[:, -3:].T
+    sine, cosine = np.sin(planar[:, 2]), np.cos(planar[:, 2])
+    own = np.column_stack([turn, cosine * x_rate + sine * y_rate, cosine * y_rate - sine * x_rate])
+    lacking = everywhere(nonlinear - own[chosen]) + e @ shape.linearised.motion_a.T
+    heading = _integral(step, lacking[:, 0])
+    x_off = _integral(step, cosine * lacking[:, 1] - sine * lacking[:, 2] - heading * y_rate)
+    y_off = _integral(step, sine * lacking[:, 1] + cosine * lacking[:, 2] + heading * x_rate)
+    errors = e @ shape.linearised.output_a.T
+    errors += np.column_stack([x_off, y_off, heading]) @ _of_planar(model).T
+    return ErrorEstimate(np.sqrt(np.mean(errors**2, axis=0)), np.abs(errors).max(axis=0))
 
 
 @dataclass(frozen=True)
@@ -79,21 +83,20 @@ class Propagator:
     left: np.ndarray
     right: np.ndarray
 
-    def driven(self, t: np.ndarray, forcing: np.ndarray) -> np.ndarray:
-        """Solution (samples, n) where the forcing (samples, n) is linear between the times."""
-        modal = forcing @ self.left.T
-        h = np.diff(t)[:, None]
-        z = self.rates * h
+    def driven(self, step: float, forcing: np.ndarray) -> np.ndarray:
+        """Solution (samples, n) where the forcing (samples, n) is linear between the samples."""
+        from scipy.signal import lfilter
+
+        modal, z = forcing @ self.left.T, self.rates * step
         small = np.abs(z) < 1e-5
         safe = np.where(small, 1.0, z)
         growth = np.exp(z)
         first = np.where(small, 1.0 + 0.5 * z, (growth - 1.0) / safe)
         second = np.where(small, 0.5 + z / 6.0, (first - 1.0) / safe)
-        pushed = h * ((first - second) * modal[:-1] + second * modal[1:])
-        found = np.zeros_like(modal)
-        for i in range(len(h)):
-            found[i + 1] = growth[i] * found[i] + pushed[i]
-        return (found @ self.right.T).real
+        pushed = np.zeros_like(modal)
+        pushed[1:] = step * ((first - second) * modal[:-1] + second * modal[1:])
+        found = [lfilter([1.0], [1.0, -g], p) for g, p in zip(growth, pushed.T, strict=True)]
+        return (self.right @ np.array(found)).T.real
 
 
 @lru_cache(maxsize=16)
@@ -134,9 +137,6 @@ def _slopes(path: np.ndarray, step: float) -> np.ndarray:
     return found
 
 
-def _integral(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Integral from the first time on, by the trapezoidal rule."""
-    h = np.diff(t).reshape(-1, *(1,) * (values.ndim - 1))
-    found = np.zeros_like(values)
-    found[1:] = np.cumsum(0.5 * h * (values[1:] + values[:-1]), axis=0)
-    return found
+def _integral(step: float, values: np.ndarray) -> np.ndarray:
+    """Integral (samples,) from the first sample on, by the trapezoidal rule."""
+    return step * (np.cumsum(values) - 0.5 * (values + values[0]))
