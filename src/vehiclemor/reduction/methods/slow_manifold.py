@@ -82,6 +82,12 @@ class SlowManifoldSettings(OnlineSettings):
         description="arguments of nonlinear terms are held beyond this multiple of their training "
         "range",
     )
+    trusted: float = Field(
+        0.93,
+        gt=0.0,
+        description="a run whose arguments leave this multiple of their training range isn't "
+        "trusted",
+    )
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 2e-3
 
@@ -93,7 +99,9 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest, settings.symmetric)
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
-    table = feature_table(shape, modes, samples, settings.hull, settings.nonlinearity)
+    table = feature_table(
+        shape, modes, samples, settings.nonlinearity, settings.hull, settings.trusted
+    )
     reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
     if settings.sweeps:
         goals = targets(reduced, training, runs)

@@ -68,7 +68,12 @@ class FeatureTable:
 
 
 def feature_table(
-    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, hull: float, nonlinearity: str
+    shape: VehicleShape,
+    modes: SlowModes,
+    samples: ShapeSamples,
+    nonlinearity: str,
+    hull: float,
+    trusted: float,
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     u = samples.inputs
@@ -121,7 +126,8 @@ def feature_table(
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    limits = (("raw", "change of speed"), *((f"raw{i}", m) for i, m in enumerate(MEANINGS)))
+    edge = f"{hull / trusted!r} * raw"
+    limits = ((edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS)))
     features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, limits)
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
