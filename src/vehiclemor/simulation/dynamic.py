@@ -203,13 +203,17 @@ class DynamicModel(Model):
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step, begin)
         run = self.system.run(maneuver, state, windows, how)
-        inputs = recorded_inputs(maneuver)[1] if times is None else maneuver.at(run.times)
+        whole = times is None and not begin
+        inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
         return self.recorded(maneuver, run, inputs, run.path)
 
     def recorded(
         self, maneuver: Maneuver, run: Run, inputs: np.ndarray, states: np.ndarray
     ) -> Trajectory:
-        """Trajectory of a run whose path has been brought to states (samples, 2 n) of the model."""
+        """Trajectory of a run whose path has been brought to the model's states.
+
+        They are the first 2 n columns, nothing else is read.
+        """
         arguments = run.times, inputs, states, run.counts, run.seconds, run.failure
         return self.trajectory(*arguments, cut_short(maneuver))
 
@@ -238,7 +242,7 @@ class DynamicModel(Model):
             times,
             inputs,
             states[:, :n],
-            states[:, n:],
+            states[:, n : 2 * n],
             outputs,
             dict(zip(DYNAMIC_COUNTS, np.asarray(counts).tolist(), strict=True)),
             seconds,

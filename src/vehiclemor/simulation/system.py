@@ -66,8 +66,6 @@ class Run:
         Time spent in the compiled loop.
     failure
         Why the run has ended early, empty if it has not.
-    begin
-        Time in s at which it has begun.
     """
 
     times: np.ndarray
@@ -75,7 +73,6 @@ class Run:
     counts: np.ndarray
     seconds: float
     failure: str
-    begin: float = 0.0
 
 
 class Solver(NamedTuple):
@@ -279,7 +276,7 @@ class System(ShortRepr):
         output = arguments.output
         status, seconds = timed(loop.prepared(*arguments))
         failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
-        return Run(output.samples, output.path, output.counts, seconds, failure, solver.begin)
+        return Run(output.samples, output.path, output.counts, seconds, failure)
 
     def prepared(
         self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
@@ -290,10 +287,11 @@ class System(ShortRepr):
         if longest is not None:
             check_positive("longest_step", longest)
         key = maneuver, id(windows), solver.name
-        plan = self._plans.get(key) if solver.times is None else None
+        whole = solver.times is None and not solver.begin
+        plan = self._plans.get(key) if whole else None
         if plan is None:
             plan = self._plan(maneuver, windows, solver)
-            if solver.times is None:
+            if whole:
                 if len(self._plans) >= MOST_PLANS:
                     self._plans.clear()
                 self._plans[key] = plan

@@ -44,19 +44,19 @@ RIDGE = 1e-12
 class TwoTrackSettings(OnlineSettings):
     """Settings for a vehicle."""
 
-    terms: int = Field(14, ge=0, description="chosen products in the lateral equations")
-    even_terms: int = Field(12, ge=0, description="chosen products in those of the speed")
+    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
+    even_terms: int = Field(16, ge=0, description="chosen products in those of the speed")
     lifted_terms: int = Field(
-        12, ge=0, description="products chosen for pitch and heave, beside those of the equations"
+        8, ge=0, description="products chosen for pitch and heave, beside those of the equations"
     )
     sweeps: int = Field(
-        6, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
+        20, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
     hull: float = Field(
         1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
     )
     saturation: float = Field(
-        1.3,
+        1.5,
         gt=0.0,
         description="a run with a tire beyond this multiple of the slip at which all of its "
         "contact slides is not trusted",

@@ -127,8 +127,8 @@ def feature_table(
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
     edge = f"{hull / trusted!r} * raw"
-    limits = ((edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS)))
-    features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, limits)
+    watched = ((edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS)))
+    features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, watched)
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
 
