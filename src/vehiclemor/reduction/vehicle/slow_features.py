@@ -122,7 +122,13 @@ def feature_table(
     if nonlinearity == "rich":
         odd += [f"m * {term}" for term in monomials(v, 3)]
     odd += [f"{e} * {variable}" for e in own[k:] for variable in v]
-    even = ["1.0", f"z{n}", *own[k:], *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
+    even = [
+        "1.0",
+        f"z{n}",
+        *own[k:],
+        *monomials(v, 2),
+        *(f"m * {pair}" for pair in monomials(v, 2)),
+    ]
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
