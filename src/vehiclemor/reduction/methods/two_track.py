@@ -124,7 +124,11 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
 
 
 def tire_text(
-    model: DynamicModel, speed: float, samples: Samples, outputs: np.ndarray, settings: TwoTrackSettings
+    model: DynamicModel,
+    speed: float,
+    samples: Samples,
+    outputs: np.ndarray,
+    settings: TwoTrackSettings,
 ) -> tf.Text:
     """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
     z, u = samples.z, samples.inputs

@@ -112,7 +112,9 @@ def fiala(text: Text, wheel: str, slip: str, load: str, p: Mapping[str, float]) 
     limit = text.let(f"limit_{wheel}", f"{load} * ({most} - {fall} * abs({slip}))")
     drive = text.parameter(p["cornering_stiffness"] / 3.0)
     text.let(f"y_{wheel}", f"{drive} * {slip} / {limit}")
-    text.limits.append((f"{text.parameter(1.0 / p['saturation'])} * y_{wheel}", f"saturation of the {wheel} tire"))
+    text.limits.append(
+        (f"{text.parameter(1.0 / p['saturation'])} * y_{wheel}", f"saturation of the {wheel} tire")
+    )
     y = text.let(f"c_{wheel}", held(f"y_{wheel}"))
     left = text.let(f"left_{wheel}", f"1.0 - abs({y})")
     text.let(f"G_{wheel}", f"{left} * {left}")
@@ -132,9 +134,7 @@ def axle_lines(text: Text, axle: int, load: float, p: Mapping[str, float]) -> No
         slip = text.let(f"slip_{wheel}", f"slip{axle} {sign} slip_half{axle}")
         raw = text.let(f"given_{wheel}", f"load{axle} {sign} load_half{axle}")
         least = text.parameter(LEAST_LOAD * load)
-        held_load = text.let(
-            f"load_{wheel}", f"0.5 * ({raw} + {least} + abs({raw} - {least}))"
-        )
+        held_load = text.let(f"load_{wheel}", f"0.5 * ({raw} + {least} + abs({raw} - {least}))")
         fiala(text, wheel, slip, held_load, {**p, "load": load})
     left, right = AXLES[axle]
     for kind in "FMG":
