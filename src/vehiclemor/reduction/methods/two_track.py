@@ -46,11 +46,14 @@ class TwoTrackSettings(OnlineSettings):
 
     terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(16, ge=0, description="chosen products in those of the speed")
+    wheel_terms: int = Field(
+        9, ge=0, description="chosen products in the slip, and in the load, of an axle's wheels"
+    )
     lifted_terms: int = Field(
-        8, ge=0, description="products chosen for pitch and heave, beside those of the equations"
+        20, ge=0, description="products chosen for pitch and heave, beside those of the equations"
     )
     sweeps: int = Field(
-        20, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
+        25, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
     hull: float = Field(
         1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
@@ -111,7 +114,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
     text = tire_text(model, shape.speed, samples, outputs, settings)
     reduced = _fitted_on_rates(shape, modes, encoding, text, samples, settings)
     if settings.sweeps:
-        goals = targets(reduced, training, runs)
+        goals = targets(reduced, training, runs, stride=1)
         (odd, lateral), (even, symmetric) = reduced.features.groups
         free = [(odd, 0), (odd, 1), (odd, 3), *((even[1:], column) for column in symmetric)]
         reduced = improved(reduced, goals, free, settings.sweeps)
@@ -133,8 +136,8 @@ def tire_text(
     ranges = largest(np.column_stack([values, z[:, tf.SPEED]]))
     inputs = u.shape[1]
     text = tf.arguments(speed, ranges, settings.hull, inputs)
-    odd = [*tf.linear_terms(inputs), *tf.CUBIC]
-    even = ["1.0", "m", *tf.SQUARE]
+    odd = [*tf.linear_terms(inputs), *tf.CUBIC, *tf.FASTER]
+    even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]
 
     def column(kind: str, wheel: str) -> np.ndarray:
         return outputs[:, model.outputs.index(f"{kind}_{wheel}")]
@@ -150,14 +153,14 @@ def tire_text(
         slips = [np.tan(column("slip_angle", wheel)) for wheel in (left, right)]
         loads = [column("Fz", wheel) for wheel in (left, right)]
         linear = len(tf.linear_terms(inputs))
-        for name, parity, target, given, more in (
-            (f"slip{axle}", "odd", 0.5 * (slips[0] + slips[1]), linear, 6),
-            (f"slip_half{axle}", "even", 0.5 * (slips[0] - slips[1]), 1, 6),
-            (f"load{axle}", "even", 0.5 * (loads[0] + loads[1]), 1, 6),
-            (f"load_half{axle}", "odd", 0.5 * (loads[0] - loads[1]), linear, 6),
+        for name, parity, target, given in (
+            (f"slip{axle}", "odd", 0.5 * (slips[0] + slips[1]), linear),
+            (f"slip_half{axle}", "even", 0.5 * (slips[0] - slips[1]), 1),
+            (f"load{axle}", "even", 0.5 * (loads[0] + loads[1]), 1),
+            (f"load_half{axle}", "odd", 0.5 * (loads[0] - loads[1]), linear),
         ):
             terms, columns = tables[parity]
-            chosen = forward_selection(columns, target[:, None], given, more)
+            chosen = forward_selection(columns, target[:, None], given, settings.wheel_terms)
             weights = ridge_fit(columns[:, chosen], target, RIDGE)
             full.sum(name, [terms[i] for i in chosen], weights)
         static = float(np.mean(loads))
