@@ -44,20 +44,22 @@ class ProjectionWindows(ShortRepr):
         return ready(Subspaces(self.means, self.trial_basis, self.test_basis, self.ranks))
 
     @cached_property
-    def _spans(self) -> dict[tuple[bytes, float, float], Ready]:
+    def _spans(self) -> dict[tuple[bytes, float], Ready]:
         return {}
 
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """Spans from `begin` to `end`, no break point or window edge inside; kept for more runs.
+        """Spans from `begin` to `end`, no break point or window edge inside; whole ones are kept.
 
         Parameters
         ----------
         breaks
             Ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
         """
-        key = breaks.tobytes(), end, begin
+        if begin:
+            return ready(smooth_spans(breaks, self.edges, end, begin))
+        key = breaks.tobytes(), end
         if key not in self._spans:
-            self._spans[key] = ready(smooth_spans(breaks, self.edges, end, begin))
+            self._spans[key] = ready(smooth_spans(breaks, self.edges, end))
         return self._spans[key]
 
 

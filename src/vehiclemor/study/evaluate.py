@@ -19,8 +19,9 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.study.experiment import Experiment, Keep
+from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.input_range import input_range
 from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.method_settings import default_settings, for_method
 from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
@@ -63,7 +64,7 @@ def _evaluated(experiment: Experiment, model: Model, kept: bool) -> xr.Dataset:
     for scenario in experiment.test:
         outcome = refused or attempt(partial(solve, model, scenario), "the full-order reference: ")
         if isinstance(outcome, Trajectory):
-            outcome = _tested(model, reduced, scenario, outcome, experiment.keep)
+            outcome = _tested(model, reduced, scenario, outcome, experiment)
         outcomes.append(outcome)
     if experiment.keep == "errors":
         return errors_dataset(model, experiment, outcomes, reduced)
@@ -174,7 +175,7 @@ def _tested(
     reduced: ReducedModel | Failure,
     scenario: Scenario,
     reference: Trajectory,
-    keep: Keep,
+    experiment: Experiment,
 ) -> Outcome | Failure:
     """One test scenario, simulated with the reduced model."""
     if isinstance(reduced, Failure):
@@ -182,8 +183,9 @@ def _tested(
 
     def run() -> Outcome:
         start = start_of(model, scenario)
-        if keep == "errors":
-            return Outcome(_sound(model, reduced, scenario, start), reference)
+        if experiment.keep == "errors":
+            trajectory = _sound(model, reduced, scenario, start)
+            return Outcome(_warned(model, experiment, scenario, trajectory), reference)
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
         trajectory = _sound(model, reduced, scenario, start)
@@ -198,6 +200,15 @@ def _tested(
         return Outcome(trajectory, reference, floor)
 
     return attempt(run)
+
+
+def _warned(
+    model: Model, experiment: Experiment, scenario: Scenario, run: Trajectory
+) -> Trajectory:
+    """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
+    if run.trust or component("method", experiment.method).own_limits:
+        return run
+    return run.judged(input_range(model, experiment.training).trust(model, scenario))
 
 
 def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:

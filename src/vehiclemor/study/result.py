@@ -129,6 +129,8 @@ def errors_dataset(
     found["seconds"] = np.array([o.trajectory.seconds if o else np.nan for o in finished])
     for name in ("status", "message"):
         found[name] = np.array([getattr(end, name) for end in ends], dtype=object)
+    remarks = [o.trajectory.remark if o else "" for o in finished]
+    found["remark"] = np.array(remarks, dtype=object)
     trusted = [o.trajectory.trust if o else None for o in finished]
     found["trust_indicator"] = np.array([t.indicator if t else np.nan for t in trusted])
     found["trusted_until"] = np.array([t.until if t else np.inf for t in trusted])

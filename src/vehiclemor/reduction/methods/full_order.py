@@ -98,4 +98,5 @@ METHOD = Method(
         "dae": _strongest("ros34pw2", 7e-4),
     },
     fit=fit,
+    own_limits=True,
 )

@@ -54,4 +54,5 @@ METHOD = Method(
     settings={"dae": OnlineSettings},
     refusal=no_closed_forms,
     fit=fit,
+    own_limits=True,
 )

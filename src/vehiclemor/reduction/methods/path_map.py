@@ -162,4 +162,5 @@ METHOD = Method(
     settings={"ae": PathMapSettings},
     check=check,
     fit=fit,
+    own_limits=True,
 )

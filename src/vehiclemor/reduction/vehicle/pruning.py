@@ -37,7 +37,7 @@ def pruned(
     nonlinear = sorted([*table.odd_nonlinear, *table.even_nonlinear])
     groups = [np.flatnonzero(rows == i) for i in nonlinear]
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
-    linear = [*table.odd[: table.linear_count], *table.even[:2]]
+    linear = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
     stay = sorted([*linear, *(nonlinear[i] for i in left)])
     fewer = table.with_only(stay)
     return (

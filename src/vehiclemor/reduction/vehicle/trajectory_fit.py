@@ -28,6 +28,7 @@ STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
 DIFFERENCE = 1e-6
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
 # (numbers of features, column) of the coefficients that may change.
@@ -106,6 +107,11 @@ def improved(
                 break
             damping *= 10.0
     return reduced
+
+
+def spread(goals: Sequence[Target], share: float) -> list[Target]:
+    """A share of the goals, spread over them without a period (multiples of the golden ratio)."""
+    return [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
 
 
 def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
