@@ -32,9 +32,7 @@ def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return normal / np.outer(scale, scale), scale
 
 
-def forward_selection(
-    columns: np.ndarray, values: np.ndarray, given: int, more: int
-) -> list[int]:
+def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
     """Numbers of the columns that explain most, one after the other (orthogonal least squares).
 
     S. Chen, S. A. Billings, W. Luo, Int. J. Control 50 (1989), 1873-1896.
