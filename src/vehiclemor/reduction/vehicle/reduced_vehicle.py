@@ -130,8 +130,7 @@ class ReducedVehicle(ShortRepr):
         excited, inputs = self._excited(start), recorded_inputs(maneuver)[1]
         run = self.equations.run(maneuver, start, direct_until=decayed(excited))
         points = run.points or Points(inputs, run.times, run.times[:0])
-        states = self.lift.states(points.moments, run.path, points.inputs, excited)
-        trust = self.lift.trust(points.moments, states)
+        states, trust = self.lift.states(points.moments, run.path, points.inputs, excited)
         return self.model.recorded(maneuver, run, inputs, states).judged(trust)
 
     def _excited(self, start: Start) -> np.ndarray:
