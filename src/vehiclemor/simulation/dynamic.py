@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
@@ -20,14 +22,16 @@ from vehiclemor.simulation.checks import (
     loop_array,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.paths import path_loops, results
+from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
+NO_PLACES = np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,16 +220,7 @@ class DynamicModel(Model):
         states
             Where the run is recorded: 2 n columns, and what may follow them.
         """
-        outputs, points = None, run.points
-        if points is not None:
-            at_points = self._outputs(states, points.inputs)
-            n, samples = 2 * len(self.coordinates), len(run.times)
-            full, outputs = np.empty((samples, n)), np.empty((samples, at_points.shape[1]))
-            path_loops()["at_samples"](states, points.places, full)
-            path_loops()["at_samples"](at_points, points.places, outputs)
-            states = full
-        arguments = run.times, inputs, states, run.counts, run.seconds
-        return self.trajectory(*arguments, run.failure, cut_short(maneuver), outputs)
+        return self._told(run, inputs, states, cut_short(maneuver))
 
     def trajectory(
         self,
@@ -235,15 +230,17 @@ class DynamicModel(Model):
         counts: np.ndarray,
         seconds: float,
         failure: str = "",
-        remark: str = "",
-        outputs: np.ndarray | None = None,
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        if outputs is None:
-            outputs = self._outputs(loop_array(states), loop_array(inputs))
-        first = self._first_outside(states, outputs, bool(failure))
-        message, sample, names = failure, len(times), self._limits[0]
-        if not failure:
+        run = Run(times, states, np.asarray(counts), seconds, failure)
+        return self._told(run, loop_array(inputs), loop_array(states), "")
+
+    def _told(self, run: Run, inputs: np.ndarray, states: np.ndarray, remark: str) -> Trajectory:
+        """See `recorded`; a remark is added to what there is to remark."""
+        states, outputs, first = self._delivered(run, inputs, states)
+        (names, *_), times = self._limits, run.times
+        message, sample = run.failure, len(times)
+        if not message:
             of_outputs = first[: len(names)]
             message, sample = left_validity(self.definition, names, of_outputs, times, outputs)
             if message:
@@ -257,31 +254,49 @@ class DynamicModel(Model):
             states[:, :n],
             states[:, n : 2 * n],
             outputs,
-            dict(zip(DYNAMIC_COUNTS, np.asarray(counts).tolist(), strict=True)),
-            seconds,
+            dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            run.seconds,
             "diverged" if message else "ok",
             message,
             "; ".join(text for text in (lifted, remark) if text),
         )
 
-    def _outputs(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        paths = states, inputs
-        return results(self.kernels, "outputs", self.constants, paths, len(self.outputs))
-
     @cached_property
     def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
         return limits_of(self.definition)
 
-    def _first_outside(self, states: np.ndarray, outputs: np.ndarray, failed: bool) -> list[int]:
-        """First sample at which each output is out of its limits; the number of all if it never is.
+    @cached_property
+    def _observers(self) -> dict[int, Ready]:
+        return {}
 
-        Parameters
-        ----------
-        failed
-            Whether the states are no numbers from a failure on, which says nothing of the limits.
+    def _observer(self, lanes: int) -> Ready:
+        if lanes not in self._observers:
+            kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
+            observer = Observer(kernel, self.constants, *self._limits[1:])
+            self._observers[lanes] = ready(observer)
+        return self._observers[lanes]
+
+    def _delivered(
+        self, run: Run, inputs: np.ndarray, states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, list[int]]:
+        """States and outputs at the samples, and when each output is first out of its limits.
+
+        That is the number of all samples where it never is.
         """
-        samples, (_, places, ranges) = len(outputs), self._limits
-        first = np.empty(len(places), dtype=np.int64)
-        reached = int(np.isfinite(states).all(axis=1).sum()) if failed else samples
-        path_loops()["outside"](outputs[:reached], places, ranges, first)
-        return [samples if sample == reached else sample for sample in first.tolist()]
+        samples, size = len(run.times), len(self.outputs)
+        outputs = np.empty((samples, size))
+        first = np.empty(len(self._limits[1]), dtype=np.int64)
+        observer = self._observer(LANES if len(states) >= LANES else 1)
+        whole, scratch, places = states, NO_PLACES, NO_PLACES
+        if run.points is not None:
+            inputs, places = run.points.inputs, run.points.places
+            whole = np.empty((samples, 2 * len(self.coordinates)))
+            scratch = np.empty((len(states), size))
+        arguments = states, inputs, places, observer, scratch, whole, outputs, first
+        path_loops()["delivered"](*arguments)
+        found = first.tolist()
+        if run.failure:
+            # From the failure on there are no numbers, which says nothing of limits.
+            reached = int(np.isfinite(whole).all(axis=1).sum())
+            found = [samples if sample == reached else sample for sample in found]
+        return whole, outputs, found
