@@ -16,14 +16,12 @@ from typing import Any
 
 from llvmlite import ir
 
-from vehiclemor.codegen import arctangent, exponential, sincos, weighted_sums
-from vehiclemor.codegen.vector_lanes import LANES, RESULTS
+from vehiclemor.codegen import arctangent, exponential, sincos, vector_statements, weighted_sums
+from vehiclemor.codegen.vector_lanes import LANES, RESULTS, WIDTH
 
 # A product and a sum may become one operation, as in the loops that are compiled with them.
 FLAGS = ("contract",)
 DOUBLE = ir.DoubleType()
-# Half a batch at a time: vectors of 512 bits were a fifth slower.
-WIDTH = LANES // 2
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
@@ -286,6 +284,13 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
     def address(name: str, place: int) -> Any:
         return builder.gep(pointers[name], [ir.Constant(ir.IntType(64), place)])
 
+    def pointer(node: ast.expr) -> Any:
+        assert isinstance(node, ast.Subscript)
+        return address(ast.unparse(node.value), _places(node)[0])
+
+    def value(node: ast.expr) -> Any:
+        return expressions.value(node, read, DOUBLE)
+
     def read(node: ast.expr) -> Any:
         # Loads come where they are needed first: registers are few.
         match node:
@@ -295,28 +300,26 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
                 places = _places(node)
                 if array == "_work" and ("_work", places[0]) in values:
                     return values["_work", places[0]]
-                if array not in {"_work", "_result"} and len(places) == 1:
+                if array != "_work" and len(places) == 1:
                     return builder.load(address(array, places[0]))
         raise ValueError(f"{ast.unparse(node)}: unknown, or of the wrong shape")
 
     for statement in kernel.statements:
         match statement:
             case ast.Assign([ast.Name(target)], expression):
-                values[target] = expressions.value(expression, read, DOUBLE)
+                values[target] = value(expression)
             case ast.Assign([ast.Subscript(ast.Name("_work")) as target], expression):
-                values["_work", _places(target)[0]] = expressions.value(expression, read, DOUBLE)
+                values["_work", _places(target)[0]] = value(expression)
             case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
                 place = _places(target)
                 if len(place) != kernel.dimensions:
                     raise ValueError(f"{ast.unparse(target)}: other results have another shape")
                 flat = place[0] if len(place) == 1 else place[0] * kernel.columns + place[1]
-                builder.store(expressions.value(expression, read, DOUBLE), address("_result", flat))
+                builder.store(value(expression), address("_result", flat))
             case ast.Assign(
                 [ast.Tuple(elements)], ast.Call(ast.Name("sincos_one"), [argument], [])
             ) if len(elements) == 2:
-                results = expressions.elementary(
-                    "sincos", expressions.value(argument, read, DOUBLE)
-                )
+                results = expressions.elementary("sincos", value(argument))
                 values |= zip((ast.unparse(e) for e in elements), results, strict=True)
             case ast.Assign(
                 [ast.Tuple(elements)],
@@ -327,7 +330,7 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
                 ),
             ):
                 # One by one, each used at once: registers are few.
-                factors = (expressions.value(term, read, DOUBLE) for term in terms)
+                factors = (value(term) for term in terms)
                 results = weighted_sums.weighted_sums(
                     builder, address(array, first), factors, len(elements)
                 )
@@ -340,6 +343,8 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
                 values |= {
                     ("_work", first + LANES + place): result for place, result in enumerate(results)
                 }
+            case ast.Expr(ast.Call(ast.Name(name)) as call) if name in vector_statements.NAMES:
+                vector_statements.write(call, builder, pointer, value)
             case _:
                 raise ValueError(
                     f"{ast.unparse(statement)}: {type(statement).__name__} is not straight-line"

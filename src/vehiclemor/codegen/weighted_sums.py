@@ -15,18 +15,13 @@ from typing import Any
 
 from llvmlite import ir
 
+from vehiclemor.codegen.vector_lanes import WIDTH, padded
+
 FLAGS = ("contract",)
-# Floats in a vector, as in the batches of elementary functions.
-WIDTH = 4
 DOUBLE = ir.DoubleType()
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # Sums in turn, so that no addition waits for the one before it.
 CHAINS = 2
-
-
-def padded(targets: int) -> int:
-    """Length of a row of coefficients for a number of targets."""
-    return -(-targets // WIDTH) * WIDTH
 
 
 def weighted_sums(
@@ -48,14 +43,14 @@ def weighted_sums(
     vectors = padded(targets) // WIDTH
     chains: list[list[Any]] = [[None] * vectors for _ in range(CHAINS)]
     for j, term in enumerate(terms):
-        spread = _spread(builder, term)
+        factor = spread(builder, term)
         sums = chains[j % CHAINS]
         for v in range(vectors):
             place = builder.gep(
                 coefficients, [ir.Constant(ir.IntType(64), (j * vectors + v) * WIDTH)]
             )
             row = builder.load(builder.bitcast(place, VECTOR.as_pointer()), align=8)
-            product = builder.fmul(row, spread, flags=FLAGS)
+            product = builder.fmul(row, factor, flags=FLAGS)
             before = sums[v]
             sums[v] = product if before is None else builder.fadd(before, product, flags=FLAGS)
     totals = []
@@ -78,7 +73,7 @@ def reach(call: ast.Call, targets: int) -> int:
     return first.value + padded(targets) * len(terms.elts)
 
 
-def _spread(builder: Any, value: Any) -> Any:
+def spread(builder: Any, value: Any) -> Any:
     """A vector with the same value in all places."""
     single = builder.insert_element(
         ir.Constant(VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)

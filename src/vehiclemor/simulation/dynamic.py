@@ -12,6 +12,7 @@ import numpy as np
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import check_inputs, cut_short, left_validity, lifted_wheels
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
@@ -69,6 +70,7 @@ class DynamicModel(Model):
             self.error_scale,
             self.active,
             self.rotating,
+            partners=partners(self.definition.states),
         )
 
     def derivative(self, x: Any, u: Any) -> np.ndarray:
