@@ -16,6 +16,7 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.system import System
 
 # Magnitudes below which errors count absolutely, by name of the state; 10 otherwise.
@@ -41,6 +42,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         np.array([ERROR_SCALE.get(name, 10.0) for name in names]),
         np.array([i for i, name in enumerate(names) if name not in cyclic]),
         np.zeros(0, dtype=np.int64),
+        partners=partners(names),
     )
     cost = Offline(time.process_time() - began)
     return transformed_system(model, system, encode, cost, settings)
