@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,9 +12,13 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
+
+# Encoded starts that are kept.
+MOST_STARTS = 64
 
 
 def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
@@ -60,17 +65,39 @@ class ReducedSystem(ShortRepr):
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
-    def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
-        """Path of the reduced states."""
+    def run(
+        self,
+        maneuver: Maneuver,
+        start: Start,
+        times: np.ndarray | None = None,
+        direct_until: float = np.inf,
+    ) -> Run:
+        """Path of the reduced states; see `System.run`."""
         check_inputs(maneuver, self.model.definition)
-        state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
+        # Output times begin with zero.
+        state = self._encoded(start, recorded_inputs(maneuver)[1][0])
         how = Solver(self.solver, self.tolerance, times)
-        return self.system.run(maneuver, state, self.spaces, how)
+        return self.system.run(maneuver, state, self.spaces, how, direct_until)
+
+    def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """State of a start; kept where it is a named one."""
+        if not isinstance(start, str):
+            return self.encode(self.model.start(start), inputs)
+        key = start, inputs.tobytes()
+        if key not in self._starts:
+            if len(self._starts) >= MOST_STARTS:
+                self._starts.clear()
+            self._starts[key] = self.encode(self.model.start(start), inputs)
+        return self._starts[key]
+
+    @cached_property
+    def _starts(self) -> dict[tuple[str, bytes], np.ndarray]:
+        return {}
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate, then lift to full states at the maneuver's output times."""
         run = self.run(maneuver, start)
-        inputs = maneuver.at(run.times)
+        inputs = recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
         return self.model.recorded(maneuver, run, inputs, states)
 
