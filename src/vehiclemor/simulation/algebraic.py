@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -176,14 +176,24 @@ class AlgebraicModel(Model):
             If an iteration fails; time and reachable range are named.
         """
         self.start(start)
+        if times is None:
+            times, inputs = self.sampled(maneuver)
+        else:
+            times = output_times(times, maneuver, repeats=True)
+            inputs = self.inputs_of(maneuver, times)
+        tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
+        return self._solved(times, inputs, "newton" if solver is None else solver, tolerance)
+
+    def sampled(self, maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+        """Output times (samples,) in s and inputs of a maneuver; kept, so they can't be written.
+
+        Raises
+        ------
+        InputError
+            As of `inputs_of`.
+        """
         check_inputs(maneuver, self.definition)
-        times = output_times(times, maneuver, repeats=True)
-        return self.solve_path(
-            times,
-            self.inputs_of(maneuver, times),
-            "newton" if solver is None else solver,
-            NEWTON_TOLERANCE if tolerance is None else tolerance,
-        )
+        return _sampled(maneuver)
 
     def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
         """Inputs (samples, number of inputs) of a maneuver as the loops want them.
@@ -204,9 +214,13 @@ class AlgebraicModel(Model):
         tolerance: float = NEWTON_TOLERANCE,
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
-        check_positive("tolerance", tolerance)
         times = checked_array(times, np.size(times), "times", self.name)
-        inputs = checked_inputs(inputs, times, self.inputs)
+        return self._solved(times, checked_inputs(inputs, times, self.inputs), solver, tolerance)
+
+    def _solved(
+        self, times: np.ndarray, inputs: np.ndarray, solver: str, tolerance: float
+    ) -> Trajectory:
+        check_positive("tolerance", tolerance)
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         further: tuple[str, ...] = ()
@@ -289,6 +303,14 @@ class AlgebraicModel(Model):
                 f"(from {heights.min():.4g} to {heights.max():.4g} m are asked for); the reachable "
                 f"range is {low:.4f} to {high:.4f} m (rack at {rack:g} m)"
             )
+
+
+@lru_cache(maxsize=64)
+def _sampled(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+    times = maneuver.times
+    inputs = checked_inputs(maneuver.at(times), times, maneuver.inputs)
+    times.flags.writeable = inputs.flags.writeable = False
+    return times, inputs
 
 
 def new_counts() -> np.ndarray:
