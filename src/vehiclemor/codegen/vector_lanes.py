@@ -1,7 +1,7 @@
 """Sizes of the batches in which kernels evaluate elementary functions."""
 
 # Elementary functions are evaluated this many at a time, so that the compiler makes one vector loop
-# of them; fewer than the smallest batch one by one.
+# of them; fewer than the smallest batch one by one.  Kernels along a path take as many samples.
 LANES = 8
 SMALLEST_BATCH = 3
 # Batched function -> prefixes of its results; its block in the scratch space has one part for the

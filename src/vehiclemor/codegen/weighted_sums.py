@@ -48,14 +48,14 @@ def weighted_sums(
     vectors = padded(targets) // WIDTH
     chains: list[list[Any]] = [[None] * vectors for _ in range(CHAINS)]
     for j, term in enumerate(terms):
-        spread = _spread(builder, term)
+        factor = spread(builder, term, WIDTH)
         sums = chains[j % CHAINS]
         for v in range(vectors):
             place = builder.gep(
                 coefficients, [ir.Constant(ir.IntType(64), (j * vectors + v) * WIDTH)]
             )
             row = builder.load(builder.bitcast(place, VECTOR.as_pointer()), align=8)
-            product = builder.fmul(row, spread, flags=FLAGS)
+            product = builder.fmul(row, factor, flags=FLAGS)
             before = sums[v]
             sums[v] = product if before is None else builder.fadd(before, product, flags=FLAGS)
     totals = []
@@ -78,11 +78,26 @@ def reach(call: ast.Call, targets: int) -> int:
     return first.value + padded(targets) * len(terms.elts)
 
 
-def _spread(builder: Any, value: Any) -> Any:
+def sums_of_lanes(
+    builder: Any, coefficients: Any, terms: Iterable[Any], targets: int
+) -> list[ir.Value]:
+    """The same where every term is a vector of samples: see `weighted_sums`."""
+    totals: list[Any] = [None] * targets
+    for j, term in enumerate(terms):
+        for i in range(targets):
+            place = builder.gep(
+                coefficients, [ir.Constant(ir.IntType(64), j * padded(targets) + i)]
+            )
+            weight = spread(builder, builder.load(place), term.type.count)
+            product = builder.fmul(weight, term, flags=FLAGS)
+            before = totals[i]
+            totals[i] = product if before is None else builder.fadd(before, product, flags=FLAGS)
+    return totals
+
+
+def spread(builder: Any, value: Any, width: int) -> Any:
     """A vector with the same value in all places."""
-    single = builder.insert_element(
-        ir.Constant(VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
-    )
-    nowhere = ir.Constant(VECTOR, ir.Undefined)
-    first = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    nowhere = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
+    single = builder.insert_element(nowhere, value, ir.Constant(ir.IntType(32), 0))
+    first = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
     return builder.shuffle_vector(single, nowhere, first)

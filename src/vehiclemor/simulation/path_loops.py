@@ -1,6 +1,7 @@
 """Kernels along a path of states, and Jacobians by differences, compiled."""
 
-from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel
+from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel, call_lanes
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.integrators.structures import DERIVATIVE, Equations
 
 
@@ -10,6 +11,17 @@ def kernel_path(
     """Results (samples, size) of one kernel at every sample of a path of states."""
     for sample in range(len(path)):
         call_kernel(kernel, 0, path[sample], inputs[sample], constants, result[sample])
+    return 0
+
+
+def lane_path(
+    path: Matrix, inputs: Matrix, kernel: IntVector, constants: Vector, result: Matrix
+) -> Int:
+    """The same by a kernel that takes `LANES` samples at once, which there must be."""
+    last = len(path) - LANES
+    for first in range(0, len(path), LANES):
+        # The last may have been computed before.
+        call_lanes(kernel, 0, path, inputs, constants, result, min(first, last))
     return 0
 
 
