@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import DESIGN_START
@@ -22,6 +23,7 @@ from vehiclemor.simulation.checks import (
     output_times,
 )
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
@@ -29,7 +31,7 @@ from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
-SOLVERS = ("newton", "newton_dense", "chord")
+SOLVERS = ("newton", "newton_dense", "chord", "newton_lanes")
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -164,7 +166,9 @@ class AlgebraicModel(Model):
             `newton`, the default: fresh Jacobians, generated elimination, started at the previous
             sample.  `newton_dense`: the same with dense elimination and partial pivoting.
             `chord`: constant inverse of the design position, started at a quadratic extrapolation;
-            where it does not contract, a fresh inverse, then Newton's method.
+            where it does not contract, a fresh inverse, then Newton's method.  `newton_lanes`:
+            Newton's method started at a quadratic extrapolation, the samples in vector lanes; where
+            that fails, `newton`.
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default.
 
@@ -221,6 +225,10 @@ class AlgebraicModel(Model):
         self, times: np.ndarray, inputs: np.ndarray, solver: str, tolerance: float
     ) -> Trajectory:
         check_positive("tolerance", tolerance)
+        if solver == "newton_lanes":
+            found, solver = self._side_by_side(times, inputs, tolerance), "newton"
+            if found is not None:
+                return found
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         further: tuple[str, ...] = ()
@@ -230,8 +238,7 @@ class AlgebraicModel(Model):
         elif solver != "chord":
             raise unknown("solver", solver, SOLVERS)
         else:
-            inverse = np.linalg.inv(self.jacobian(self.design, np.zeros(len(self.inputs))))
-            entry, how, further = "chord_path", inverse.T.copy(), ("simulation.chord_loops",)
+            entry, how, further = "chord_path", self._inverse, ("simulation.chord_loops",)
         mechanism, iteration = self._mechanism, self._iteration(tolerance, SHORTEST_STEP)
         arguments = (mechanism, inputs, how, iteration, solution, self._buffer())
         loop = self.loop(entry, *further)
@@ -247,6 +254,38 @@ class AlgebraicModel(Model):
         failed = self.trajectory(times, inputs, path, solution.counts, seconds, failure)
         raise ConvergenceError(f"{self.name}: {failed.message} ({solver})", failed)
 
+    def _side_by_side(
+        self, times: np.ndarray, inputs: np.ndarray, tolerance: float
+    ) -> Trajectory | None:
+        """Solution with the samples in vector lanes; none if it has failed."""
+        n, m, samples = len(self.coordinates), len(self.outputs), len(times)
+        if samples < LANES:
+            return None
+        table = np.empty((samples, n + m))
+        solution = newton_loops.Solution(table, new_counts())
+        iteration = self._iteration(tolerance, SHORTEST_STEP)
+        buffer = np.empty(LANES * (5 * n + len(self.inputs) + m) + n * (n + 2))
+        loop, mechanism, kernels = self._lanes
+        run = loop.prepared(mechanism, inputs, kernels, iteration, solution, buffer)
+        status, seconds = timed(run, solution.counts)
+        if status:
+            return None
+        path, outputs = table[:, :n], table[:, n:]
+        return self.trajectory(times, inputs, path, solution.counts, seconds, None, outputs)
+
+    @cached_property
+    def _lanes(self) -> tuple[Loop, Ready, np.ndarray]:
+        """Loop with the samples in vector lanes, mechanism, addresses of its kernels."""
+        kernels = [address_of(self.kernels, name, LANES) for name in ("newton_step", "outputs")]
+        loop = self.loop("lane_path", "simulation.lane_loops")
+        return loop, ready(self._mechanism), np.array(kernels, dtype=np.int64)
+
+    @cached_property
+    def _inverse(self) -> np.ndarray:
+        """Transposed inverse Jacobian (n, n) at the design position."""
+        inverse = np.linalg.inv(self.jacobian(self.design, np.zeros(len(self.inputs))))
+        return inverse.T.copy()
+
     def _iteration(self, tolerance: float, shortest: float) -> newton_loops.Iteration:
         return newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, shortest)
 
@@ -258,8 +297,12 @@ class AlgebraicModel(Model):
         counts: np.ndarray,
         seconds: float,
         failure: tuple[int, int] | None = None,
+        outputs: np.ndarray | None = None,
     ) -> Trajectory:
-        """Trajectory of a path of coordinates; `failure` is (status, sample) of a stopped loop."""
+        """Trajectory of a path of coordinates; `failure` is (status, sample) of a stopped loop.
+
+        Outputs are those of the path where none are given.
+        """
         status, message = "ok", ""
         if failure is not None:
             status = "diverged"
@@ -269,7 +312,7 @@ class AlgebraicModel(Model):
             inputs,
             path,
             np.empty((len(path), 0)),
-            self.along("outputs", path, inputs),
+            self.along("outputs", path, inputs) if outputs is None else outputs,
             {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=False)},
             seconds,
             status,

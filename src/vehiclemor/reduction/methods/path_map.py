@@ -4,7 +4,7 @@ The configurations of a suspension form a surface over wheel travel and rack dis
 where the rack rests.  It is analytic, so that interpolation in Chebyshev points converges
 geometrically with the degree, and with the size of the cells at the order of the degree plus one
 (L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, chapter 8).  The training
-runs only tell between which inputs.  No equation is solved online.
+runs only tell between which inputs: the equations are solved in all of that box.  No equation is solved online.
 """
 
 import time
@@ -22,7 +22,7 @@ from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import map_loop, monomials
-from vehiclemor.reduction.polynomials.map_loops import INDICATOR, LEFT, Cells
+from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
@@ -36,7 +36,9 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 HIGHEST_DEGREE = 20
 # Solved positions that a fit may ask for.
 MOST_NODES = 300_000
-# An input that changes by less (m) rests; runs may leave the range of training by as much.
+# Part of an input's range in training that is added at either end: its peaks lie between samples.
+MARGIN = 0.005
+# An input that changes by less (m) rests; runs may leave the ranges by as much.
 RESTING = 1e-9
 # Quantities (rad or m) that differ by less are one, such as an output that is a coordinate.
 SAME = 1e-15
@@ -61,7 +63,7 @@ class PathMapModel(ShortRepr):
     Attributes
     ----------
     ranges
-        Lowest and highest value (inputs, 2) of each input in training.
+        Lowest and highest value (inputs, 2) of each input in training, with the margins.
     degree
         Total degree of the polynomials.
     cells
@@ -87,8 +89,7 @@ class PathMapModel(ShortRepr):
 
     @cached_property
     def _loop(self) -> Loop:
-        sizes = self.effective_rank, self.degree, len(self.model.coordinates)
-        return map_loop(len(self.ranges), *sizes, self.columns)
+        return map_loop(len(self.ranges), self.effective_rank, self.degree, self.columns)
 
     @cached_property
     def _ready(self) -> Ready:
@@ -99,12 +100,10 @@ class PathMapModel(ShortRepr):
         model, samples = self.model, maneuver.samples
         model.start(start)
         times, inputs = model.sampled(maneuver)
-        path = np.empty((samples, len(model.coordinates)))
-        outputs = np.empty((samples, len(model.outputs)))
-        told, buffer = np.empty(2), np.empty(self.effective_rank + path.shape[1] + outputs.shape[1])
-        run = self._loop.prepared(inputs, self._ready, path, outputs, told, buffer)
-        _, seconds = timed(run, told)
-        indicator, left = told.tolist()
+        # One table is written faster than two.
+        table, buffer = np.empty((samples, len(self.columns))), np.empty(TOLD + self.effective_rank)
+        _, seconds = timed(self._loop.prepared(inputs, self._ready, table, buffer), buffer)
+        indicator, left = buffer[:TOLD].tolist()
         status, message, until, reason = "ok", "", np.inf, ""
         if left < samples:
             left = int(left)
@@ -112,13 +111,14 @@ class PathMapModel(ShortRepr):
             message = f"from t = {until:.4g} s on {reason}"
             if self.stops:
                 status, message = "diverged", f"at t = {until:.6g} s {reason}"
-                path[left:], outputs[left:] = np.nan, np.nan
+                table[left:] = np.nan
+        n = len(model.coordinates)
         return Trajectory(
             times,
             inputs,
-            path,
+            table[:, :n],
             np.empty((samples, 0)),
-            outputs,
+            table[:, n:],
             dict.fromkeys(model.counts, 0),
             seconds,
             status,
@@ -168,7 +168,9 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     """
     began = time.process_time()
     every = np.concatenate([model.sampled(run.maneuver)[1] for run in training])
-    ranges = np.column_stack([every.min(axis=0), every.max(axis=0)])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margins = MARGIN * (high - low)
+    ranges = np.column_stack([low - margins, high + margins])
     centres, widths = ranges.mean(axis=1), np.ptp(ranges, axis=1)
     moving = np.flatnonzero(widths > RESTING)
     if not len(moving):

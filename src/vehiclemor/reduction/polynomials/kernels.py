@@ -94,12 +94,9 @@ def map_kernel(variables: int, degree: int, columns: tuple[int, ...]) -> str:
 
 
 @cache
-def map_loop(
-    inputs: int, variables: int, degree: int, states: int, columns: tuple[int, ...]
-) -> Loop:
+def map_loop(inputs: int, variables: int, degree: int, columns: tuple[int, ...]) -> Loop:
     """Compiled loop of polynomials of that total degree in so many of the inputs."""
-    outputs = len(columns) - states
-    sizes = {"INPUTS": inputs, "MOVING": variables, "N": states, "OUTPUTS": outputs}
+    sizes = {"INPUTS": inputs, "MOVING": variables}
     modules = (*NEWTON, "reduction.polynomials.map_loops")
     kernels = {"polynomials": map_kernel(variables, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]

@@ -8,10 +8,11 @@ from typing import NamedTuple
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, vector
 from vehiclemor.simulation.newton_loops import CONVERGED
 
-# Sizes that the compiler knows: inputs, those of them that move, coordinates, outputs.
-INPUTS, MOVING, N, OUTPUTS = 0, 0, 0, 0
-# Places of what a run tells: the largest indicator, and the first sample at which it is above 1.
-INDICATOR, LEFT = range(2)
+# Sizes that the compiler knows: inputs, those of them that move.
+INPUTS, MOVING = 0, 0
+# Places of what a run tells: the largest indicator, and the first sample at which it is above 1, or
+# the number of samples; how much that is.
+INDICATOR, LEFT, TOLD = range(3)
 
 
 class Cells(NamedTuple):
@@ -43,24 +44,20 @@ def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:
     """Quantities at a place x (MOVING,) of a cell, from -1 to 1: a kernel inside of the loop."""
 
 
-def map_path(
-    inputs: Matrix, cells: Cells, path: Matrix, outputs: Matrix, told: Vector, buffer: Vector
-) -> Int:
+def map_path(inputs: Matrix, cells: Cells, table: Matrix, buffer: Vector) -> Int:
     """Polynomials at every sample, outside of the box those of the nearest cell.
 
     Parameters
     ----------
     inputs
         At the samples (samples, INPUTS).
-    path, outputs
-        Coordinates (samples, n) and outputs (samples, m): the quantities in this order.
-    told
-        By place, see above: 0 and the number of samples at first.
+    table
+        Quantities (samples, quantities).
     buffer
-        Scratch space (MOVING + N + OUTPUTS,).
+        What the run tells, by place, see above; behind it scratch space (MOVING,).
     """
     centres, scales, moving, numbers, lowest, rates, coefficients = cells
-    x, results = vector(buffer, 0, MOVING), vector(buffer, MOVING, N + OUTPUTS)
+    x = vector(buffer, TOLD, MOVING)
     largest, samples = 0.0, inputs.shape[0]
     left = samples
     for sample in range(samples):
@@ -76,10 +73,6 @@ def map_path(
             number = int(min(max(place, 0.0), numbers[k] - 1.0))
             x[k] = 2.0 * (place - number) - 1.0
             cell = cell * numbers[k] + number
-        polynomials(x, coefficients[cell], results)
-        for i in range(N):
-            path[sample, i] = results[i]
-        for i in range(OUTPUTS):
-            outputs[sample, i] = results[N + i]
-    told[INDICATOR], told[LEFT] = largest, left
+        polynomials(x, coefficients[cell], table[sample])
+    buffer[INDICATOR], buffer[LEFT] = largest, left
     return CONVERGED
