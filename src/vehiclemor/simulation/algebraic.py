@@ -242,7 +242,7 @@ class AlgebraicModel(Model):
         mechanism, iteration = self._mechanism, self._iteration(tolerance, SHORTEST_STEP)
         arguments = (mechanism, inputs, how, iteration, solution, self._buffer())
         loop = self.loop(entry, *further)
-        status, seconds = timed(loop.prepared(*arguments), solution.counts)
+        status, seconds = timed(loop.prepared(*arguments))
         stopped = int(solution.counts[newton_loops.SAMPLE]) if status else len(times)
         beyond = np.flatnonzero((np.abs(path[:stopped]) > mechanism.stops).any(axis=1))
         if not (status or len(beyond)):

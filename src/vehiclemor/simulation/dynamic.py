@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.simulation.checks import check_inputs, cut_short, left_validity, lifted_wheels
+from vehiclemor.simulation.checks import (
+    check_inputs,
+    cut_short,
+    left_validity,
+    lifted_wheels,
+    limits_of,
+    loop_array,
+)
+from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
@@ -186,17 +198,15 @@ class DynamicModel(Model):
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step)
         run = self.system.run(maneuver, state, windows, how)
-        return self.recorded(maneuver, run, maneuver.at(run.times), run.path)
+        inputs = recorded_inputs(maneuver)[1] if times is None else maneuver.at(run.times)
+        return self.recorded(maneuver, run, inputs, run.path)
 
     def recorded(
         self, maneuver: Maneuver, run: Run, inputs: np.ndarray, states: np.ndarray
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to states (samples, 2 n) of the model."""
-        trajectory = self.trajectory(
-            run.times, inputs, states, run.counts, run.seconds, run.failure
-        )
-        remarks = (trajectory.remark, cut_short(maneuver))
-        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
+        arguments = run.times, inputs, states, run.counts, run.seconds, run.failure
+        return self.trajectory(*arguments, cut_short(maneuver))
 
     def trajectory(
         self,
@@ -206,15 +216,18 @@ class DynamicModel(Model):
         counts: np.ndarray,
         seconds: float,
         failure: str = "",
+        remark: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        outputs = self.along("outputs", states, inputs)
-        message, sample = failure, len(times)
+        outputs, first = self._observed(loop_array(states), loop_array(inputs), bool(failure))
+        message, sample, names = failure, len(times), self._limits[0]
         if not failure:
-            message, sample = left_validity(self.definition.validity, self.outputs, times, outputs)
-            # What follows means nothing.
-            states[sample:], outputs[sample:] = np.nan, np.nan
-        status = "diverged" if message else "ok"
+            of_outputs = first[: len(names)]
+            message, sample = left_validity(self.definition, names, of_outputs, times, outputs)
+            if message:
+                # What follows means nothing.
+                states[sample:], outputs[sample:] = np.nan, np.nan
+        lifted = lifted_wheels(self.definition.loads, first[len(names) :], times)
         n = len(self.coordinates)
         return Trajectory(
             times,
@@ -222,9 +235,41 @@ class DynamicModel(Model):
             states[:, :n],
             states[:, n:],
             outputs,
-            {name: int(count) for name, count in zip(DYNAMIC_COUNTS, counts, strict=True)},
+            dict(zip(DYNAMIC_COUNTS, np.asarray(counts).tolist(), strict=True)),
             seconds,
-            status,
+            "diverged" if message else "ok",
             message,
-            lifted_wheels(self.definition.loads, self.outputs, times, outputs),
+            "; ".join(text for text in (lifted, remark) if text),
         )
+
+    @cached_property
+    def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+        return limits_of(self.definition)
+
+    @cached_property
+    def _observers(self) -> dict[int, Ready]:
+        return {}
+
+    def _observed(
+        self, states: np.ndarray, inputs: np.ndarray, failed: bool
+    ) -> tuple[np.ndarray, list[int]]:
+        """Outputs, and the first sample at which each is out of its limits; samples if it never is.
+
+        Parameters
+        ----------
+        failed
+            Whether the states are no numbers from a failure on, which says nothing of the limits.
+        """
+        samples, (_, places, ranges) = len(states), self._limits
+        lanes = LANES if samples >= LANES else 1
+        if lanes not in self._observers:
+            kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
+            self._observers[lanes] = ready(Observer(kernel, self.constants, places, ranges))
+        outputs = np.empty((samples, len(self.outputs)))
+        passed = np.empty(len(places), dtype=np.int64)
+        path_loops()["observed"](states, inputs, self._observers[lanes], outputs, passed)
+        first = passed.tolist()
+        if failed:
+            reached = int(np.isfinite(states).all(axis=1).sum())
+            first = [samples if sample == reached else sample for sample in first]
+        return outputs, first

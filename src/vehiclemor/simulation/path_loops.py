@@ -2,7 +2,7 @@
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel, call_lanes
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.integrators.structures import DERIVATIVE, Equations
+from vehiclemor.simulation.integrators.structures import DERIVATIVE, Equations, Observer
 
 
 def kernel_path(
@@ -22,6 +22,25 @@ def lane_path(
     for first in range(0, len(path), LANES):
         # The last may have been computed before.
         call_lanes(kernel, 0, path, inputs, constants, result, min(first, last))
+    return 0
+
+
+def observed(
+    path: Matrix, inputs: Matrix, observer: Observer, outputs: Matrix, first: IntVector
+) -> Int:
+    """Outputs along a path, and the first sample at which each of the limits is passed, if any."""
+    if len(path) < LANES:
+        kernel_path(path, inputs, observer.kernel, observer.constants, outputs)
+    else:
+        lane_path(path, inputs, observer.kernel, observer.constants, outputs)
+    for k in range(len(observer.places)):
+        place, low, high = observer.places[k], observer.ranges[k, 0], observer.ranges[k, 1]
+        first[k] = len(outputs)
+        for sample in range(len(outputs)):
+            # What is no number lies outside too.
+            if not low <= outputs[sample, place] <= high:
+                first[k] = sample
+                break
     return 0
 
 

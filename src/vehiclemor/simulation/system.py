@@ -33,6 +33,8 @@ from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
+# Maneuvers whose plans are kept.
+MOST_PLANS = 64
 REASONS = {
     TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side",
     NOT_FINITE: "a state is not finite",
@@ -107,6 +109,25 @@ class RunArguments(NamedTuple):
     output: Output
     buffer: np.ndarray
     integers: np.ndarray
+
+
+class Plan(NamedTuple):
+    """What runs of a system over the same maneuver share.
+
+    Attributes
+    ----------
+    arguments
+        Those that are not shared are empty.
+    sizes
+        Numbers of states, of floats of scratch space and of integers.
+    windows
+        Kept alive: a plan is found by the object.
+    """
+
+    loop: Loop
+    arguments: RunArguments
+    sizes: tuple[int, int, int]
+    windows: ProjectionWindows
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +271,7 @@ class System(ShortRepr):
         """
         loop, arguments = self.prepared(maneuver, state, windows, solver)
         output = arguments.output
-        status, seconds = timed(loop.prepared(*arguments), output.counts)
+        status, seconds = timed(loop.prepared(*arguments))
         failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
         return Run(output.samples, output.path, output.counts, seconds, failure)
 
@@ -262,6 +283,37 @@ class System(ShortRepr):
         check_positive("tolerance", solver.tolerance, SMALLEST_TOLERANCE)
         if longest is not None:
             check_positive("longest_step", longest)
+        key = maneuver, id(windows), solver.name
+        plan = self._plans.get(key) if solver.times is None else None
+        if plan is None:
+            plan = self._plan(maneuver, windows, solver)
+            if solver.times is None:
+                if len(self._plans) >= MOST_PLANS:
+                    self._plans.clear()
+                self._plans[key] = plan
+        arguments = plan.arguments
+        n, floats, integers = plan.sizes
+        assert len(state) == n, f"{len(state)} states in a space of {n} dimensions"
+        times = arguments.output.samples
+        output = Output(
+            times, np.empty((len(times), n)), np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
+        )
+        return plan.loop, arguments._replace(
+            start=loop_array(state),
+            control=catalogue.control_of(
+                solver.name, float(solver.tolerance), float(longest or np.inf)
+            ),
+            output=output,
+            buffer=np.empty(floats),
+            integers=np.empty(integers, dtype=np.int64),
+        )
+
+    @cached_property
+    def _plans(self) -> dict[tuple, Plan]:
+        return {}
+
+    def _plan(self, maneuver: Maneuver, windows: ProjectionWindows, solver: Solver) -> Plan:
+        """What runs of a maneuver share."""
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
@@ -271,23 +323,21 @@ class System(ShortRepr):
         end = float(times[-1]) if len(times) else maneuver.duration
         fused = self.fused.get(name, "") if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
-        dim, n = int(windows.ranks.max()), len(state)
-        assert dim == n or not full, f"{n} states in a space of {dim} dimensions"
+        dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
+        nothing = np.empty(0)
         arguments = RunArguments(
-            loop_array(state),
+            nothing,
             self.called(formulation, fused),
             signal,
             windows.spans(signal.bundle.edges, end),
             windows.subspaces,
             self.method(name, active),
-            catalogue.control_of(name, float(solver.tolerance), float(longest or np.inf)),
-            Output(
-                times,
-                np.full((len(times), n), np.nan),
-                np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64),
-            ),
-            np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, bool(fused))),
-            np.empty(dim + 8, dtype=np.int64),
+            windows.subspaces,
+            Output(times, nothing, nothing),
+            nothing,
+            nothing,
         )
-        return catalogue.time_loop(chosen, formulation, bool(fused)), arguments
+        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, bool(fused))
+        loop = catalogue.time_loop(chosen, formulation, bool(fused))
+        return Plan(loop, arguments, (n, floats, dim + 8), windows)

@@ -91,14 +91,16 @@ def integrate(
         segment = spans.segments[span]
         times = (t, spans.edges[span + 1])
         status, t, h, sample = over_span(problem, times, h, method, control, work, output, sample)
-        if status != FINISHED:
-            buffer[0] = t
-            return status
         lift(problem, work.y, x)
         for i in range(n):
-            if not math.isfinite(x[i]):
-                buffer[0] = t
-                return NOT_FINITE
+            if status == FINISHED and not math.isfinite(x[i]):
+                status = NOT_FINITE
+        if status != FINISHED:
+            buffer[0] = t
+            for left in range(sample, len(samples)):
+                for i in range(n):
+                    path[left, i] = math.nan
+            return status
     return FINISHED
 
 

@@ -179,6 +179,25 @@ class Output(NamedTuple):
     counts: IntVector
 
 
+class Observer(NamedTuple):
+    """How outputs follow from states, and what they are watched for.
+
+    Attributes
+    ----------
+    kernel
+        Address of the kernel of the outputs: for `LANES` samples, or for one on shorter paths.
+    constants
+        Of the kernel.
+    places, ranges
+        Numbers (limits,) of outputs, and their smallest and largest values (limits, 2).
+    """
+
+    kernel: IntVector
+    constants: Vector
+    places: IntVector
+    ranges: Matrix
+
+
 class Problem(NamedTuple):
     """Equations on one span and one window, with scratch space.
 
