@@ -22,6 +22,7 @@ from vehiclemor.simulation.checks import (
     checked_inputs,
     output_times,
 )
+from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
@@ -231,24 +232,13 @@ class AlgebraicModel(Model):
                 return found
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
-        further: tuple[str, ...] = ()
-        how: Any
-        if solver in ("newton", "newton_dense"):
-            entry, how = "newton_path", int(solver == "newton_dense")
-        elif solver != "chord":
-            raise unknown("solver", solver, SOLVERS)
-        else:
-            entry, how, further = "chord_path", self._inverse, ("simulation.chord_loops",)
-        mechanism, iteration = self._mechanism, self._iteration(tolerance, SHORTEST_STEP)
-        arguments = (mechanism, inputs, how, iteration, solution, self._buffer())
-        loop = self.loop(entry, *further)
-        status, seconds = timed(loop.prepared(*arguments))
-        stopped = int(solution.counts[newton_loops.SAMPLE]) if status else len(times)
-        beyond = np.flatnonzero((np.abs(path[:stopped]) > mechanism.stops).any(axis=1))
-        if not (status or len(beyond)):
+        loop, how = self._full_order(solver)
+        iteration, buffer = self._iteration(tolerance, SHORTEST_STEP), self._buffer()
+        run = loop.prepared(self._ready_mechanism, inputs, how, iteration, solution, buffer)
+        status, seconds = timed(run)
+        if not status:
             return self.trajectory(times, inputs, path, solution.counts, seconds)
-        sample = int(beyond[0]) if len(beyond) else stopped
-        path[sample:] = np.nan
+        sample = int(solution.counts[newton_loops.SAMPLE])
         self._check_reach(times, inputs, sample)
         failure = int(status), sample
         failed = self.trajectory(times, inputs, path, solution.counts, seconds, failure)
@@ -261,30 +251,45 @@ class AlgebraicModel(Model):
         n, m, samples = len(self.coordinates), len(self.outputs), len(times)
         if samples < LANES:
             return None
+        # One table is written faster than two.
         table = np.empty((samples, n + m))
         solution = newton_loops.Solution(table, new_counts())
+        loop, kernels = self._full_order("newton_lanes")
         iteration = self._iteration(tolerance, SHORTEST_STEP)
         buffer = np.empty(LANES * (5 * n + len(self.inputs) + m) + n * (n + 2))
-        loop, mechanism, kernels = self._lanes
-        run = loop.prepared(mechanism, inputs, kernels, iteration, solution, buffer)
-        status, seconds = timed(run, solution.counts)
+        run = loop.prepared(self._ready_mechanism, inputs, kernels, iteration, solution, buffer)
+        status, seconds = timed(run)
         if status:
             return None
         path, outputs = table[:, :n], table[:, n:]
         return self.trajectory(times, inputs, path, solution.counts, seconds, None, outputs)
 
-    @cached_property
-    def _lanes(self) -> tuple[Loop, Ready, np.ndarray]:
-        """Loop with the samples in vector lanes, mechanism, addresses of its kernels."""
-        kernels = [address_of(self.kernels, name, LANES) for name in ("newton_step", "outputs")]
-        loop = self.loop("lane_path", "simulation.lane_loops")
-        return loop, ready(self._mechanism), np.array(kernels, dtype=np.int64)
+    def _full_order(self, solver: str) -> tuple[Loop, Any]:
+        """Loop of a solver, and what it needs beside the mechanism; kept for further runs."""
+        if solver not in self._kept:
+            how: Any
+            if solver in ("newton", "newton_dense"):
+                modules, how = ("newton_path",), int(solver == "newton_dense")
+            elif solver == "chord":
+                modules = "chord_path", "simulation.chord_loops"
+                jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
+                how = np.linalg.inv(jacobian).T.copy()
+            elif solver == "newton_lanes":
+                modules, names = ("lane_path", "simulation.lane_loops"), ("newton_step", "outputs")
+                addresses = [address_of(self.kernels, name, LANES) for name in names]
+                how = np.array(addresses, dtype=np.int64)
+            else:
+                raise unknown("solver", solver, SOLVERS)
+            self._kept[solver] = self.loop(*modules), how
+        return self._kept[solver]
 
     @cached_property
-    def _inverse(self) -> np.ndarray:
-        """Transposed inverse Jacobian (n, n) at the design position."""
-        inverse = np.linalg.inv(self.jacobian(self.design, np.zeros(len(self.inputs))))
-        return inverse.T.copy()
+    def _kept(self) -> dict[str, tuple[Loop, Any]]:
+        return {}
+
+    @cached_property
+    def _ready_mechanism(self) -> Ready:
+        return ready(self._mechanism)
 
     def _iteration(self, tolerance: float, shortest: float) -> newton_loops.Iteration:
         return newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, shortest)
@@ -350,9 +355,8 @@ class AlgebraicModel(Model):
 
 @lru_cache(maxsize=64)
 def _sampled(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    times = maneuver.times
-    inputs = checked_inputs(maneuver.at(times), times, maneuver.inputs)
-    times.flags.writeable = inputs.flags.writeable = False
+    times, inputs = recorded_inputs(maneuver)
+    checked_inputs(inputs, times, maneuver.inputs)
     return times, inputs
 
 

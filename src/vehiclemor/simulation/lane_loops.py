@@ -32,6 +32,7 @@ from vehiclemor.simulation.newton_loops import (
     residual_jacobian,
     small_solve,
     stopped,
+    within,
 )
 
 # Kernels by place: Newton steps, outputs.
@@ -132,9 +133,9 @@ def lane_path(
         call_lanes(kernels, RESULTS, q, u, mechanism.constants, results, 0)
         for lane in range(LANES):
             sample = min(lane * length, samples - length) + step
+            inside &= within(q[lane], mechanism.stops)
             for i in range(N):
                 path[sample, i] = q[lane, i]
-                inside &= abs(q[lane, i]) <= mechanism.stops[i]
             for i in range(columns):
                 path[sample, N + i] = results[lane, i]
     return stopped(counts, iterations, iterations, CONVERGED if inside else OFF_BRANCH)

@@ -102,6 +102,7 @@ INLINED = (
     "newton",
     "largest_of",
     "stopped",
+    "within",
 )
 
 
@@ -326,6 +327,8 @@ def newton_path(
                 if taken < 0:
                     return stopped(counts, iterations, iterations, OFF_BRANCH)
                 break
+        if not within(q, mechanism.stops):
+            return stopped(counts, iterations, iterations, OFF_BRANCH)
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):

@@ -4,7 +4,7 @@ The configurations of a suspension form a surface over wheel travel and rack dis
 where the rack rests.  It is analytic, so that interpolation in Chebyshev points converges
 geometrically with the degree, and with the size of the cells at the order of the degree plus one
 (L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, chapter 8).  The training
-runs only tell between which inputs: the equations are solved in all of that box.  No equation is solved online.
+runs only tell between which inputs: the equations are solved in all of that box.  Online none is.
 """
 
 import time
@@ -102,7 +102,7 @@ class PathMapModel(ShortRepr):
         times, inputs = model.sampled(maneuver)
         # One table is written faster than two.
         table, buffer = np.empty((samples, len(self.columns))), np.empty(TOLD + self.effective_rank)
-        _, seconds = timed(self._loop.prepared(inputs, self._ready, table, buffer), buffer)
+        _, seconds = timed(self._loop.prepared(inputs, self._ready, table, buffer))
         indicator, left = buffer[:TOLD].tolist()
         status, message, until, reason = "ok", "", np.inf, ""
         if left < samples:

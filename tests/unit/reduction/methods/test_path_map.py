@@ -69,7 +69,7 @@ def test_error_falls_with_the_cells_at_the_order_of_the_polynomials(
         max(largest_error(model, mapped(model, both, cells=n, degree=degree), m) for m in unseen)
         for n in (8, 16)
     )
-    assert np.log2(coarse / fine) == pytest.approx(degree + 1, abs=0.7)
+    assert np.log2(coarse / fine) == pytest.approx(degree + 1, abs=0.8)
 
 
 def test_default_is_far_within_the_published_errors(
@@ -111,7 +111,7 @@ def test_coordinates_depend_on_the_inputs_alone(model: AlgebraicModel, both: Man
     values = rng.uniform(-1.0, 1.0, (both.samples, 2)) * [0.12, 0.036]
     order = rng.permutation(both.samples)
     first, mixed = (
-        reduced.simulate(travelling(lambda t, v=v: tuple(v.T), both), START)
+        reduced.simulate(replace(both, signal=lambda *_, v=v: v), START)
         for v in (values, values[order])
     )
     assert first.status == "ok"
@@ -202,7 +202,9 @@ def test_wrong_training_and_inputs_are_refused(
         mapped(model, nominal.perturbed(1.0, 0.0))
     # Either is within reach; both together are not.
     corner = travelling(lambda t: (-0.18 * (t < 5.0), 0.08 * (t >= 5.0)), nominal)
-    with pytest.raises(InputError, match=r"not all in reach: z -0\.1809 to 0\.0009 m, s0 -0\.0004 to 0\.0804 m"):
+    with pytest.raises(
+        InputError, match=r"not all in reach: z -0\.1809 to 0\.0009 m, s0 -0\.0004 to 0\.0804 m"
+    ):
         mapped(model, corner)
     with pytest.raises(InputError, match="degree 21 is above 20"):
         mapped(model, nominal, degree=21)
