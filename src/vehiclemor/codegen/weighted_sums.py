@@ -22,6 +22,8 @@ DOUBLE = ir.DoubleType()
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # Sums in turn, so that no addition waits for the one before it.
 CHAINS = 2
+# Sums of lanes that a loop makes at once.
+AT_ONCE = 12
 
 
 def padded(targets: int) -> int:
@@ -81,17 +83,35 @@ def reach(call: ast.Call, targets: int) -> int:
 def sums_of_lanes(
     builder: Any, coefficients: Any, terms: Iterable[Any], targets: int
 ) -> list[ir.Value]:
-    """The same where every term is a vector of samples: see `weighted_sums`."""
-    totals: list[Any] = [None] * targets
-    for j, term in enumerate(terms):
-        for i in range(targets):
-            place = builder.gep(
-                coefficients, [ir.Constant(ir.IntType(64), j * padded(targets) + i)]
-            )
-            weight = spread(builder, builder.load(place), term.type.count)
-            product = builder.fmul(weight, term, flags=FLAGS)
-            before = totals[i]
-            totals[i] = product if before is None else builder.fadd(before, product, flags=FLAGS)
+    """The same where terms are vectors of samples, in loops: written out it compiles slowly."""
+    factors = list(terms)
+    kind, count, word = factors[0].type, len(factors), ir.IntType(64)
+    with builder.goto_entry_block():
+        stored = builder.alloca(kind, count)
+    for j, factor in enumerate(factors):
+        builder.store(factor, builder.gep(stored, [word(j)]))
+    totals: list[Any] = []
+    for first in range(0, targets, AT_ONCE):
+        before, body = builder.block, builder.append_basic_block()
+        builder.branch(body)
+        builder.position_at_end(body)
+        j = builder.phi(word)
+        j.add_incoming(word(0), before)
+        own = range(first, min(first + AT_ONCE, targets))
+        sums = [builder.phi(kind) for _ in own]
+        row = builder.mul(j, word(padded(targets)))
+        factor = builder.load(builder.gep(stored, [j]))
+        for i, total in zip(own, sums, strict=True):
+            weight = builder.load(builder.gep(coefficients, [builder.add(row, word(i))]))
+            product = builder.fmul(spread(builder, weight, kind.count), factor, flags=FLAGS)
+            totals.append(builder.fadd(total, product, flags=FLAGS))
+            total.add_incoming(ir.Constant(kind, [0.0] * kind.count), before)
+            total.add_incoming(totals[-1], body)
+        following = builder.add(j, word(1))
+        j.add_incoming(following, body)
+        after = builder.append_basic_block()
+        builder.cbranch(builder.icmp_unsigned("<", following, word(count)), body, after)
+        builder.position_at_end(after)
     return totals
 
 

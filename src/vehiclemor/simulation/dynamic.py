@@ -204,7 +204,10 @@ class DynamicModel(Model):
     def recorded(
         self, maneuver: Maneuver, run: Run, inputs: np.ndarray, states: np.ndarray
     ) -> Trajectory:
-        """Trajectory of a run whose path has been brought to states (samples, 2 n) of the model."""
+        """Trajectory of a run whose path has been brought to the model's states.
+
+        They are the first 2 n columns, nothing else is read.
+        """
         arguments = run.times, inputs, states, run.counts, run.seconds, run.failure
         return self.trajectory(*arguments, cut_short(maneuver))
 
@@ -233,7 +236,7 @@ class DynamicModel(Model):
             times,
             inputs,
             states[:, :n],
-            states[:, n:],
+            states[:, n : 2 * n],
             outputs,
             dict(zip(DYNAMIC_COUNTS, np.asarray(counts).tolist(), strict=True)),
             seconds,

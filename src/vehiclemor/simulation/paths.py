@@ -41,7 +41,19 @@ def along(
     """
     states = checked_path(paths[0], sizes[0], "states", finite=finite)
     inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
-    result = np.empty((len(states), sizes[2]))
+    return results(kernels, name, constants, (states, inputs), sizes[2])
+
+
+def results(
+    kernels: Kernels,
+    name: str,
+    constants: np.ndarray,
+    paths: tuple[np.ndarray, np.ndarray],
+    size: int,
+) -> np.ndarray:
+    """The same of paths that are known to be what the kernel reads."""
+    states, inputs = paths
+    result = np.empty((len(states), size))
     if len(states) < LANES:
         address = np.array([address_of(kernels, name)], dtype=np.int64)
         path_loops()["kernel_path"](states, inputs, address, constants, result)

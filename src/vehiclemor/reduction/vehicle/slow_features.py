@@ -116,7 +116,9 @@ def feature_table(
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
-    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks)
+    watched = (("raw", "the speed"), *((f"raw{i}", name) for i, name in enumerate(VARIABLES)))
+    terms = (*odd, *even)
+    features = Features(k + 1, inputs, tuple(lines), terms, groups, modes.blocks, watched)
     return FeatureTable(features, parameters, list(lateral), list(symmetric), k + inputs)
 
 

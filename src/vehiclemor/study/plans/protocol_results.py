@@ -51,7 +51,7 @@ def protocol_dataset(
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
     dataset = dataset.assign(variables(per_row, "row"))
-    for name in ("seconds", "seconds_lower", "seconds_upper"):
+    for name in ("seconds", "seconds_lower", "seconds_upper", "loop_seconds"):
         online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
         online[:, : timed.sizes["scenario"]] = timed[name].values
         dataset[name] = (("row", "scenario"), online, dict(timed[name].attrs))
