@@ -46,6 +46,10 @@ REASONS = {
 }
 
 
+# Times, inputs, and these as loops take them.
+Sampled = tuple[np.ndarray, np.ndarray, Ready]
+
+
 @dataclass(frozen=True, eq=False)
 class AlgebraicModel(Model):
     """Compiled residual equations Phi(q; u) = 0 of one mechanism."""
@@ -182,15 +186,18 @@ class AlgebraicModel(Model):
         """
         self.start(start)
         if times is None:
-            times, inputs = self.sampled(maneuver)
+            sampled = self.sampled(maneuver)
         else:
             times = output_times(times, maneuver, repeats=True)
             inputs = self.inputs_of(maneuver, times)
+            sampled = times, inputs, ready(newton_loops.Samples(inputs))
         tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
-        return self._solved(times, inputs, "newton" if solver is None else solver, tolerance)
+        return self._solved(sampled, "newton" if solver is None else solver, tolerance)
 
-    def sampled(self, maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-        """Output times (samples,) in s and inputs of a maneuver; kept, so they can't be written.
+    def sampled(self, maneuver: Maneuver) -> Sampled:
+        """Output times (samples,) in s of a maneuver and its inputs, which are ready for loops.
+
+        They are kept, so they can't be written.
 
         Raises
         ------
@@ -220,21 +227,22 @@ class AlgebraicModel(Model):
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
         times = checked_array(times, np.size(times), "times", self.name)
-        return self._solved(times, checked_inputs(inputs, times, self.inputs), solver, tolerance)
+        inputs = checked_inputs(inputs, times, self.inputs)
+        sampled = times, inputs, ready(newton_loops.Samples(inputs))
+        return self._solved(sampled, solver, tolerance)
 
-    def _solved(
-        self, times: np.ndarray, inputs: np.ndarray, solver: str, tolerance: float
-    ) -> Trajectory:
+    def _solved(self, sampled: Sampled, solver: str, tolerance: float) -> Trajectory:
         check_positive("tolerance", tolerance)
+        times, inputs, given = sampled
         if solver == "newton_lanes":
-            found, solver = self._side_by_side(times, inputs, tolerance), "newton"
+            found, solver = self._side_by_side(sampled, tolerance), "newton"
             if found is not None:
                 return found
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         loop, how = self._full_order(solver)
         iteration, buffer = self._iteration(tolerance, SHORTEST_STEP), self._buffer()
-        run = loop.prepared(self._ready_mechanism, inputs, how, iteration, solution, buffer)
+        run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
         status, seconds = timed(run)
         if not status:
             return self.trajectory(times, inputs, path, solution.counts, seconds)
@@ -244,10 +252,9 @@ class AlgebraicModel(Model):
         failed = self.trajectory(times, inputs, path, solution.counts, seconds, failure)
         raise ConvergenceError(f"{self.name}: {failed.message} ({solver})", failed)
 
-    def _side_by_side(
-        self, times: np.ndarray, inputs: np.ndarray, tolerance: float
-    ) -> Trajectory | None:
+    def _side_by_side(self, sampled: Sampled, tolerance: float) -> Trajectory | None:
         """Solution with the samples in vector lanes; none if it has failed."""
+        times, inputs, given = sampled
         n, m, samples = len(self.coordinates), len(self.outputs), len(times)
         if samples < LANES:
             return None
@@ -257,7 +264,7 @@ class AlgebraicModel(Model):
         loop, kernels = self._full_order("newton_lanes")
         iteration = self._iteration(tolerance, SHORTEST_STEP)
         buffer = np.empty(LANES * (5 * n + len(self.inputs) + m) + n * (n + 2))
-        run = loop.prepared(self._ready_mechanism, inputs, kernels, iteration, solution, buffer)
+        run = loop.prepared(self._ready_mechanism, given, kernels, iteration, solution, buffer)
         status, seconds = timed(run)
         if status:
             return None
@@ -354,10 +361,10 @@ class AlgebraicModel(Model):
 
 
 @lru_cache(maxsize=64)
-def _sampled(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(maneuver: Maneuver) -> Sampled:
     times, inputs = recorded_inputs(maneuver)
     checked_inputs(inputs, times, maneuver.inputs)
-    return times, inputs
+    return times, inputs, ready(newton_loops.Samples(inputs))
 
 
 def new_counts() -> np.ndarray:

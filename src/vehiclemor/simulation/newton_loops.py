@@ -69,6 +69,12 @@ class Mechanism(NamedTuple):
     orientation: Int
 
 
+class Samples(NamedTuple):
+    """Inputs at the samples (samples, INPUTS), to be made ready once."""
+
+    inputs: Matrix
+
+
 class Work(NamedTuple):
     """Scratch space: a step (N,), coordinates to return to (N,), a matrix (N, N + 1)."""
 

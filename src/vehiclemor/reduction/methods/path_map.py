@@ -48,7 +48,7 @@ class PathMapSettings(Settings):
     """Settings for a kinematic model."""
 
     degree: int = Field(4, ge=1, description="total degree of the polynomials in a cell")
-    cells: int = Field(16, ge=1, description="equal cells along each input that moves in training")
+    cells: int = Field(8, ge=1, description="equal cells along each input that moves in training")
     outside: Literal["extrapolate", "stop"] = Field(
         "extrapolate",
         description="extrapolate: a run that leaves the inputs of training goes on, untrusted; "
@@ -99,11 +99,12 @@ class PathMapModel(ShortRepr):
         """Polynomials at the maneuver's output times."""
         model, samples = self.model, maneuver.samples
         model.start(start)
-        times, inputs = model.sampled(maneuver)
-        # One table is written faster than two.
-        table, buffer = np.empty((samples, len(self.columns))), np.empty(TOLD + self.effective_rank)
-        _, seconds = timed(self._loop.prepared(inputs, self._ready, table, buffer))
-        indicator, left = buffer[:TOLD].tolist()
+        times, inputs, given = model.sampled(maneuver)
+        size = samples * len(self.columns)
+        space = np.empty(size + TOLD + self.effective_rank)
+        _, seconds = timed(self._loop.prepared(given, self._ready, space))
+        table = space[:size].reshape(samples, -1)
+        indicator, left = space[size : size + TOLD].tolist()
         status, message, until, reason = "ok", "", np.inf, ""
         if left < samples:
             left = int(left)

@@ -107,7 +107,7 @@ class PolynomialResidualModel(ShortRepr):
         """Solve the polynomial equations at the maneuver's output times."""
         model = self.model
         began_at = self.reduced(model.start(start)[None, :])[0]
-        times, inputs = model.sampled(maneuver)
+        times, inputs, _ = model.sampled(maneuver)
         rank, start_at = self.basis.rank, loop_array(began_at)
         given = (inputs, start_at, self._polynomials, int(self.newton), ITERATION_LIMIT)
         loop, buffer = self._loop("reduced_path"), np.empty(6 * rank + rank * (rank + 1))

@@ -96,7 +96,7 @@ def map_kernel(variables: int, degree: int, columns: tuple[int, ...]) -> str:
 @cache
 def map_loop(inputs: int, variables: int, degree: int, columns: tuple[int, ...]) -> Loop:
     """Compiled loop of polynomials of that total degree in so many of the inputs."""
-    sizes = {"INPUTS": inputs, "MOVING": variables}
+    sizes = {"INPUTS": inputs, "MOVING": variables, "QUANTITIES": len(columns)}
     modules = (*NEWTON, "reduction.polynomials.map_loops")
     kernels = {"polynomials": map_kernel(variables, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]

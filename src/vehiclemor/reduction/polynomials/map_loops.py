@@ -5,11 +5,11 @@ The polynomials are a kernel that `kernels.py` writes for their number and degre
 
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, vector
+from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
 from vehiclemor.simulation.newton_loops import CONVERGED
 
-# Sizes that the compiler knows: inputs, those of them that move.
-INPUTS, MOVING = 0, 0
+# Sizes that the compiler knows: inputs, those of them that move, quantities.
+INPUTS, MOVING, QUANTITIES = 0, 0, 0
 # Places of what a run tells: the largest indicator, and the first sample at which it is above 1, or
 # the number of samples; how much that is.
 INDICATOR, LEFT, TOLD = range(3)
@@ -44,22 +44,22 @@ def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:
     """Quantities at a place x (MOVING,) of a cell, from -1 to 1: a kernel inside of the loop."""
 
 
-def map_path(inputs: Matrix, cells: Cells, table: Matrix, buffer: Vector) -> Int:
+def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
     """Polynomials at every sample, outside of the box those of the nearest cell.
 
     Parameters
     ----------
     inputs
         At the samples (samples, INPUTS).
-    table
-        Quantities (samples, quantities).
-    buffer
-        What the run tells, by place, see above; behind it scratch space (MOVING,).
+    space
+        Quantities of all samples, then what the run tells, by place, see above, then scratch space
+        (MOVING,): one array is sooner handed over than three.
     """
     centres, scales, moving, numbers, lowest, rates, coefficients = cells
-    x = vector(buffer, TOLD, MOVING)
-    largest, samples = 0.0, inputs.shape[0]
-    left = samples
+    samples = inputs.shape[0]
+    table, end = matrix(space, 0, samples, QUANTITIES), samples * QUANTITIES
+    told, x = vector(space, end, TOLD), vector(space, end + TOLD, MOVING)
+    largest, left = 0.0, samples
     for sample in range(samples):
         indicator = 0.0
         for i in range(INPUTS):
@@ -74,5 +74,5 @@ def map_path(inputs: Matrix, cells: Cells, table: Matrix, buffer: Vector) -> Int
             x[k] = 2.0 * (place - number) - 1.0
             cell = cell * numbers[k] + number
         polynomials(x, coefficients[cell], table[sample])
-    buffer[INDICATOR], buffer[LEFT] = largest, left
+    told[INDICATOR], told[LEFT] = largest, left
     return CONVERGED
