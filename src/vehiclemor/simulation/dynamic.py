@@ -23,6 +23,7 @@ from vehiclemor.simulation.checks import (
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.structures import Observer
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
@@ -82,6 +83,7 @@ class DynamicModel(Model):
             self.error_scale,
             self.active,
             self.rotating,
+            partners=partners(self.definition.states),
         )
 
     def derivative(self, x: Any, u: Any) -> np.ndarray:
