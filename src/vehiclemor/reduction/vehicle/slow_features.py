@@ -16,7 +16,7 @@ from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
-VARIABLES = ("front", "rear", "roll", "rolling", "steer")
+VARIABLES = ("slip of the front axle", "slip of the rear axle", "roll", "roll rate", "steering")
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def feature_table(
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
-    watched = (("raw", "the speed"), *((f"raw{i}", name) for i, name in enumerate(VARIABLES)))
+    watched = (("raw", "speed"), *((f"raw{i}", name) for i, name in enumerate(VARIABLES)))
     terms = (*odd, *even)
     features = Features(k + 1, inputs, tuple(lines), terms, groups, modes.blocks, watched)
     return FeatureTable(features, parameters, list(lateral), list(symmetric), k + inputs)

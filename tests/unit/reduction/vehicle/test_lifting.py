@@ -78,7 +78,7 @@ def test_a_run_tells_how_far_it_has_gone(reduced):
     assert known.status == "ok"
     assert known.trust.indicator < 1.0
     assert known.trust.until == np.inf
-    beyond = maneuver.perturbed(1.0, 1.35)
+    beyond = maneuver.perturbed(1.2, 1.35)
     run, expected = reduced.simulate(beyond, "equilibrium"), indicator(beyond)
     assert run.status == "untrusted"
     assert run.finished
