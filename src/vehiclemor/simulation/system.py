@@ -113,12 +113,15 @@ class Solver(NamedTuple):
         Output times (samples,) in s, the maneuver's by default.
     longest_step
         In s; unlimited by default.
+    begin
+        Time in s at which the run begins with its state, in mid-maneuver if it isn't 0.
     """
 
     name: str
     tolerance: float
     times: np.ndarray | None = None
     longest_step: float | None = None
+    begin: float = 0.0
 
 
 class RunArguments(NamedTuple):
@@ -372,10 +375,11 @@ class System(ShortRepr):
         if longest is not None:
             check_positive("longest_step", longest)
         key = maneuver, id(windows), solver.name
-        plan = self._plans.get(key) if solver.times is None else None
+        whole = solver.times is None and not solver.begin
+        plan = self._plans.get(key) if whole else None
         if plan is None:
             plan = self._plan(maneuver, windows, solver)
-            if solver.times is None:
+            if whole:
                 if len(self._plans) >= MOST_PLANS:
                     self._plans.clear()
                 self._plans[key] = plan
@@ -409,7 +413,7 @@ class System(ShortRepr):
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
-        times = output_times(solver.times, maneuver)
+        times = output_times(solver.times, maneuver, begin=solver.begin)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
         steps = self.steps(name) if full else ""
@@ -421,7 +425,7 @@ class System(ShortRepr):
             nothing,
             self.called(formulation, name if steps else ""),
             signal,
-            windows.spans(signal.bundle.edges, end),
+            windows.spans(signal.bundle.edges, end, solver.begin),
             windows.subspaces,
             self.method(name, active),
             windows.subspaces,
@@ -431,5 +435,6 @@ class System(ShortRepr):
         )
         floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
         loop = catalogue.time_loop(chosen, formulation, steps)
-        cubic = solver.times is None and "cubic" in chosen.modules
+        whole = solver.times is None and not solver.begin
+        cubic = whole and "cubic" in chosen.modules
         return Plan(loop, arguments, (n, floats, dim + 8), windows, cubic)

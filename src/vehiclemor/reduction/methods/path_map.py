@@ -254,4 +254,5 @@ METHOD = Method(
     settings={"ae": PathMapSettings},
     check=check,
     fit=fit,
+    own_limits=True,
 )

@@ -99,7 +99,7 @@ def lifting_text(features: Features, layout: Layout, parameters: int, modes: int
     for a, b in layout.pairs:
         results[a] = f"cosine * s{a} - sine * s{b}"
         results[b] = f"sine * s{a} + cosine * s{b}"
-    results |= enumerate((name for name, _ in features.watched), layout.size)
+    results |= enumerate((_constants(text) for text, _ in features.watched), layout.size)
     lines += [f"_result[{i}] = {text}" for i, text in results.items()]
     return _function("full_state", lines)
 
