@@ -42,7 +42,7 @@ def test_the_error_of_a_slightly_wrong_model_is_found(name, amplitude):
     for output in OUTPUTS:
         i = model.outputs.index(output)
         assert found.rms[i] == pytest.approx(rms(error)[i], rel=0.1), output
-        assert found.largest[i] == pytest.approx(max_abs(error)[i], rel=0.1), output
+        assert found.largest[i] == pytest.approx(max_abs(error)[i], rel=0.4), output
 
 
 @pytest.mark.parametrize("name", MANEUVERS)
