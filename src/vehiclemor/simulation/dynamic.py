@@ -23,6 +23,7 @@ from vehiclemor.simulation.checks import (
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.structures import Observer
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
@@ -82,6 +83,7 @@ class DynamicModel(Model):
             self.error_scale,
             self.active,
             self.rotating,
+            partners=partners(self.definition.states),
         )
 
     def derivative(self, x: Any, u: Any) -> np.ndarray:
@@ -133,6 +135,7 @@ class DynamicModel(Model):
         solver: str | None = None,
         tolerance: float | None = None,
         longest_step: float | None = None,
+        begin: float = 0.0,
     ) -> Trajectory:
         """Full-order trajectory at the given times (the maneuver's output times by default).
 
@@ -154,6 +157,8 @@ class DynamicModel(Model):
             Largest local error of a state relative to its typical size plus its own.
         longest_step
             In s; unlimited by default.
+        begin
+            Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
 
         Raises
         ------
@@ -170,6 +175,7 @@ class DynamicModel(Model):
             REFERENCE_TOLERANCE if tolerance is None else tolerance,
             times,
             longest_step,
+            begin,
         )
         if trajectory.status != "ok":
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
@@ -184,6 +190,7 @@ class DynamicModel(Model):
         tolerance: float,
         times: np.ndarray | None = None,
         longest_step: float | None = None,
+        begin: float = 0.0,
     ) -> Trajectory:
         """Trajectory of the full or a projected system; a divergence is recorded in it.
 
@@ -197,9 +204,10 @@ class DynamicModel(Model):
         check_inputs(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
-        how = Solver(solver, tolerance, times, longest_step)
+        how = Solver(solver, tolerance, times, longest_step, begin)
         run = self.system.run(maneuver, state, windows, how, 0.0)
-        inputs = recorded_inputs(maneuver)[1] if times is None else maneuver.at(run.times)
+        whole = times is None and not begin
+        inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
         return self.recorded(maneuver, run, inputs, run.path)
 
     def recorded(

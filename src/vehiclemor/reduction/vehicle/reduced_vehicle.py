@@ -131,6 +131,10 @@ class ReducedVehicle(ShortRepr):
         run = self.equations.run(maneuver, start, direct_until=decayed(excited))
         points = run.points or Points(inputs, run.times, run.times[:0])
         states, trust = self.lift.states(points.moments, run.path, points.inputs, excited)
+        if run.points is None or run.points.places[0, 1] < 0.0:
+            # The start is known better than its slow part.
+            full = self.model.start(start)
+            states[0, : len(full)] = full
         return self.model.recorded(maneuver, run, inputs, states).judged(trust)
 
     def _excited(self, start: Start) -> np.ndarray:
