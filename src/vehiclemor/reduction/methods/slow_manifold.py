@@ -30,6 +30,7 @@ from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
+from vehiclemor.reduction.vehicle.lifting_terms import fitted_lifting
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
@@ -44,7 +45,6 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     targets,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.trajectory import Trajectory
 
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
@@ -75,6 +75,9 @@ class SlowManifoldSettings(OnlineSettings):
         description="nonlinear terms that the equations keep, those that whole runs need most; "
         "0: all; only with sweeps",
     )
+    lifting: int = Field(
+        8, ge=0, description="nonlinear terms of the full states, those that explain most; 0: all"
+    )
     hull: float = Field(
         1.1,
         gt=0.0,
@@ -101,7 +104,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     table = feature_table(
         shape, modes, samples, settings.nonlinearity, settings.hull, settings.trusted
     )
-    reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
+    reduced = _fitted_on_rates(shape, modes, table, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
@@ -115,10 +118,14 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
 
 
 def _fitted_on_rates(
-    shape: VehicleShape, modes: SlowModes, table: FeatureTable, samples: ShapeSamples, ridge: float
+    shape: VehicleShape,
+    modes: SlowModes,
+    table: FeatureTable,
+    samples: ShapeSamples,
+    settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
     """Equations fitted on the rates of the training runs, exact at straight running."""
-    u, motion = samples.inputs, samples.motion
+    u, motion, ridge = samples.inputs, samples.motion, settings.ridge
     z, speed = modes.coordinates(samples.deviations, u)
     k, n, inputs = modes.lateral, len(modes.rates), u.shape[1]
     odd, even = table.odd, table.even
@@ -142,13 +149,16 @@ def _fitted_on_rates(
     c[even_nonlinear, n + 2] = ridge_fit(even_columns, ahead - z[:, k:] @ forward, ridge)
     c[odd, n + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
     c[odd, n + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
+    lifting, lifted = fitted_lifting(
+        shape, table, columns, samples.deviations, ridge, settings.lifting
+    )
     return ReducedVehicle(
         shape.model,
         shape,
         table.features,
         table.parameters,
         c,
-        ridge_fit(columns, samples.deviations, ridge),
+        lifting,
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
         np.concatenate([3.0 * ranges, [10.0, 1.0, 10.0, 10.0]]),
@@ -156,6 +166,7 @@ def _fitted_on_rates(
         "dopri5",
         REFIT_TOLERANCE,
         modes.symmetric,
+        lifted,
     )
 
 

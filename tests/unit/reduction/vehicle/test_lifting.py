@@ -30,7 +30,9 @@ def lifted(reduced: ReducedVehicle, maneuver, start: str) -> np.ndarray:
     path = reduced.path(maneuver, start)
     k, shape, decay = reduced.features.states, reduced.shape, reduced.transient
     inputs = maneuver.at(maneuver.times)
-    columns = feature_columns(reduced.features, path[:, :k], inputs, reduced.parameters)
+    features = reduced.lifted_features
+    assert len(features.terms) < len(reduced.features.terms)
+    columns = feature_columns(features, path[:, :k], inputs, reduced.parameters)
     deviation = shape.of(reduced.model.start(start)[None])[0] - shape.reference
     motion = np.exp(np.outer(maneuver.times, decay.rates)) * (decay.left @ deviation) @ decay.right
     shapes = shape.reference + columns @ reduced.lifting + motion.real
