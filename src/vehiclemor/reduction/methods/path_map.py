@@ -47,8 +47,8 @@ SAME = 1e-15
 class PathMapSettings(Settings):
     """Settings for a kinematic model."""
 
-    degree: int = Field(4, ge=1, description="total degree of the polynomials in a cell")
-    cells: int = Field(8, ge=1, description="equal cells along each input that moves in training")
+    degree: int = Field(3, ge=1, description="total degree of the polynomials in a cell")
+    cells: int = Field(16, ge=1, description="equal cells along each input that moves in training")
     outside: Literal["extrapolate", "stop"] = Field(
         "extrapolate",
         description="extrapolate: a run that leaves the inputs of training goes on, untrusted; "
