@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import quoted, real_array
+from vehiclemor.arguments import number, quoted, real_array, within
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
+
+OFF_GROUND = "off the ground for a time"
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -156,8 +158,10 @@ def cut_short(maneuver: Maneuver) -> str:
     return f"the maneuver would end at {last:.4g} s, after the run"
 
 
-def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.ndarray:
-    """Output times (samples,) in s; the maneuver's where none are given.
+def output_times(
+    given: Any, maneuver: Maneuver, repeats: bool = False, begin: float = 0.0
+) -> np.ndarray:
+    """Output times (samples,) in s; the maneuver's from `begin` on where none are given.
 
     Parameters
     ----------
@@ -169,8 +173,11 @@ def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.nd
     InputError
         If they don't increase within the maneuver.
     """
+    if begin:
+        within("begin", number("begin", begin), (0.0, maneuver.duration), " s")
     if given is None:
-        return maneuver.times
+        times = maneuver.times
+        return times[times >= begin] if begin else times
     try:
         times = loop_array(given)
     except (TypeError, ValueError):
@@ -181,8 +188,10 @@ def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.nd
     steps = np.diff(times)
     if not (np.isfinite(times).all() and np.all(steps >= 0.0 if repeats else steps > 0.0)):
         raise InputError("output times must be finite and increasing")
-    if len(times) == 0 or times[0] < 0.0 or times[-1] > maneuver.duration + slack:
-        raise InputError(f"output times must lie within the maneuver, 0 to {maneuver.duration:g} s")
+    if len(times) == 0 or times[0] < begin or times[-1] > maneuver.duration + slack:
+        raise InputError(
+            f"output times must lie within the run, {begin:g} to {maneuver.duration:g} s"
+        )
     return times
 
 
@@ -242,7 +251,7 @@ def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray)
         if sample < len(times)
     }
     wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
-    return f"off the ground for a time: {wheels}"
+    return f"{OFF_GROUND}: {wheels}"
 
 
 def loop_array(values: Any) -> np.ndarray:

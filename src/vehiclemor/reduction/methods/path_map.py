@@ -258,4 +258,5 @@ METHOD = Method(
     settings={"ae": PathMapSettings},
     check=check,
     fit=fit,
+    own_limits=True,
 )

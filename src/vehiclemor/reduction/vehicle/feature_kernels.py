@@ -14,15 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.simulation.integrators import ros34pw2, tableaus
 from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
-from vehiclemor.simulation.integrators.exponential_functions import TABLES
-
-# The tables' functions at argument zero, for states that no block belongs to.
-AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
-JACOBIAN, HALF_FIRST, HALF_SECOND, FIRST, SECOND, MIDDLE, LAST = range(TABLES)
+from vehiclemor.simulation.integrators.exponential_functions import (
+    AT_ZERO,
+    FIRST,
+    HALF_FIRST,
+    HALF_SECOND,
+    JACOBIAN,
+    LAST,
+    MIDDLE,
+    SECOND,
+)
 
 
 class Layout(NamedTuple):
@@ -94,7 +99,7 @@ def lifting_text(features: Features, layout: Layout, parameters: int, modes: int
     for a, b in layout.pairs:
         results[a] = f"cosine * s{a} - sine * s{b}"
         results[b] = f"sine * s{a} + cosine * s{b}"
-    results |= enumerate((name for name, _ in features.watched), layout.size)
+    results |= enumerate((_constants(text) for text, _ in features.watched), layout.size)
     lines += [f"_result[{i}] = {text}" for i, text in results.items()]
     return _function("full_state", lines)
 

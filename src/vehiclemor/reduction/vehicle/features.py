@@ -38,7 +38,7 @@ class Features:
         Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
         Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
     watched
-        (name of a line, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
+        (expression, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
         what the features were made for.
     """
 
