@@ -1,4 +1,4 @@
-"""The two-track model: its tires are the vehicle's own, it is its own mirror image, and it warns."""
+"""The two-track model: its tires are the vehicle's, it is its own mirror image, and it warns."""
 
 from functools import cache
 
