@@ -68,6 +68,7 @@ def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(mon
     monkeypatch.setattr(run_timer, "clock", lambda: next(steps))
     ended = Trajectory(*[np.zeros((1, 1))] * 5, {}, 7.0)
     assert called(lambda: ended, 4) == (3.0, 7.0)
+    monkeypatch.setattr(run_timer, "clock", count().__next__)
     assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 

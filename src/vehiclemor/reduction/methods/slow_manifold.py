@@ -49,8 +49,8 @@ from vehiclemor.simulation.trajectory import Trajectory
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
 # The part of the terms that is left by each round of elimination, and for how many of them all
-# training runs are looked at; with more terms it is fewer runs.
-SHRINKING, WANTED = 0.4, 60
+# training runs are looked at; with more terms it is fewer runs, but so many at least.
+SHRINKING, WANTED, FEW = 0.4, 60, 20
 
 
 class SlowManifoldSettings(OnlineSettings):
@@ -64,23 +64,28 @@ class SlowManifoldSettings(OnlineSettings):
     )
     ridge: float = Field(1e-10, ge=0.0, description="weight of the coefficients' size in the fit")
     symmetric: int = Field(
-        0, ge=0, description="symmetric modes (or pairs) that are integrated with them"
+        2, ge=0, description="symmetric modes (or pairs) that are integrated with them"
     )
     sweeps: int = Field(
         4, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
     terms: int = Field(
-        20,
+        24,
         ge=0,
-        description="lateral nonlinear terms that the equations keep, those that whole runs need "
-        "most, and a quarter as many symmetric ones; 0: all; only with sweeps, which are done "
-        "again after it",
+        description="nonlinear terms that the equations keep, those that whole runs need most; "
+        "0: all; only with sweeps",
     )
     hull: float = Field(
         1.1,
         gt=0.0,
         description="arguments of nonlinear terms are held beyond this multiple of their training "
         "range",
+    )
+    trusted: float = Field(
+        0.93,
+        gt=0.0,
+        description="a run whose arguments leave this multiple of their training range isn't "
+        "trusted",
     )
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 2e-3
@@ -93,7 +98,9 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest, settings.symmetric)
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
-    table = feature_table(shape, modes, samples, settings.hull, settings.nonlinearity)
+    table = feature_table(
+        shape, modes, samples, settings.nonlinearity, settings.hull, settings.trusted
+    )
     reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
@@ -163,7 +170,7 @@ def _fitted_on_runs(
         return reduced
     count = len(table.odd_nonlinear) + len(table.even_nonlinear)
     while settings.terms and count > settings.terms:
-        some = spread(goals, WANTED / count)
+        some = spread(goals, max(WANTED / count, FEW / len(goals)))
         reduced = improved(reduced, some, table.free, 1)
         count = max(settings.terms, round(SHRINKING * count))
         fewer, table = pruned(reduced, table, some, count)

@@ -37,9 +37,7 @@ def after_landing(transient: Transient, shape: VehicleShape, run: Trajectory) ->
     return replace(run, **{name: getattr(run, name)[later] for name in PATHS})
 
 
-def landed(
-    reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
-) -> ReducedVehicle:
+def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]) -> ReducedVehicle:
     """The reduced vehicle with the transients and coordinates of runs before they are steered."""
     from scipy.linalg import expm
 
@@ -51,7 +49,10 @@ def landed(
         seen = (run.time >= LANDED) & (run.time < np.append(steered, LONGEST)[0])
         if not seen.any():
             continue
-        deviations, start = shape.of(run.states[seen]) - shape.reference, shape.of(run.states[:1])[0]
+        deviations, start = (
+            shape.of(run.states[seen]) - shape.reference,
+            shape.of(run.states[:1])[0],
+        )
         start = start - shape.reference
         decays = np.exp(np.outer(run.time[seen], transient.rates[slow]))
         found = (decays.conj() * (deviations @ transient.left[slow].T)).sum(axis=0)

@@ -68,7 +68,12 @@ class FeatureTable:
 
 
 def feature_table(
-    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, hull: float, nonlinearity: str
+    shape: VehicleShape,
+    modes: SlowModes,
+    samples: ShapeSamples,
+    nonlinearity: str,
+    hull: float,
+    trusted: float,
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     u = samples.inputs
@@ -117,11 +122,18 @@ def feature_table(
     if nonlinearity == "rich":
         odd += [f"m * {term}" for term in monomials(v, 3)]
     odd += [f"{e} * {variable}" for e in own[k:] for variable in v]
-    even = ["1.0", f"z{n}", *own[k:], *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
+    even = [
+        "1.0",
+        f"z{n}",
+        *own[k:],
+        *monomials(v, 2),
+        *(f"m * {pair}" for pair in monomials(v, 2)),
+    ]
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    watched = (("raw", "change of speed"), *((f"raw{i}", m) for i, m in enumerate(MEANINGS)))
+    edge = f"{hull / trusted!r} * raw"
+    watched = ((edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS)))
     features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, watched)
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
