@@ -55,6 +55,10 @@ class _Codegen(JITCPUCodegen):
     def _add_module(self, module: Any) -> None:
         pass
 
+    def _pass_builder(self, **options: Any) -> Any:
+        # Straight-line code has no loops: left and right are packed statement by statement.
+        return super()._pass_builder(**{"slp_vectorize": True} | options)
+
     def set_env(self, env_name: str, env: Any) -> None:
         """Nothing: code without Python objects has no environment."""
 

@@ -16,14 +16,12 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from vehiclemor.codegen import arctangent, exponential, sincos, weighted_sums
-from vehiclemor.codegen.vector_lanes import LANES, RESULTS
+from vehiclemor.codegen import arctangent, exponential, sincos, vector_statements, weighted_sums
+from vehiclemor.codegen.vector_lanes import LANES, RESULTS, WIDTH
 
 # A product and a sum may become one operation, as in the loops that are compiled with them.
 FLAGS = ("contract",)
 DOUBLE = ir.DoubleType()
-# Half a batch at a time: vectors of 512 bits were a fifth slower.
-WIDTH = LANES // 2
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
@@ -340,6 +338,13 @@ def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int 
             single = value if lanes == 1 else builder.extract_element(value, LANE(lane))
             builder.store(single, address("_result", place, lane))
 
+    def pointer(node: ast.expr) -> Any:
+        assert isinstance(node, ast.Subscript)
+        return address(ast.unparse(node.value), _places(node)[0])
+
+    def value(node: ast.expr) -> Any:
+        return expressions.value(node, read, kind)
+
     def read(node: ast.expr) -> Any:
         # Loads come where they are needed first: registers are few.
         match node:
@@ -349,26 +354,26 @@ def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int 
                 places = _places(node)
                 if array == "_work" and ("_work", places[0]) in values:
                     return values["_work", places[0]]
-                if array not in {"_work", "_result"} and len(places) == 1:
+                if array != "_work" and len(places) == 1:
                     return load(array, places[0])
         raise ValueError(f"{ast.unparse(node)}: unknown, or of the wrong shape")
 
     for statement in kernel.statements:
         match statement:
             case ast.Assign([ast.Name(target)], expression):
-                values[target] = expressions.value(expression, read, kind)
+                values[target] = value(expression)
             case ast.Assign([ast.Subscript(ast.Name("_work")) as target], expression):
-                values["_work", _places(target)[0]] = expressions.value(expression, read, kind)
+                values["_work", _places(target)[0]] = value(expression)
             case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
                 place = _places(target)
                 if len(place) != kernel.dimensions:
                     raise ValueError(f"{ast.unparse(target)}: other results have another shape")
                 flat = place[0] if len(place) == 1 else place[0] * kernel.columns + place[1]
-                store(expressions.value(expression, read, kind), flat)
+                store(value(expression), flat)
             case ast.Assign(
                 [ast.Tuple(elements)], ast.Call(ast.Name("sincos_one"), [argument], [])
             ) if len(elements) == 2:
-                results = expressions.elementary("sincos", expressions.value(argument, read, kind))
+                results = expressions.elementary("sincos", value(argument))
                 values |= zip((ast.unparse(e) for e in elements), results, strict=True)
             case ast.Assign(
                 [ast.Tuple(elements)],
@@ -379,7 +384,7 @@ def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int 
                 ),
             ):
                 # One by one, each used at once: registers are few.
-                factors = (expressions.value(term, read, kind) for term in terms)
+                factors = (value(term) for term in terms)
                 sums = weighted_sums.weighted_sums if lanes == 1 else weighted_sums.sums_of_lanes
                 results = sums(builder, address(array, first), factors, len(elements))
                 values |= zip((ast.unparse(e) for e in elements), results, strict=True)
@@ -391,6 +396,8 @@ def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int 
                 values |= {
                     ("_work", first + LANES + place): result for place, result in enumerate(results)
                 }
+            case ast.Expr(ast.Call(ast.Name(name)) as call) if name in vector_statements.NAMES:
+                vector_statements.write(call, builder, pointer, value)
             case _:
                 raise ValueError(
                     f"{ast.unparse(statement)}: {type(statement).__name__} is not straight-line"

@@ -68,6 +68,8 @@ def call_kernel(
         place = context.cast(builder, args[1], sig.args[1], types.intp)
         address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
         pointers = [_data(context, builder, sig, args, k) for k in range(2, 6)]
+        # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
+        pointers.append(builder.bitcast(_data(context, builder, sig, args, 0), DOUBLE.as_pointer()))
         kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
         function = builder.inttoptr(address, kind.as_pointer())
         builder.call(function, pointers, attrs=("nounwind",))

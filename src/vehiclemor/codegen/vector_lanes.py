@@ -1,9 +1,16 @@
-"""Sizes of the batches in which kernels evaluate elementary functions."""
+"""Sizes of vectors, and of the batches in which kernels evaluate elementary functions."""
 
 # Elementary functions are evaluated this many at a time, so that the compiler makes one vector loop
 # of them; fewer than the smallest batch one by one.  Kernels along a path take as many samples.
 LANES = 8
 SMALLEST_BATCH = 3
+# Floats in a vector: half a batch; vectors of 512 bits were a fifth slower.
+WIDTH = LANES // 2
 # Batched function -> prefixes of its results; its block in the scratch space has one part for the
 # arguments and one for each result.
 RESULTS = {"sincos": ("_sin", "_cos"), "atan": ("_atan",)}
+
+
+def padded(count: int) -> int:
+    """Length of a row of so many floats in whole vectors."""
+    return -(-count // WIDTH) * WIDTH

@@ -15,20 +15,15 @@ from typing import Any
 
 from llvmlite import ir
 
+from vehiclemor.codegen.vector_lanes import WIDTH, padded
+
 FLAGS = ("contract",)
-# Floats in a vector, as in the batches of elementary functions.
-WIDTH = 4
 DOUBLE = ir.DoubleType()
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # Sums in turn, so that no addition waits for the one before it.
 CHAINS = 2
 # Sums of lanes that a loop makes at once.
 AT_ONCE = 12
-
-
-def padded(targets: int) -> int:
-    """Length of a row of coefficients for a number of targets."""
-    return -(-targets // WIDTH) * WIDTH
 
 
 def weighted_sums(
@@ -115,7 +110,7 @@ def sums_of_lanes(
     return totals
 
 
-def spread(builder: Any, value: Any, width: int) -> Any:
+def spread(builder: Any, value: Any, width: int = WIDTH) -> Any:
     """A vector with the same value in all places."""
     nowhere = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
     single = builder.insert_element(nowhere, value, ir.Constant(ir.IntType(32), 0))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,9 +12,13 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+
+# Encoded starts that are kept.
+MOST_STARTS = 64
 
 
 def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
@@ -72,18 +77,36 @@ class ReducedSystem(ShortRepr):
         maneuver: Maneuver,
         start: Start,
         times: np.ndarray | None = None,
+        direct_until: float = np.inf,
         begin: float = 0.0,
     ) -> Run:
-        """Path of the reduced states, from a full state at the time `begin` in s."""
+        """Path of the reduced states, from a full state at a time; see `System.run`."""
         check_inputs(maneuver, self.model.definition)
-        state = self.encode(self.model.start(start), maneuver.at(np.array([begin]))[0])
+        # Output times begin with zero.
+        first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
+        state = self._encoded(start, first[0])
         how = Solver(self.solver, self.tolerance, times, begin=begin)
-        return self.system.run(maneuver, state, self.spaces, how)
+        return self.system.run(maneuver, state, self.spaces, how, direct_until)
+
+    def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """State of a start; kept where it is a named one."""
+        if not isinstance(start, str):
+            return self.encode(self.model.start(start), inputs)
+        key = start, inputs.tobytes()
+        if key not in self._starts:
+            if len(self._starts) >= MOST_STARTS:
+                self._starts.clear()
+            self._starts[key] = self.encode(self.model.start(start), inputs)
+        return self._starts[key]
+
+    @cached_property
+    def _starts(self) -> dict[tuple[str, bytes], np.ndarray]:
+        return {}
 
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
         """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
         run = self.run(maneuver, start, begin=begin)
-        inputs = maneuver.at(run.times)
+        inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
         found = self.model.recorded(maneuver, run, inputs, states)
         return found.judged(self.judge(run, inputs))

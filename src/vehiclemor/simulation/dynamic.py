@@ -23,6 +23,7 @@ from vehiclemor.simulation.checks import (
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.structures import Observer
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
@@ -31,6 +32,7 @@ from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
+NO_PLACES = np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +83,7 @@ class DynamicModel(Model):
             self.error_scale,
             self.active,
             self.rotating,
+            partners=partners(self.definition.states),
         )
 
     def derivative(self, x: Any, u: Any) -> np.ndarray:
@@ -202,7 +205,7 @@ class DynamicModel(Model):
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step, begin)
-        run = self.system.run(maneuver, state, windows, how)
+        run = self.system.run(maneuver, state, windows, how, 0.0)
         whole = times is None and not begin
         inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
         return self.recorded(maneuver, run, inputs, run.path)
@@ -212,10 +215,14 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to the model's states.
 
-        They are the first 2 n columns, nothing else is read.
+        Parameters
+        ----------
+        inputs
+            At the output times (samples, inputs).
+        states
+            Where the run is recorded: 2 n columns, and what may follow them.
         """
-        arguments = run.times, inputs, states, run.counts, run.seconds, run.failure
-        return self.trajectory(*arguments, cut_short(maneuver))
+        return self._told(run, inputs, states, cut_short(maneuver))
 
     def trajectory(
         self,
@@ -225,12 +232,17 @@ class DynamicModel(Model):
         counts: np.ndarray,
         seconds: float,
         failure: str = "",
-        remark: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        outputs, first = self._observed(loop_array(states), loop_array(inputs), bool(failure))
-        message, sample, names = failure, len(times), self._limits[0]
-        if not failure:
+        run = Run(times, states, np.asarray(counts), seconds, failure)
+        return self._told(run, loop_array(inputs), loop_array(states), "")
+
+    def _told(self, run: Run, inputs: np.ndarray, states: np.ndarray, remark: str) -> Trajectory:
+        """See `recorded`; a remark is added to what there is to remark."""
+        states, outputs, first = self._delivered(run, inputs, states)
+        (names, *_), times = self._limits, run.times
+        message, sample = run.failure, len(times)
+        if not message:
             of_outputs = first[: len(names)]
             message, sample = left_validity(self.definition, names, of_outputs, times, outputs)
             if message:
@@ -244,8 +256,8 @@ class DynamicModel(Model):
             states[:, :n],
             states[:, n : 2 * n],
             outputs,
-            dict(zip(DYNAMIC_COUNTS, np.asarray(counts).tolist(), strict=True)),
-            seconds,
+            dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            run.seconds,
             "diverged" if message else "ok",
             message,
             "; ".join(text for text in (lifted, remark) if text),
@@ -259,26 +271,34 @@ class DynamicModel(Model):
     def _observers(self) -> dict[int, Ready]:
         return {}
 
-    def _observed(
-        self, states: np.ndarray, inputs: np.ndarray, failed: bool
-    ) -> tuple[np.ndarray, list[int]]:
-        """Outputs, and the first sample at which each is out of its limits; samples if it never is.
-
-        Parameters
-        ----------
-        failed
-            Whether the states are no numbers from a failure on, which says nothing of the limits.
-        """
-        samples, (_, places, ranges) = len(states), self._limits
-        lanes = LANES if samples >= LANES else 1
+    def _observer(self, lanes: int) -> Ready:
         if lanes not in self._observers:
             kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
-            self._observers[lanes] = ready(Observer(kernel, self.constants, places, ranges))
-        outputs = np.empty((samples, len(self.outputs)))
-        passed = np.empty(len(places), dtype=np.int64)
-        path_loops()["observed"](states, inputs, self._observers[lanes], outputs, passed)
-        first = passed.tolist()
-        if failed:
-            reached = int(np.isfinite(states).all(axis=1).sum())
-            first = [samples if sample == reached else sample for sample in first]
-        return outputs, first
+            observer = Observer(kernel, self.constants, *self._limits[1:])
+            self._observers[lanes] = ready(observer)
+        return self._observers[lanes]
+
+    def _delivered(
+        self, run: Run, inputs: np.ndarray, states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, list[int]]:
+        """States and outputs at the samples, and when each output is first out of its limits.
+
+        That is the number of all samples where it never is.
+        """
+        samples, size = len(run.times), len(self.outputs)
+        outputs = np.empty((samples, size))
+        first = np.empty(len(self._limits[1]), dtype=np.int64)
+        observer = self._observer(LANES if len(states) >= LANES else 1)
+        whole, scratch, places = states, NO_PLACES, NO_PLACES
+        if run.points is not None:
+            inputs, places = run.points.inputs, run.points.places
+            whole = np.empty((samples, 2 * len(self.coordinates)))
+            scratch = np.empty((len(states), size))
+        arguments = states, inputs, places, observer, scratch, whole, outputs, first
+        path_loops()["delivered"](*arguments)
+        found = first.tolist()
+        if run.failure:
+            # From the failure on there are no numbers, which says nothing of limits.
+            reached = int(np.isfinite(whole).all(axis=1).sum())
+            found = [samples if sample == reached else sample for sample in found]
+        return whole, outputs, found

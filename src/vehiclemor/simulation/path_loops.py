@@ -1,8 +1,16 @@
 """Kernels along a path of states, and Jacobians by differences, compiled."""
 
+import math
+
 from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel, call_lanes
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.integrators.structures import DERIVATIVE, Equations, Observer
+from vehiclemor.simulation.integrators.structures import (
+    DERIVATIVE,
+    NODE_1,
+    NODE_2,
+    Equations,
+    Observer,
+)
 
 
 def kernel_path(
@@ -25,23 +33,62 @@ def lane_path(
     return 0
 
 
-def observed(
-    path: Matrix, inputs: Matrix, observer: Observer, outputs: Matrix, first: IntVector
+def delivered(
+    states: Matrix,
+    inputs: Matrix,
+    places: Matrix,
+    observer: Observer,
+    scratch: Matrix,
+    all_states: Matrix,
+    outputs: Matrix,
+    first: IntVector,
 ) -> Int:
-    """Outputs along a path, and the first sample at which each of the limits is passed, if any."""
-    if len(path) < LANES:
-        kernel_path(path, inputs, observer.kernel, observer.constants, outputs)
+    """States and outputs at the samples of a run from its states (points, 2 n or more).
+
+    Where there are no places the points are the samples, and the states stay where they are.
+    The first sample at which each limited output is outside of its range is found too, if any.
+    """
+    if len(places):
+        lane_path(states, inputs, observer.kernel, observer.constants, scratch)
+    elif len(states) < LANES:
+        kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
     else:
-        lane_path(path, inputs, observer.kernel, observer.constants, outputs)
-    for k in range(len(observer.places)):
-        place, low, high = observer.places[k], observer.ranges[k, 0], observer.ranges[k, 1]
+        lane_path(states, inputs, observer.kernel, observer.constants, outputs)
+    for k in range(len(first)):
         first[k] = len(outputs)
-        for sample in range(len(outputs)):
+    for sample in range(len(outputs)):
+        if len(places):
+            row, z = int(places[sample, 0]), places[sample, 1]
+            read_point(states, row, z, all_states[sample])
+            read_point(scratch, row, z, outputs[sample])
+        for k in range(len(first)):
+            value = outputs[sample, observer.limited[k]]
             # What is no number lies outside too.
-            if not low <= outputs[sample, place] <= high:
+            inside = observer.ranges[k, 0] <= value <= observer.ranges[k, 1]
+            if not inside and first[k] == len(outputs):
                 first[k] = sample
-                break
     return 0
+
+
+def read_point(points, row, z, into):
+    """What is known at the points of a run, at the part z of a step, or at a row itself."""
+    if row < 0:
+        for i in range(len(into)):
+            into[i] = math.nan
+        return
+    if z < 0.0:
+        for i in range(len(into)):
+            into[i] = points[row, i]
+        return
+    # Lagrange's polynomials at the points.
+    a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
+    outer = (NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0)
+    inner = (NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0)
+    p, q, r, s = b * c * d / outer, a * c * d / inner, -a * b * d / inner, -a * b * c / outer
+    for i in range(len(into)):
+        into[i] = (p * points[row, i] + q * points[row + 1, i]) + (
+            r * points[row + 2, i] + s * points[row + 3, i]
+        )
 
 
 def jacobian_at(

@@ -9,15 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, Ready, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, loop_array, output_times
-from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.integrators.step_text import Frame
 from vehiclemor.simulation.integrators.structures import (
+    NODES,
     NOT_FINITE,
     SINGULAR,
     STEP_TOO_SMALL,
@@ -26,6 +29,7 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
+from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_timer import timed
@@ -41,6 +45,8 @@ REASONS = {
     SINGULAR: "the matrix of a linear system is singular",
     STEP_TOO_SMALL: "the step size has become too small",
 }
+# Of a run that is recorded at the samples: no inputs, points and places.
+NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
 # Kernels that a formulation calls; a fused step comes besides.
 CALLED = {
     "full": ("derivative",),
@@ -48,6 +54,22 @@ CALLED = {
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
 }
+
+
+class Points(NamedTuple):
+    """Points at which a run is recorded, see `structures.Output`.
+
+    Attributes
+    ----------
+    inputs, moments
+        Inputs (points, inputs) at the points, and their times (points,) in s.
+    places
+        How the samples follow from them (samples, 2).
+    """
+
+    inputs: np.ndarray
+    moments: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -59,13 +81,15 @@ class Run:
     times
         Output times (samples,) in s.
     path
-        States (samples, dim) at these times; NaN from a failure on.
+        States (samples, dim) at these times, NaN from a failure on; or at `points`.
     counts
         Numbers in the order of `DYNAMIC_COUNTS`.
     seconds
         Time spent in the compiled loop.
     failure
         Why the run has ended early, empty if it has not.
+    points
+        Where it is recorded, if not at the output times.
     """
 
     times: np.ndarray
@@ -73,6 +97,7 @@ class Run:
     counts: np.ndarray
     seconds: float
     failure: str
+    points: Points | None = None
 
 
 class Solver(NamedTuple):
@@ -125,12 +150,15 @@ class Plan(NamedTuple):
         Numbers of states, of floats of scratch space and of integers.
     windows
         Kept alive: a plan is found by the object.
+    cubic
+        Whether dense output is a cubic in each step, and the run may be recorded at points.
     """
 
     loop: Loop
     arguments: RunArguments
     sizes: tuple[int, int, int]
     windows: ProjectionWindows
+    cubic: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +185,8 @@ class System(ShortRepr):
         Integrator -> kernel that takes whole steps of it.
     diagonal
         Numbers of states by diagonal block of the Jacobian, where a fused step relies on them.
+    partners
+        Number of the state that each becomes in the mirror image; empty where there is none.
     """
 
     kernels: Kernels
@@ -168,19 +198,19 @@ class System(ShortRepr):
     rotating: np.ndarray
     fused: Mapping[str, str] = field(default_factory=dict)
     diagonal: tuple[tuple[int, ...], ...] = ()
+    partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
-    def equations(self, *names: str, fused: str = "") -> Equations:
+    def equations(self, *names: str, step: int = 0) -> Equations:
         """Kernels of these names, at their places, as compiled loops take them.
 
         Parameters
         ----------
-        fused
-            Kernel that takes whole steps, if any.
+        step
+            Address of a kernel that takes whole steps, if any.
         """
         places = ("derivative", "outputs", "second_order", "speeds")
         found = [address_of(self.kernels, name) if name in names else 0 for name in places]
-        found.append(address_of(self.kernels, fused) if fused else 0)
-        kernels = np.array(found, dtype=np.int64)
+        kernels = np.array([*found, step], dtype=np.int64)
         return Equations(kernels, self.constants, self.error_scale, self.turning)
 
     @cached_property
@@ -199,7 +229,7 @@ class System(ShortRepr):
             )
         result = np.empty((len(x), len(x)))
         loop = path_loops()["jacobian_at"]
-        equations, work = self.called("full", ""), np.empty((3, len(x)))
+        equations, work = self.called("full"), np.empty((3, len(x)))
         loop(loop_array(x), loop_array(u), equations, self.active, work, result)
         return result
 
@@ -239,6 +269,35 @@ class System(ShortRepr):
         # What integrators store of the frozen Jacobian is made when it is first used.
         return {}
 
+    @cached_property
+    def frame(self) -> Frame:
+        """Coordinates of the operators of whole steps."""
+        blocks = (tuple(((i, 1.0),) for i in range(len(self.reference))),)
+        if len(self.partners):
+            sign = signs(self.frozen_jacobian, self.partners)
+            if sign is not None:
+                blocks = mirror_blocks(self.partners, sign)
+        columns = tuple(
+            tuple(k for k, row in enumerate(block) if row[0][0] in self.active) for block in blocks
+        )
+        return Frame(blocks, columns, tuple(self.rotating.tolist()))
+
+    def steps(self, solver: str) -> str:
+        """What takes whole steps of a full run: `fused`, `stepped`, or nothing."""
+        if solver in self.fused:
+            return "fused"
+        few = len(self.reference) <= catalogue.MOST_STATES
+        return "stepped" if few and catalogue.integrator(solver).stepped else ""
+
+    def step_address(self, solver: str) -> int:
+        """Address of the kernel that takes whole steps of an integrator."""
+        if solver in self.fused:
+            return address_of(self.kernels, self.fused[solver])
+        stepped = catalogue.integrator(solver).stepped
+        assert stepped
+        sources = kernel_sources(stepped.text(self.frame, self.inputs))
+        return address_of(Kernels(sources), next(iter(sources)))
+
     def method(self, solver: str, active: np.ndarray) -> Ready:
         """What an integrator needs beside its code; kept for further runs."""
         key = solver, active.tobytes()
@@ -247,6 +306,11 @@ class System(ShortRepr):
             grid, stored = catalogue.STEP_GRID, catalogue.Stored(catalogue.NOTHING)
             if solver in self.fused and chosen.block_operators:
                 stored = chosen.block_operators(self.frozen_jacobian, self.diagonal)
+            elif chosen.stepped and self.steps(solver) == "stepped":
+                blocks = self.frame.diagonal(self.frozen_jacobian)
+                stored = catalogue.Stored(
+                    self.frame.packed([chosen.stepped.tables(block) for block in blocks])
+                )
             elif chosen.operators is not None:
                 own = chosen.formulation == "vehicle_frame"
                 jacobian = self.turning_jacobian if own else self.frozen_jacobian
@@ -255,31 +319,55 @@ class System(ShortRepr):
             self._ready[key] = ready(method)
         return self._ready[key]
 
-    def called(self, formulation: str, fused: str) -> Ready:
-        """The kernels that a run calls; kept for further runs."""
-        key = formulation, fused
+    def called(self, formulation: str, solver: str = "") -> Ready:
+        """The kernels that a run calls, a solver's whole steps too; kept for further runs."""
+        key = formulation, solver
         if key not in self._ready:
-            self._ready[key] = ready(self.equations(*CALLED[formulation], fused=fused))
+            step = self.step_address(solver) if solver else 0
+            self._ready[key] = ready(self.equations(*CALLED[formulation], step=step))
         return self._ready[key]
 
     def run(
-        self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
+        self,
+        maneuver: Maneuver,
+        state: np.ndarray,
+        windows: ProjectionWindows,
+        solver: Solver,
+        direct_until: float = np.inf,
     ) -> Run:
         """Integrate from a state (n,) over a maneuver.
+
+        Parameters
+        ----------
+        direct_until
+            Time in s from which on the run may be recorded at points, see `structures.Output`.
 
         Raises
         ------
         InputError
             If a value is out of bounds or a name is unknown.
         """
-        loop, arguments = self.prepared(maneuver, state, windows, solver)
+        loop, arguments = self.prepared(maneuver, state, windows, solver, direct_until)
         output = arguments.output
         status, seconds = timed(loop.prepared(*arguments))
         failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
-        return Run(output.samples, output.path, output.counts, seconds, failure)
+        path, times, places = output.path, output.samples, output.places
+        if not len(places):
+            return Run(times, path, output.counts, seconds, failure)
+        reached = int(places[:, 0].argmax()) if status else -1
+        row, part = places[reached].tolist()
+        # Kernels take so many at once.
+        end = max(int(row) + (1 if part < 0.0 else NODES), LANES)
+        points = Points(output.inputs[:end], output.moments[:end], places)
+        return Run(times, path[:end], output.counts, seconds, failure, points)
 
     def prepared(
-        self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
+        self,
+        maneuver: Maneuver,
+        state: np.ndarray,
+        windows: ProjectionWindows,
+        solver: Solver,
+        direct_until: float = np.inf,
     ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
         longest = solver.longest_step
@@ -298,10 +386,13 @@ class System(ShortRepr):
         arguments = plan.arguments
         n, floats, integers = plan.sizes
         assert len(state) == n, f"{len(state)} states in a space of {n} dimensions"
-        times = arguments.output.samples
-        output = Output(
-            times, np.empty((len(times), n)), np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-        )
+        times, counts = arguments.output.samples, np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
+        size, points = len(times), NO_POINTS
+        if plan.cubic and direct_until < times[-1] and size >= LANES:
+            given = recorded_inputs(maneuver)[1]
+            inputs, moments = np.empty((size, self.inputs)), np.empty(size)
+            points = given, inputs, moments, np.empty((size, 2))
+        output = Output(times, np.empty((size, n)), counts, *points, direct_until)
         return plan.loop, arguments._replace(
             start=loop_array(state),
             control=catalogue.control_of(
@@ -325,23 +416,25 @@ class System(ShortRepr):
         times = output_times(solver.times, maneuver, begin=solver.begin)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
-        fused = self.fused.get(name, "") if full else ""
+        steps = self.steps(name) if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
         nothing = np.empty(0)
         arguments = RunArguments(
             nothing,
-            self.called(formulation, fused),
+            self.called(formulation, name if steps else ""),
             signal,
             windows.spans(signal.bundle.edges, end, solver.begin),
             windows.subspaces,
             self.method(name, active),
             windows.subspaces,
-            Output(times, nothing, nothing),
+            Output(times, nothing, nothing, *NO_POINTS, np.inf),
             nothing,
             nothing,
         )
-        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, bool(fused))
-        loop = catalogue.time_loop(chosen, formulation, bool(fused))
-        return Plan(loop, arguments, (n, floats, dim + 8), windows)
+        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
+        loop = catalogue.time_loop(chosen, formulation, steps)
+        whole = solver.times is None and not solver.begin
+        cubic = whole and "cubic" in chosen.modules
+        return Plan(loop, arguments, (n, floats, dim + 8), windows, cubic)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.validation import checked_fit, checked_run
+from vehiclemor.reduction.vehicle.acceptance import no_vehicle
+from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -29,6 +31,8 @@ from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from vehiclemor.simulation.dynamic import DynamicModel
 
 # How a fitted model is integrated: experiments that differ in these alone are fitted once.
 ONLINE = ("solver", "tolerance")
@@ -185,7 +189,8 @@ def _tested(
         start = start_of(model, scenario)
         if experiment.keep == "errors":
             trajectory = _sound(model, reduced, scenario, start)
-            return Outcome(_warned(model, experiment, scenario, trajectory), reference)
+            trajectory = _warned(model, experiment, scenario, trajectory)
+            return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
         trajectory = _sound(model, reduced, scenario, start)
@@ -209,6 +214,13 @@ def _warned(
     if run.trust or component("method", experiment.method).own_limits:
         return run
     return run.judged(input_range(model, experiment.training).trust(model, scenario))
+
+
+def _estimate(model: Model, run: Trajectory) -> ErrorEstimate | None:
+    """Errors by the residual, of a vehicle's run that may be wrong by its model's own account."""
+    if run.trust is None or not run.finished or no_vehicle(model):
+        return None
+    return estimated_errors(cast("DynamicModel", model), run)
 
 
 def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:

@@ -17,6 +17,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.system import Run, System
 from vehiclemor.simulation.trajectory import Trust
 
@@ -55,6 +56,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         np.array([ERROR_SCALE.get(name, 10.0) for name in names]),
         np.array([i for i, name in enumerate(names) if name not in cyclic]),
         np.zeros(0, dtype=np.int64),
+        partners=partners(names),
     )
     cost = Offline(time.process_time() - began)
     return transformed_system(model, system, encode, cost, settings, judge)

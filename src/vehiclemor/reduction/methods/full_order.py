@@ -21,10 +21,11 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class AlgebraicSettings(Settings):
     """How algebraic equations are solved."""
 
-    solver: Literal["newton", "newton_dense", "chord"] = Field(
+    solver: Literal["newton", "newton_dense", "chord", "newton_lanes"] = Field(
         "newton",
         description="newton: fresh Jacobians; newton_dense: without the generated elimination; "
-        "chord: constant inverse and predictor",
+        "chord: constant inverse and predictor; newton_lanes: newton with predictor, eight samples "
+        "at once",
     )
     tolerance: StepTolerance = NEWTON_TOLERANCE
 

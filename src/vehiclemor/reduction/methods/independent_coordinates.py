@@ -16,6 +16,7 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.system import System
 
 
@@ -42,6 +43,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         model.error_scale[chosen],
         np.array([whole.index(i) for i in model.active if i in whole]),
         np.array([whole.index(i) for i in model.rotating], dtype=np.int64),
+        partners=partners([model.definition.states[i] for i in whole]),
     )
     cost = Offline(time.process_time() - began)
     return transformed_system(model, system, encode, cost, settings)

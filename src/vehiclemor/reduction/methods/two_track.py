@@ -18,14 +18,14 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.multibody.components.tire_coefficients import FIALA
-from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.mirror import mirror
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
@@ -34,8 +34,9 @@ from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 
-# The states that are coordinates.
+# The states that are coordinates, and those of them whose rates are accelerations.
 COORDINATES = ("y_dot", "psi_dot", "phi", "phi_dot")
+ACCELERATIONS = (0, 1, 3)
 # Symmetric states for which the lifting has terms of its own.
 SEEN = ("theta", "z_dot")
 RIDGE = 1e-12
@@ -46,11 +47,14 @@ class TwoTrackSettings(OnlineSettings):
 
     terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(16, ge=0, description="chosen products in those of the speed")
+    wheel_terms: int = Field(
+        9, ge=0, description="chosen products in the slip, and in the load, of an axle's wheels"
+    )
     lifted_terms: int = Field(
-        8, ge=0, description="products chosen for pitch and heave, beside those of the equations"
+        20, ge=0, description="products chosen for pitch and heave, beside those of the equations"
     )
     sweeps: int = Field(
-        20, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
+        25, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
     hull: float = Field(
         1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
@@ -108,12 +112,12 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         of_shape.deviations @ encoding.T, of_shape.inputs, of_shape.rates @ encoding.T, of_shape
     )
     outputs = np.concatenate([run.outputs for run in runs])
-    text = tire_text(model, shape.speed, samples, outputs, settings)
-    reduced = _fitted_on_rates(shape, modes, encoding, text, samples, settings)
+    text = tire_text(shape, samples, outputs, settings)
+    reduced = fitted_on_rates(shape, modes, encoding, text, samples, settings)
     if settings.sweeps:
-        goals = targets(reduced, training, runs)
-        (odd, lateral), (even, symmetric) = reduced.features.groups
-        free = [(odd, 0), (odd, 1), (odd, 3), *((even[1:], column) for column in symmetric)]
+        goals = targets(reduced, training, runs, stride=1)
+        (odd, _), (even, symmetric) = reduced.features.groups
+        free = [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
         reduced = improved(reduced, goals, free, settings.sweeps)
     return replace(
         reduced,
@@ -124,52 +128,41 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
 
 
 def tire_text(
-    model: DynamicModel,
-    speed: float,
-    samples: Samples,
-    outputs: np.ndarray,
-    settings: TwoTrackSettings,
+    shape: VehicleShape, samples: Samples, outputs: np.ndarray, settings: TwoTrackSettings
 ) -> tf.Text:
     """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
     z, u = samples.z, samples.inputs
-    part = 1.0 / (speed + z[:, tf.SPEED])
-    values = np.column_stack([z[:, 0] * part, z[:, 1] * part, z[:, 2], z[:, 3] * part, u[:, 0]])
-    ranges = largest(np.column_stack([values, z[:, tf.SPEED]]))
-    inputs = u.shape[1]
-    text = tf.arguments(speed, ranges, settings.hull, inputs)
-    odd = [*tf.linear_terms(inputs), *tf.CUBIC]
-    even = ["1.0", "m", *tf.SQUARE]
+    model, inputs = shape.model, u.shape[1]
+    reach = settings.hull * largest(tf.argument_values(shape.speed, z, u))
+    text = tf.arguments(shape.speed, reach)
+    linear = tf.linear_terms(inputs)
+    odd = [*linear, *tf.CUBIC, *tf.FASTER]
+    even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]
+    given = text.features(inputs, [*odd, *even])
+    columns = feature_columns(given, z, u, np.array(text.values))
+    parities = (
+        (odd, columns[:, : len(odd)], len(linear)),
+        (even, columns[:, len(odd) :], 1),
+    )
 
-    def column(kind: str, wheel: str) -> np.ndarray:
-        return outputs[:, model.outputs.index(f"{kind}_{wheel}")]
+    def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
+        return outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
 
-    parameters = {name: float(model.parameters[name]) for name in FIALA}
-    parameters["saturation"] = settings.saturation
-    full = text.copy()
-    tables = {}
-    for name, terms in (("odd", odd), ("even", even)):
-        features = text.features(inputs, terms)
-        tables[name] = terms, feature_columns(features, z, u, np.array(text.values))
-    for axle, (left, right) in enumerate(tf.AXLES):
-        slips = [np.tan(column("slip_angle", wheel)) for wheel in (left, right)]
-        loads = [column("Fz", wheel) for wheel in (left, right)]
-        linear = len(tf.linear_terms(inputs))
-        for name, parity, target, given, more in (
-            (f"slip{axle}", "odd", 0.5 * (slips[0] + slips[1]), linear, 6),
-            (f"slip_half{axle}", "even", 0.5 * (slips[0] - slips[1]), 1, 6),
-            (f"load{axle}", "even", 0.5 * (loads[0] + loads[1]), 1, 6),
-            (f"load_half{axle}", "odd", 0.5 * (loads[0] - loads[1]), linear, 6),
-        ):
-            terms, columns = tables[parity]
-            chosen = forward_selection(columns, target[:, None], given, more)
-            weights = ridge_fit(columns[:, chosen], target, RIDGE)
-            full.sum(name, [terms[i] for i in chosen], weights)
-        static = float(np.mean(loads))
-        tf.axle_lines(full, axle, static, parameters)
-    return full
+    for axle, wheels in enumerate(tf.AXLES):
+        slips, loads = np.tan(of_wheels("slip_angle", wheels)), of_wheels("Fz", wheels)
+        for name, values, mean_parity in (("slip", slips, 0), ("load", loads, 1)):
+            mean, half = values @ [0.5, 0.5], values @ [0.5, -0.5]
+            for end, target, parity in (("", mean, mean_parity), ("_half", half, 1 - mean_parity)):
+                terms, table, first = parities[parity]
+                chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
+                weights = ridge_fit(table[:, chosen], target, RIDGE)
+                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights)
+        parameters = {name: float(model.parameters[name]) for name in FIALA}
+        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
+    return text
 
 
-def _fitted_on_rates(
+def fitted_on_rates(
     shape: VehicleShape,
     modes: SlowModes,
     encoding: np.ndarray,
@@ -180,45 +173,46 @@ def _fitted_on_rates(
     """Equations fitted to the accelerations of the training runs."""
     z, u, rates, of_shape = samples
     inputs, parameters = u.shape[1], np.array(text.values)
-    forces = ["F0", "F1", "M0", "M1"]
-    given_odd = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], *forces]
-    odd_terms = [*given_odd, *tf.odd_candidates()]
-    even_terms = ["z4", *tf.even_candidates(inputs)]
 
     def columns_of(terms: Sequence[str]) -> np.ndarray:
         return feature_columns(text.features(inputs, terms), z, u, parameters)
 
-    def chosen(terms: Sequence[str], values: np.ndarray, given: int, more: int) -> list[str]:
+    def chosen(
+        given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
+    ) -> list[str]:
+        terms = [*given, *(term for term in others if term not in given)]
         scaled = values / np.sqrt(np.mean(values**2, axis=0))
-        return [terms[i] for i in forward_selection(columns_of(terms), scaled, given, more)]
+        numbers = forward_selection(columns_of(terms), scaled, len(given), more)
+        return [terms[i] for i in numbers]
 
-    odd = chosen(odd_terms, rates[:, [0, 1, 3]], len(given_odd), settings.terms)
+    plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
+    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], settings.terms)
     forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
     symmetric = np.column_stack([rates[:, tf.SPEED], forward])
-    even = chosen(even_terms, symmetric, 1, settings.even_terms)
+    candidates = tf.even_candidates(inputs)
+    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, settings.even_terms)
     terms = [*odd, "1.0", *even]
-    features = text.features(inputs, terms, len(odd))
-    columns = feature_columns(features, z, u, parameters)
-    seen = [shape.names.index(name) for name in SEEN]
-    lifting_terms = [*terms, *(term for term in even_terms if term not in even)]
-    lifted_terms = chosen(
-        lifting_terms, of_shape.deviations[:, seen], len(terms), settings.lifted_terms
-    )
+    seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
+    lifted = chosen(terms, candidates, seen, settings.lifted_terms)
+    lifting_columns, other_side = columns_of(lifted), of_shape.deviations @ mirror(shape).T
+    sides = [
+        ridge_fit(part, 0.5 * (of_shape.deviations + sign * other_side), RIDGE)
+        for part, sign in zip(np.split(lifting_columns, [len(odd)], axis=1), (-1, 1), strict=True)
+    ]
+    columns = columns_of(terms)
     k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
     lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
-    c[:k, [0, 1, 2, 3, 5, 7]] = ridge_fit(columns[:, :k], lateral, RIDGE)
+    c[:k, tf.LATERAL] = ridge_fit(columns[:, :k], lateral, RIDGE)
     # Straight running at any speed is an equilibrium.
-    c[k + 2 :, [4, 6]] = ridge_fit(
-        columns[:, k + 2 :], np.column_stack([rates[:, tf.SPEED], forward]), RIDGE
-    )
     c[k, 6], c[k + 1, 6] = shape.speed, 1.0
+    c[k + 2 :, tf.SYMMETRIC] = ridge_fit(columns[:, k + 2 :], symmetric, RIDGE)
     return ReducedVehicle(
         shape.model,
         shape,
-        features,
+        text.features(inputs, terms, len(odd)),
         parameters,
         c,
-        ridge_fit(columns_of(lifted_terms), of_shape.deviations, RIDGE),
+        np.vstack(sides),
         encoding,
         np.zeros((tf.STATES, inputs)),
         np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
@@ -226,7 +220,7 @@ def _fitted_on_rates(
         "dopri5",
         1e-6,
         modes.symmetric,
-        text.features(inputs, lifted_terms),
+        text.features(inputs, lifted),
     )
 
 

@@ -14,15 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.simulation.integrators import ros34pw2, tableaus
 from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
-from vehiclemor.simulation.integrators.exponential_functions import TABLES
-
-# The tables' functions at argument zero, for states that no block belongs to.
-AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
-JACOBIAN, HALF_FIRST, HALF_SECOND, FIRST, SECOND, MIDDLE, LAST = range(TABLES)
+from vehiclemor.simulation.integrators.exponential_functions import (
+    AT_ZERO,
+    FIRST,
+    HALF_FIRST,
+    HALF_SECOND,
+    JACOBIAN,
+    LAST,
+    MIDDLE,
+    SECOND,
+)
 
 
 class Layout(NamedTuple):

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.reduction.vehicle.feature_kernels import columns_text, diagonal_blocks, kernel_text
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.simulation.paths import along

@@ -10,12 +10,16 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.paths import results
+from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.trajectory import Trust
+
+# Part of a transient below which it needs no samples of its own.
+NEGLIGIBLE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -67,61 +71,76 @@ class Lifting(ShortRepr):
     transient: Transient
 
     @cached_property
-    def _made(self) -> dict[int, tuple[Kernels, np.ndarray]]:
+    def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
         return {}
 
-    def _kernel(self, modes: int) -> tuple[Kernels, np.ndarray]:
-        """Kernel and constants; without modes for a start that excites none."""
-        if modes not in self._made:
+    def _kernel(self, modes: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
+        """Address and constants of the kernel; without modes for a start that excites none."""
+        if (modes, lanes) not in self._made:
             right = self.transient.right[:modes]
-            pairs = np.stack([right.real, -right.imag], axis=1).reshape(-1, right.shape[1])
+            pairs = np.stack([right.real, -right.imag], axis=1).reshape(2 * modes, right.shape[1])
             shared = [self.coefficients, self.reference[None]]
             rows = np.vstack([*shared, pairs] if modes else shared)
             rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
             text = lifting_text(self.features, self.layout, len(self.parameters), modes)
-            constants = np.concatenate([self.parameters, rows.ravel()])
-            self._made[modes] = Kernels(kernel_sources(text)), constants
-        return self._made[modes]
+            kernels = Kernels(kernel_sources(text))
+            address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
+            self._made[modes, lanes] = address, np.concatenate([self.parameters, rows.ravel()])
+        return self._made[modes, lanes]
+
+    def excited(self, deviation: np.ndarray) -> np.ndarray:
+        """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
+
+        Parameters
+        ----------
+        deviation
+            Of the start's shape from straight running (n,); m is zero if there is none.
+        """
+        rates = self.transient.rates if deviation.any() else self.transient.rates[:0]
+        amplitudes = self.transient.left[: len(rates)] @ deviation if len(rates) else rates
+        found = np.array([rates, amplitudes], dtype=complex)
+        return np.stack([found.real, found.imag], axis=2)
 
     def states(
-        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, deviation: np.ndarray
-    ) -> np.ndarray:
-        """Full states, and behind them what is watched (samples, 2 n + watched).
+        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, excited: np.ndarray
+    ) -> tuple[np.ndarray, Trust | None]:
+        """Full states, and behind them what is watched (samples, 2 n + watched); what this tells.
 
         Parameters
         ----------
         times, path, inputs
             Of the samples: in s, reduced states (samples, states + 3), inputs (samples, inputs).
-        deviation
-            Of the start's shape from straight running (n,).
+        excited
+            By the start, as `excited` gives it.
         """
-        rates = self.transient.rates
-        amplitudes = self.transient.left @ deviation if deviation.any() else rates[:0]
-        modes = len(amplitudes)
+        modes, watched = excited.shape[1], self.features.watched
         if modes:
             given = np.empty((len(times), inputs.shape[1] + 2 * modes))
-            parts = [np.column_stack([a.real, a.imag]) for a in (rates, amplitudes)]
-            _loops()["with_decay"](times, inputs, *parts, np.empty((modes, 2)), given)
+            _loops()["with_decay"](times, inputs, *excited, np.empty((modes, 2)), given)
             inputs = given
-        kernels, constants = self._kernel(modes)
-        size = self.layout.size + len(self.features.watched)
-        return results(kernels, "full_state", constants, (path, inputs), size)
+        kernel = self._kernel(modes, LANES if len(times) >= LANES else 1)
+        states = np.empty((len(times), self.layout.size + len(watched)))
+        largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
+        _loops()["lifted"](path, inputs, *kernel, states, largest, first)
+        return states, self._trust(times, largest.tolist(), first.tolist())
 
-    def trust(self, times: np.ndarray, states: np.ndarray) -> Trust | None:
-        """How far a run has gone, of its states as `states` gives them; none if nothing tells."""
-        watched = self.features.watched
-        if not watched:
+    def _trust(self, times: np.ndarray, largest: list[float], first: list[int]) -> Trust | None:
+        """How far a run has gone; none if nothing tells."""
+        if not largest:
             return None
-        largest = np.empty(len(watched))
-        first = np.empty(len(watched), dtype=np.int64)
-        _loops()["furthest"](states, self.layout.size, largest, first)
-        if not first.min() < len(times):
-            return Trust(float(largest.max()))
-        place = int(first.argmin())
-        reason = f"{watched[place][1]} leaves what the training runs have covered"
-        return Trust(float(largest.max()), float(times[first[place]]), reason)
+        sample = min(first)
+        if sample == len(times):
+            return Trust(max(largest))
+        name = self.features.watched[first.index(sample)][1]
+        reason = f"{name} leaves what the training runs have covered"
+        return Trust(max(largest), float(times[sample]), reason)
+
+
+def decayed(excited: np.ndarray) -> float:
+    """Time in s at which the modes of a transient have decayed; 0 if there are none."""
+    slowest = excited[0, :, 0].max(initial=-np.inf)
+    return float(np.log(NEGLIGIBLE) / slowest) if slowest < 0.0 else np.inf
 
 
 def _loops() -> Mapping[str, Loop]:
-    modules = ("simulation.integrators.structures", "reduction.vehicle.lifting_loops")
-    return loops(modules, ("with_decay", "furthest"))
+    return loops((*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted"))

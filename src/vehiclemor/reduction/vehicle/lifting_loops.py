@@ -3,6 +3,8 @@
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector
+from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.simulation.path_loops import kernel_path, lane_path
 
 # What has decayed to this part of what it was is nothing.
 NOTHING = 1e-14
@@ -45,8 +47,24 @@ def with_decay(
     return 0
 
 
-def furthest(states: Matrix, column: Int, largest: Vector, first: IntVector) -> Int:
-    """Largest magnitude in each column from one on, and the first sample above 1, if any."""
+def lifted(
+    path: Matrix,
+    inputs: Matrix,
+    kernel: IntVector,
+    constants: Vector,
+    states: Matrix,
+    largest: Vector,
+    first: IntVector,
+) -> Int:
+    """States by a kernel for `LANES` samples, or for one on shorter paths.
+
+    Of the columns behind the states also the largest magnitude, and the first sample above 1.
+    """
+    if len(path) < LANES:
+        kernel_path(path, inputs, kernel, constants, states)
+    else:
+        lane_path(path, inputs, kernel, constants, states)
+    column = states.shape[1] - len(largest)
     for k in range(len(largest)):
         largest[k], first[k] = 0.0, len(states)
     for sample in range(len(states)):

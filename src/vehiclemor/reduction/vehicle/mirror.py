@@ -9,9 +9,8 @@ from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
 from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.simulation.mirror_image import partners
 
-# Wheels that the mirror exchanges, as parts of names.
-SWAPPED = {"FL": "FR", "FR": "FL", "RL": "RR", "RR": "RL"}
 # States that move less than this part of their range count as not moved.
 STILL = 1e-6
 
@@ -42,11 +41,9 @@ def mirror(shape: VehicleShape) -> np.ndarray:
     lateral = lateral_modes(shape)
     moved = np.hstack([lateral.right, lateral.follow])
     moved /= largest(moved)
-    names = shape.names
-    matrix = np.zeros((len(names), len(names)))
-    for i, name in enumerate(names):
-        partner = "_".join(SWAPPED.get(part, part) for part in name.split("_"))
-        j = names.index(partner) if partner in names else i
+    partner = partners(shape.names)
+    matrix = np.zeros((len(partner), len(partner)))
+    for i, j in enumerate(partner):
         if i == j:
             matrix[i, i] = -1.0 if np.abs(moved[i]).max() > STILL else 1.0
         else:

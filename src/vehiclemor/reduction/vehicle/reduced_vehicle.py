@@ -10,13 +10,13 @@ from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
-from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient
+from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system import System
+from vehiclemor.simulation.system import Points, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Step of the reduced coordinates in differences.
@@ -127,14 +127,29 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        run, inputs = self.equations.run(maneuver, start), recorded_inputs(maneuver)[1]
-        full = self.model.start(start)
-        deviation = self.shape.of(full[None])[0] - self.shape.reference
-        states = self.lift.states(run.times, run.path, inputs, deviation)
-        # The start is known better than its slow part.
-        states[0, : len(full)] = full
-        trust = self.lift.trust(run.times, states)
+        excited, inputs = self._excited(start), recorded_inputs(maneuver)[1]
+        run = self.equations.run(maneuver, start, direct_until=decayed(excited))
+        points = run.points or Points(inputs, run.times, run.times[:0])
+        states, trust = self.lift.states(points.moments, run.path, points.inputs, excited)
+        if run.points is None or run.points.places[0, 1] < 0.0:
+            # The start is known better than its slow part.
+            full = self.model.start(start)
+            states[0, : len(full)] = full
         return self.model.recorded(maneuver, run, inputs, states).judged(trust)
+
+    def _excited(self, start: Start) -> np.ndarray:
+        """What of the transient a start excites; kept where it is a named one."""
+        if isinstance(start, str) and start in self._starts:
+            return self._starts[start]
+        state = self.model.start(start)
+        found = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+        if isinstance(start, str):
+            self._starts[start] = found
+        return found
+
+    @cached_property
+    def _starts(self) -> dict[str, np.ndarray]:
+        return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002
         """Lifted shapes lie on no subspace."""

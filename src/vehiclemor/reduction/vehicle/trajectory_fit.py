@@ -22,8 +22,8 @@ from vehiclemor.simulation.trajectory import Trajectory
 
 # Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
 HEADING, PLACE, PART = 7.6e-5, 0.03, 0.02
-# The variational equations take every so many output times, runs are compared at every so many of
-# their steps.
+# The variational equations take by default every so many output times, runs are compared at every
+# so many of their steps.
 STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
@@ -68,9 +68,12 @@ class Target:
 
 
 def targets(
-    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
+    reduced: ReducedVehicle,
+    training: Training,
+    runs: Sequence[Trajectory],
+    stride: int = STRIDE,
 ) -> list[Target]:
-    """Training runs in reduced states."""
+    """Training runs in reduced states; the variational equations take every `stride`th time."""
     x, y, heading = reduced.model.planar
     k, result = reduced.features.states - 1, []
     for run, true in zip(training, runs, strict=True):
@@ -81,7 +84,7 @@ def targets(
         restless = np.flatnonzero(moved > REST * moved.max())
         last = len(z) - 1
         rest = int(restless[-1]) if len(restless) else 0
-        steps = [*range(0, rest, STRIDE), *range(rest, last, LONG_STRIDE), last]
+        steps = [*range(0, rest, stride), *range(rest, last, LONG_STRIDE), last]
         result.append(Target(run, true.time, true.inputs, states, np.array(steps)))
     return result
 

@@ -17,7 +17,7 @@ GREYS = (("#000000", "-"), ("#777777", "-"), ("#AAAAAA", "-"), ("#444444", "--")
 
 
 def figure_pareto(results: Results) -> Figure:
-    """Score (worst error as a multiple of its bound) over the mean time of a whole call, one model."""
+    """Score (worst error over its bound) over the mean time of a whole call, one model."""
     (dataset,) = results.values()
     rows = method_rows(dataset, protocol_of(dataset))
     figure, axes = panels(1, 1, (6.7, 4.2))

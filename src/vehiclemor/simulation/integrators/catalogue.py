@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from vehiclemor.progress import first_use
 from vehiclemor.registry import unknown
 from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
 from vehiclemor.simulation.integrators.loop import scratch_end
+from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
+from vehiclemor.simulation.integrators.step_text import Frame, exponential_step, w_step
 from vehiclemor.simulation.integrators.structures import Control
 
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
@@ -24,6 +26,8 @@ STEP_GRID = 2.0 ** (0.125 * np.arange(-128, 25))
 MOST_CALLS = 100_000
 # Longest first step (s) after a break point of the inputs.
 RESTART = 0.05
+# A kernel of whole steps for more states than these would be too long.
+MOST_STATES = 64
 NOTHING = np.zeros((1, 1, 1))
 
 
@@ -61,6 +65,24 @@ class Stored(NamedTuple):
     shared: np.ndarray = NOTHING[0]
 
 
+class Stepped(NamedTuple):
+    """Whole steps of a full model as one kernel.
+
+    Attributes
+    ----------
+    text
+        Makes the kernel's source from the frame and the number of inputs.
+    tables
+        Makes transposed operators (step sizes, tables, n, n) of a diagonal block.
+    modules
+        Modules of the loop's functions.
+    """
+
+    text: Callable[[Frame, int], str]
+    tables: Callable[[np.ndarray], np.ndarray]
+    modules: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Integrator:
     """One integrator, and what the time loop must know of it.
@@ -88,6 +110,8 @@ class Integrator:
         Scratch space: vectors and matrices of the system's dimension, and single numbers.
     block_operators
         Makes operators of diagonal blocks alone, where a kernel that takes whole steps wants those.
+    stepped
+        How it takes whole steps of a full model.
     """
 
     summary: str
@@ -103,15 +127,19 @@ class Integrator:
     fused_squares: int = 0
     numbers: int = 16
     block_operators: Callable[[np.ndarray, Sequence[Sequence[int]]], Stored] | None = None
+    stepped: Stepped | None = None
 
 
 def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
     """Transposed active columns (step sizes, active, dim) of (I - gamma h J)^-1."""
-    from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
+    return Stored(np.ascontiguousarray(transposed_inverses(jacobian)[:, 0, active]))
 
+
+def transposed_inverses(jacobian: np.ndarray) -> np.ndarray:
+    """Transposed (step sizes, 1, n, n) of (I - gamma h J)^-1."""
     identity = np.eye(len(jacobian))
     found = [np.linalg.inv(identity - GAMMA * h * jacobian) for h in STEP_GRID]
-    return Stored(np.ascontiguousarray([inverse.T[active] for inverse in found]))
+    return np.array([[inverse.T] for inverse in found])
 
 
 def matrix_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
@@ -162,6 +190,9 @@ INTEGRATORS = {
         inverses,
         ("step_grid", "cubic", "fused_ros34pw2"),
         fused_squares=2,
+        stepped=Stepped(
+            w_step, transposed_inverses, ("step_grid", "cubic", "ros34pw2", "stepped_ros34pw2")
+        ),
     ),
     "etdrk4": Integrator(
         "exponential method of order 4, with the same",
@@ -181,6 +212,11 @@ INTEGRATORS = {
         fused_modules=("step_grid", "cubic", "etdrk4", "fused_etdrk4"),
         rows=32,
         fused_squares=7,
+        stepped=Stepped(
+            exponential_step,
+            partial(exponential_functions.exponential_tables, grid=STEP_GRID),
+            ("step_grid", "cubic", "etdrk4", "stepped_etdrk4"),
+        ),
     ),
     "exponential_adams": Integrator(
         "exponential Adams method of order up to 6, with the same",
@@ -266,9 +302,17 @@ def rhs_loop(formulation: str) -> Loop:
     return loops(modules, ("rhs_at",))["rhs_at"]
 
 
-def time_loop(chosen: Integrator, formulation: str, fused: bool) -> Loop:
-    """The compiled time loop of an integrator and a formulation."""
-    own = chosen.fused_modules if fused else chosen.modules
+def time_loop(chosen: Integrator, formulation: str, steps: str = "") -> Loop:
+    """The compiled time loop of an integrator and a formulation.
+
+    Parameters
+    ----------
+    steps
+        `fused` or `stepped` if a kernel takes whole steps.
+    """
+    own = chosen.fused_modules if steps == "fused" else chosen.modules
+    if steps == "stepped" and chosen.stepped:
+        own = chosen.stepped.modules
     modules = (
         *_problem_modules(formulation),
         *(f"simulation.integrators.{name}" for name in own),
@@ -278,10 +322,12 @@ def time_loop(chosen: Integrator, formulation: str, fused: bool) -> Loop:
         return loops(modules, ("integrate",))["integrate"]
 
 
-def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, fused: bool) -> int:
+def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, steps: str) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs."""
-    squares = chosen.fused_squares if fused else chosen.squares
-    own = chosen.rows * dim + squares * dim * dim + 3 * inputs + chosen.numbers
+    squares = chosen.fused_squares if steps == "fused" else chosen.squares
+    # Vectors of a stepped kernel are padded, block by block.
+    row = dim + 8 if steps == "stepped" else dim
+    own = chosen.rows * row + squares * dim * dim + 3 * inputs + chosen.numbers
     return scratch_end(n, inputs) + own
 
 
@@ -292,7 +338,9 @@ LOOP_SOURCES = (
     *(
         f"simulation.integrators.{name}"
         for own in INTEGRATORS.values()
-        for name in dict.fromkeys((*own.modules, *own.fused_modules))
+        for name in dict.fromkeys(
+            (*own.modules, *own.fused_modules, *(own.stepped.modules if own.stepped else ()))
+        )
     ),
     "simulation.integrators.structures",
     "simulation.integrators.loop",

@@ -17,6 +17,9 @@ import numpy as np
 SMALL, TERMS = 0.1, 10
 # Tables of a step size, see `etdrk4`: J, then functions of h J / 2 and h J.
 TABLES = 7
+JACOBIAN, HALF_FIRST, HALF_SECOND, FIRST, SECOND, MIDDLE, LAST = range(TABLES)
+# The tables' functions at argument zero, for states that no block belongs to.
+AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
 def phi_functions(matrix: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -1,0 +1,75 @@
+"""The W-method for a full model: a whole step is one kernel, see `step_text.w_step`."""
+
+from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
+from vehiclemor.simulation.formulations.full import rhs
+from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.simulation.integrators.step_grid import index_above
+from vehiclemor.simulation.integrators.structures import (
+    FUSED_STEP,
+    LINEAR_SOLVES,
+    RHS_CALLS,
+    Work,
+)
+
+ALPHA = 8
+# Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
+INLINED = ("accept", "longest_step", "step")
+
+
+def work_space(buffer, first, integers, dim, inputs):
+    """Scratch space from place `first` of the buffer on; what the step needs besides is last."""
+    given = vector(buffer, first, 2 * dim + 1 + 3 * inputs)
+    rows = matrix(buffer, first + len(given), 5, dim)
+    stride = (dim + 3) // 4 * 4
+    result = vector(buffer, first + len(given) + 5 * dim, 2 * stride)
+    return Work(
+        given[:dim],
+        given[dim : 2 * dim],
+        result[:dim],
+        rows[0],
+        result[stride : stride + dim],
+        rows[1],
+        rows,
+        rows[2:],
+        rows,
+        rows,
+        integers,
+        integers,
+        result,
+        given,
+        given[2 * dim + 1 :],
+        result,
+    )
+
+
+def begin(problem, t, method, work):
+    """Right-hand side at the beginning of a span."""
+    rhs(problem, t, work.y, work.f)
+    work.places[0] = len(method.grid) // 2
+
+
+def longest_step(h, method, control, work):
+    """Any step size will do: the operator of a step a little longer serves."""
+    return h
+
+
+def step(problem, t, h, method, work, counts):
+    """Try a step; it is always possible."""
+    given, values, u = work.given, work.values, problem.u
+    work.places[0] = index_above(method.grid, work.places[0], h)
+    given[2 * len(work.y)] = h
+    for stage in range(3):
+        input_at(problem, t + method.tableau[ALPHA, stage + 1] * h, u)
+        for i in range(len(u)):
+            values[stage * len(u) + i] = u[i]
+    equations, operator = problem.equations, method.operators[work.places[0]]
+    call_kernel(equations.kernels, FUSED_STEP, given, operator, equations.constants, work.result)
+    counts[RHS_CALLS] += 3
+    counts[LINEAR_SOLVES] += 4
+    return True
+
+
+def accept(problem, t, h, method, work, counts):
+    """Right-hand side at the end of the step."""
+    rhs(problem, t + h, work.new, work.f_new)
+    counts[RHS_CALLS] += 1

@@ -1,0 +1,71 @@
+"""Whole steps of a full model as one kernel are the steps of the general loops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vehiclemor.registry import component
+from vehiclemor.simulation import build
+from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.system import Solver, System
+
+# With pairs that turn with the heading and without; states in the mirror image and as they are.
+VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
+NO_PARTNERS = np.zeros(0, dtype=np.int64)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
+@pytest.mark.parametrize("mirror", [True, False])
+def test_a_step_as_one_kernel_is_the_step_of_the_loops(name, solver, mirror, monkeypatch):
+    model = build.build(name)
+    system = model.system if mirror else replace(model.system, partners=NO_PARTNERS)
+    maneuver = component("maneuver", component("model", name).maneuver)
+    start = model.start()
+
+    def run(of: System, tolerance: float):
+        found = of.run(maneuver, start, whole_space(len(start)), Solver(solver, tolerance))
+        assert not found.failure
+        return found
+
+    one = run(system, 2e-3)
+    assert system.steps(solver) == "stepped"
+    assert len(system.frame.blocks) == (2 if mirror else 1)
+    monkeypatch.setattr(catalogue, "MOST_STATES", 0)
+    general = replace(system)
+    other = run(general, 2e-3)
+    assert general.steps(solver) == ""
+    np.testing.assert_array_equal(one.counts, other.counts)
+    # Where a step is as long as one of the grid, rounding chooses between two stored inverses: the
+    # general loop too moves by the local error when its start moves by 1e-14.
+    np.testing.assert_allclose(one.path[:40], other.path[:40], rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(one.path, other.path, rtol=1e-3, atol=1e-3)
+
+
+def test_a_frame_is_turned_and_mirrored_and_back():
+    system = build.build("high_fidelity_vehicle").system
+    frame = system.frame
+    whole = frame.transform @ system.frozen_jacobian @ np.linalg.inv(frame.transform)
+    size = len(frame.blocks[0])
+    assert len(frame.blocks[1]) == size == 26
+    scale = np.abs(whole).max()
+    assert np.abs(whole[:size, size:]).max() < 1e-10 * scale
+    assert np.abs(whole[size:, :size]).max() < 1e-10 * scale
+    first, second = frame.diagonal(system.frozen_jacobian)
+    np.testing.assert_allclose(first, whole[:size, :size], atol=1e-9 * scale)
+    np.testing.assert_allclose(second, whole[size:, size:], atol=1e-9 * scale)
+
+
+def test_rows_behind_the_last_lane_are_padded():
+    system = build.build("high_fidelity_vehicle").system
+    tables = [np.arange(2.0 * n * n).reshape(1, 2, n, n) for n in (26, 26)]
+    packed = system.frame.packed(tables)[0, 0]
+    for table in range(2):
+        for k, first in enumerate(system.frame.entries(table)[:2]):
+            rows = packed[first:].reshape(-1)[: 28 * len(system.frame.columns[k])].reshape(-1, 28)
+            np.testing.assert_array_equal(
+                rows[:, :26], tables[k][0, table, list(system.frame.columns[k])]
+            )
+            assert not rows[:, 26:].any()
