@@ -60,7 +60,10 @@ def protocol_results(name):
     rng = np.random.default_rng(2)
     seconds = 10.0 ** rng.uniform(-5.0, -2.0, shape[:2])
     labels, methods, roles = zip(*rows, strict=True)
+    winners = [role == "contender" for role in roles]
+    winners = [w and not any(winners[:i]) for i, w in enumerate(winners)]
     by_row = {"method": methods, "role": roles, "settings": ["{}"] * n, "validation": ["[]"] * n}
+    by_row |= {"contestant": [label.rsplit(" ", 1)[0] for label in labels], "winner": winners}
     variables = {name: ("row", list(values)) for name, values in by_row.items()}
     for variable in ("effective_rank", "offline_evaluations"):
         variables[variable] = ("row", np.ones(n, dtype=int))
@@ -75,11 +78,13 @@ def protocol_results(name):
     status[-1, 0] = "diverged"
     variables["status"] = (("row", "scenario"), status)
     variables["message"] = (("row", "scenario"), np.full(shape[:2], "", dtype=object))
+    variables["trusted_until"] = (("row", "scenario"), np.full(shape[:2], np.inf))
     variables["calls"] = (("row", "scenario"), np.ones(shape[:2], dtype=int))
     places = {
         "row": list(labels),
         "scenario": scenarios,
-        "scenario_set": ("scenario", ["test", "test"]),
+        "scenario_set": ("scenario", ["drawn", "drawn"]),
+        "apart": ("scenario", ["", ""]),
         "output": outputs,
     }
     attributes = {

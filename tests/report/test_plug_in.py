@@ -70,7 +70,7 @@ def test_comparison_names_every_method(folder, capsys, monkeypatch):
         assert words in printed
     assert main(["compare", CAR, "--json", "--out", str(folder)]) == 0
     rows = json.loads(capsys.readouterr().out)
-    kinds = {"nominal", "perturbed", "cost", "spectrum", "method", "outside", "paper"}
+    kinds = {"nominal", "perturbed", "cost", "spectrum", "method", "paper"}
     assert kinds <= {row["kind"] for row in rows}
     unseen = {row["method"]: row for row in rows if row["kind"] == "method"}
     assert {"replay", "pod", "fixed basis", "strongest 2e-3"} <= set(unseen)

@@ -19,6 +19,14 @@ points = [[0.9, 1.0]]
 [[test]]
 maneuver = "chirp_travel"
 
+[drawn]
+runs = 5
+boxes = [{ maneuver = "sine_travel", frequency = [0.7, 2.0], amplitude = [0.5, 1.1] }]
+
+[drawn_outside]
+runs = 2
+boxes = [{ maneuver = "sine_travel", frequency = [0.7, 2.0], amplitude = [1.3, 1.4] }]
+
 [[contestants]]
 label = "newton"
 method = "full_order"

@@ -1,16 +1,20 @@
 """The timing pass: cases are known by their ids, and nothing is measured twice."""
 
 from dataclasses import replace
+from itertools import accumulate, count
 
 import numpy as np
 import pytest
 
 from vehiclemor.maneuver import sine_travel
 from vehiclemor.multibody.report import TimingCase
+from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
 from vehiclemor.study.scenario import Scenario, input_hash
-from vehiclemor.study.timing import timed_cases, timed_model
+from vehiclemor.study.timing import called, timed_cases, timed_model
 
 CASES = (
     TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
@@ -32,13 +36,40 @@ def test_speed_ups_are_against_ids_wherever_they_stand(suspension):
     assert float(data["speed_up"].sel(case="baseline")) == 1.0
     assert float(data["speed_up_strongest"].sel(case="strongest")) == 1.0
     assert float(data["speed_up"].sel(case="strongest")) > 1.0
-    assert np.isnan(float(data["speed_up"].sel(case="replay")))
+    assert np.isnan(float(data["loop_speed_up"].sel(case="replay")))
+    assert (data["loop_seconds"] < data["seconds"]).all()
     assert (data["seconds_lower"] <= data["seconds"]).all()
     assert (data["seconds"] <= data["seconds_upper"]).all()
     assert float(data["offline_seconds"].sel(case="pod_r3")) > 0.0
     assert float(data["offline_seconds"].sel(case="baseline")) == 0.0
     assert int(data["iterations"].sel(case="replay")) == 0
     assert (data["status"] == "ok").all()
+
+
+def test_what_a_model_tells_of_its_own_time_decides_nothing(suspension, monkeypatch):
+    honest = FullOrderModel.simulate
+
+    def flattering(self, maneuver, start):
+        return replace(honest(self, maneuver, start), seconds=0.0)
+
+    monkeypatch.setattr(FullOrderModel, "simulate", flattering)
+    # A clock that tells how often it has been read: twice more inside of a call.
+    monkeypatch.setattr(run_timer, "clock", count(0.0, 1e-3).__next__)
+    data = timed_cases(suspension, CASES[1::2], sine_travel, "equilibrium", 2)
+    assert float(data["loop_seconds"].sel(case="baseline")) == 0.0
+    assert np.isnan(data["loop_speed_up"]).all()
+    np.testing.assert_allclose(data["seconds"], 3e-3)
+    np.testing.assert_allclose(data["speed_up"], 1.0)
+
+
+def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(monkeypatch):
+    lengths = [100.0, 3.0, 50.0, 2.0]
+    steps = accumulate([0.0, *(step for length in lengths for step in (length, 0.0))])
+    monkeypatch.setattr(run_timer, "clock", lambda: next(steps))
+    ended = Trajectory(*[np.zeros((1, 1))] * 5, {}, 7.0)
+    assert called(lambda: ended, 4) == (3.0, 7.0)
+    monkeypatch.setattr(run_timer, "clock", count().__next__)
+    assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 
 def test_without_baselines_there_are_seconds_but_no_speed_ups(suspension):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
+from vehiclemor.simulation.checks import check_resolved
 
 factors = st.floats(0.1, 4.0)
 
@@ -54,6 +55,58 @@ def test_chirp_sweeps_from_its_first_to_its_last_frequency() -> None:
     assert np.all(np.diff(crossings, 2) < 0.0)
     slopes = np.abs(np.gradient(travel, times)[[0, -1]])
     assert slopes == pytest.approx(0.1 * 2 * np.pi * np.array([0.1, 0.4]), rel=1e-3)
+
+
+# Travel with a rack that moves
+
+TWO_WAY = ("travel_and_rack", "travel_and_rack_sweep", "travel_and_rack_multisine")
+
+
+@pytest.mark.parametrize("name", TWO_WAY)
+@settings(max_examples=20)
+@given(frequency=st.floats(0.7, 1.8), amplitude=st.floats(-1.15, 1.15))
+def test_travel_and_rack_stay_within_their_rectangle(
+    name: str, frequency: float, amplitude: float
+) -> None:
+    maneuver = component("maneuver", name).perturbed(frequency, amplitude)
+    largest = np.abs(maneuver.at(maneuver.times)).max(axis=0)
+    assert np.all(largest <= abs(amplitude) * np.array([0.1, 0.03]) * (1.0 + 1e-12))
+    check_resolved(maneuver)
+
+
+@pytest.mark.parametrize("name", TWO_WAY)
+def test_travel_and_rack_take_every_side_of_each_other(name: str) -> None:
+    inputs = component("maneuver", name).at(np.linspace(0.0, 10.0, 1001))
+    sides = {tuple(row) for row in np.sign(inputs[np.all(inputs != 0.0, axis=1)]).tolist()}
+    assert len(sides) == 4
+    # Not along a line.
+    assert abs(np.corrcoef(inputs.T)[0, 1]) < 0.4
+
+
+@pytest.mark.parametrize("name", ["travel_and_rack", "travel_and_rack_multisine"])
+def test_frequency_of_travel_and_rack_scales_time(name: str) -> None:
+    maneuver, times = component("maneuver", name), np.linspace(0.0, 5.0, 51)
+    faster = maneuver.perturbed(frequency=1.7).at(times)
+    np.testing.assert_allclose(faster, maneuver.at(1.7 * times), rtol=0, atol=1e-15)
+
+
+def test_travel_and_rack_never_repeat() -> None:
+    # Spectral lines in the golden ratio: no common period.
+    maneuver = component("maneuver", "travel_and_rack")
+    times = np.linspace(0.0, 1000.0, 100001)
+    lines = np.abs(np.fft.rfft(maneuver.at(times)[:-1], axis=0)).argmax(axis=0) / 1000.0
+    assert lines == pytest.approx([0.1, 0.1618], abs=1e-3)
+
+
+def test_the_sweeps_of_travel_and_rack_cross() -> None:
+    sweep = component("maneuver", "travel_and_rack_sweep")
+    times = np.linspace(0.0, 10.0, 100001)
+    inputs = sweep.at(times)
+    # The area of sin is zero at each whole turn: 0.25 and 0.33 Hz on average, so 2.5 and 3.3 turns.
+    crossings = [times[np.flatnonzero(np.diff(np.sign(column[1:-1])))] for column in inputs.T]
+    assert [len(found) for found in crossings] == [4, 6]
+    assert np.all(np.diff(crossings[0], 2) < 0.0)
+    assert np.all(np.diff(crossings[1], 2) > 0.0)
 
 
 @pytest.mark.parametrize(

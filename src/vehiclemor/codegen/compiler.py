@@ -37,7 +37,10 @@ OPTIONS = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
 }
-INTRINSICS = {name: getattr(loop_intrinsics, name) for name in ("vector", "matrix", "call_kernel")}
+INTRINSICS = {
+    name: getattr(loop_intrinsics, name)
+    for name in ("vector", "matrix", "call_kernel", "call_lanes")
+}
 
 
 class _Part(AOTCodeLibrary):

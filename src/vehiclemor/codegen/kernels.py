@@ -57,9 +57,15 @@ class Kernels:
     def __contains__(self, name: str) -> bool:
         return name in self.sources
 
-    def address(self, name: str) -> int:
-        """Address of a kernel's machine code, for loops; 0 where there is no such kernel."""
-        return _machine(self.sources[name])[0] if name in self.sources else 0
+    def address(self, name: str, lanes: int = 1) -> int:
+        """Address of a kernel's machine code, for loops; 0 where there is no such kernel.
+
+        Parameters
+        ----------
+        lanes
+            Samples that it takes at once, see `llvm_kernels.kernel_module`.
+        """
+        return _machine(self.sources[name], lanes)[0] if name in self.sources else 0
 
     def call(self, name: str, *arrays: np.ndarray) -> None:
         """Run a kernel.
@@ -75,7 +81,7 @@ class Kernels:
             If an array is too short or of another kind.
         """
         source = self.sources[name]
-        function = _machine(source)[1]
+        function = _machine(source, 1)[1]
         function(*[_checked(source, k, array) for k, array in enumerate(arrays)])
 
 
@@ -99,16 +105,16 @@ def _checked(source: KernelSource, place: int, array: Any) -> int:
 
 
 @once
-def _machine(source: KernelSource) -> tuple[int, Any, MachineCode]:
+def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
-    parts = [source.text, source_digest(("codegen",), (), ()), compiler_identity()]
+    parts = [source.text, str(lanes), source_digest(("codegen",), (), ()), compiler_identity()]
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_module
         from vehiclemor.codegen.llvm_kernels import KernelText, kernel_module
 
-        return compiled_module(kernel_module([KernelText(source.text)]))
+        return compiled_module(kernel_module([KernelText(source.text)], lanes))
 
     code = MachineCode(fetched(f"kernels/{source.name}-{key}.o", make))
     address = code.address(source.name)

@@ -12,7 +12,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from llvmlite import ir
 
@@ -26,6 +26,7 @@ VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
 POINTER = DOUBLE.as_pointer()
+LANE = ir.IntType(32)
 SOURCES: dict[str, ModuleType] = {
     "sincos": sincos,
     "atan": arctangent,
@@ -148,15 +149,26 @@ class _Expressions:
         if name == "power_of_two" and len(arguments) == 1:
             return self._power_of_two(arguments[0])
         if name.removeprefix("math.") in LIBRARY and name.startswith("math."):
-            double = [DOUBLE] * len(arguments)
-            function = _declared(self._builder, name.removeprefix("math."), DOUBLE, double)
-            return self._builder.call(function, arguments)
+            return self._library(name.removeprefix("math."), arguments)
         raise ValueError(f"{ast.unparse(node)}: {name} is not straight-line")
+
+    def _library(self, name: str, arguments: list[Any]) -> Any:
+        builder, kind = self._builder, arguments[0].type
+        function = _declared(builder, name, DOUBLE, [DOUBLE] * len(arguments))
+        if kind == DOUBLE:
+            return builder.call(function, arguments)
+        results = ir.Constant(kind, ir.Undefined)
+        for lane in range(kind.count):
+            single = [builder.extract_element(a, LANE(lane)) for a in arguments]
+            single = builder.call(function, single)
+            results = builder.insert_element(results, single, LANE(lane))
+        return results
 
     def _power_of_two(self, number: Any) -> Any:
         # The last bits of the sum are the whole number, also a negative one.
-        builder = self._builder
-        whole = ir.IntType(64) if number.type == DOUBLE else ir.VectorType(ir.IntType(64), WIDTH)
+        builder, whole = self._builder, ir.IntType(64)
+        if number.type != DOUBLE:
+            whole = ir.VectorType(whole, number.type.count)
         bits = builder.bitcast(builder.fadd(number, _constant(number.type, SHIFT)), whole)
         biased = builder.add(bits, _whole(whole, 1023))
         return builder.bitcast(builder.shl(biased, _whole(whole, 52)), number.type)
@@ -164,7 +176,7 @@ class _Expressions:
 
 def _function(builder: Any, name: str, *kinds: ir.Type) -> Any:
     """An LLVM function of floats or vectors, by its name without the suffix of its type."""
-    suffix = f"v{WIDTH}f64" if kinds[0] == VECTOR else "f64"
+    suffix = "f64" if kinds[0] == DOUBLE else f"v{kinds[0].count}f64"
     return _declared(builder, f"{name}.{suffix}", kinds[0], kinds)
 
 
@@ -177,11 +189,11 @@ def _declared(builder: Any, name: str, returned: ir.Type, kinds: Sequence[ir.Typ
 
 
 def _constant(kind: ir.Type, number: float) -> ir.Constant:
-    return ir.Constant(kind, [number] * WIDTH if kind == VECTOR else number)
+    return ir.Constant(kind, number if kind == DOUBLE else [number] * kind.count)
 
 
 def _whole(kind: ir.Type, number: int) -> ir.Constant:
-    return ir.Constant(kind, number if kind == ir.IntType(64) else [number] * WIDTH)
+    return ir.Constant(kind, number if kind == ir.IntType(64) else [number] * kind.count)
 
 
 @cache
@@ -252,26 +264,46 @@ def _places(node: ast.Subscript) -> tuple[int, ...]:
     return tuple(places)
 
 
-def kernel_module(kernels: Sequence[KernelText]) -> ir.Module:
-    """LLVM module of kernels, each a C function of pointers to floats by the kernel's name."""
+def kernel_module(kernels: Sequence[KernelText], lanes: int = 1) -> ir.Module:
+    """LLVM module of kernels, each a C function of pointers to floats by the kernel's name.
+
+    Parameters
+    ----------
+    lanes
+        Of how many samples a kernel computes the results at once.  If several, its arguments but
+        the constants are rows of matrices, and further arguments say how many floats from one row
+        to the next, in order.
+    """
     module = ir.Module("kernels")
     for kernel in kernels:
-        kind = ir.FunctionType(ir.VoidType(), [POINTER] * len(kernel.pointers))
-        function = ir.Function(module, kind, kernel.name)
+        strided = [name for name in kernel.pointers if name != "_constants"] if lanes > 1 else []
+        kinds = [POINTER] * len(kernel.pointers) + [ir.IntType(64)] * len(strided)
+        function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
         function.attributes.add("nounwind")
         builder = ir.IRBuilder(function.append_basic_block())
-        emit(kernel, builder, dict(zip(kernel.pointers, function.args, strict=True)))
+        given = dict(zip(kernel.pointers, function.args, strict=False))
+        strides = dict(zip(strided, function.args[len(given) :], strict=True))
+        emit(kernel, builder, {name: Rows(given[name], strides.get(name)) for name in given}, lanes)
         builder.ret_void()
     return module
 
 
-def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
+class Rows(NamedTuple):
+    """Where a kernel finds an argument: its first float, and the floats from lane to lane."""
+
+    first: Any
+    stride: Any = None
+
+
+def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int = 1) -> None:
     """Write the instructions of a kernel where the builder stands.
 
     Parameters
     ----------
-    pointers
-        Argument -> pointer to its first float; the scratch space needs none.
+    rows
+        Argument -> where it is; the scratch space is nowhere.
+    lanes
+        Samples at once, see `kernel_module`.
 
     Raises
     ------
@@ -280,16 +312,38 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
     """
     expressions = _Expressions(builder)
     values: dict[Key, Any] = {}
+    kind = DOUBLE if lanes == 1 else ir.VectorType(DOUBLE, lanes)
 
-    def address(name: str, place: int) -> Any:
-        return builder.gep(pointers[name], [ir.Constant(ir.IntType(64), place)])
+    def address(name: str, place: int, lane: int = 0) -> Any:
+        offset = ir.Constant(ir.IntType(64), place)
+        if lane:
+            moved = builder.mul(rows[name].stride, ir.Constant(ir.IntType(64), lane))
+            offset = builder.add(moved, offset)
+        return builder.gep(rows[name].first, [offset])
+
+    def load(name: str, place: int) -> Any:
+        number = builder.load(address(name, place))
+        if lanes == 1:
+            return number
+        if name == "_constants":
+            return weighted_sums.spread(builder, number, lanes)
+        vector = builder.insert_element(ir.Constant(kind, ir.Undefined), number, LANE(0))
+        for lane in range(1, lanes):
+            number = builder.load(address(name, place, lane))
+            vector = builder.insert_element(vector, number, LANE(lane))
+        return vector
+
+    def store(value: Any, place: int) -> None:
+        for lane in range(lanes):
+            single = value if lanes == 1 else builder.extract_element(value, LANE(lane))
+            builder.store(single, address("_result", place, lane))
 
     def pointer(node: ast.expr) -> Any:
         assert isinstance(node, ast.Subscript)
         return address(ast.unparse(node.value), _places(node)[0])
 
     def value(node: ast.expr) -> Any:
-        return expressions.value(node, read, DOUBLE)
+        return expressions.value(node, read, kind)
 
     def read(node: ast.expr) -> Any:
         # Loads come where they are needed first: registers are few.
@@ -301,7 +355,7 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
                 if array == "_work" and ("_work", places[0]) in values:
                     return values["_work", places[0]]
                 if array != "_work" and len(places) == 1:
-                    return builder.load(address(array, places[0]))
+                    return load(array, places[0])
         raise ValueError(f"{ast.unparse(node)}: unknown, or of the wrong shape")
 
     for statement in kernel.statements:
@@ -315,7 +369,7 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
                 if len(place) != kernel.dimensions:
                     raise ValueError(f"{ast.unparse(target)}: other results have another shape")
                 flat = place[0] if len(place) == 1 else place[0] * kernel.columns + place[1]
-                builder.store(value(expression), address("_result", flat))
+                store(value(expression), flat)
             case ast.Assign(
                 [ast.Tuple(elements)], ast.Call(ast.Name("sincos_one"), [argument], [])
             ) if len(elements) == 2:
@@ -331,15 +385,14 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
             ):
                 # One by one, each used at once: registers are few.
                 factors = (value(term) for term in terms)
-                results = weighted_sums.weighted_sums(
-                    builder, address(array, first), factors, len(elements)
-                )
+                sums = weighted_sums.weighted_sums if lanes == 1 else weighted_sums.sums_of_lanes
+                results = sums(builder, address(array, first), factors, len(elements))
                 values |= zip((ast.unparse(e) for e in elements), results, strict=True)
             case ast.Expr(
                 ast.Call(ast.Name(name), [ast.Name("_work"), ast.Constant(int() as first)], [])
             ) if name in BATCHES:
-                lanes = [values["_work", first + lane] for lane in range(LANES)]
-                results = _batch(builder, expressions, BATCHES[name], lanes)
+                given = [values["_work", first + lane] for lane in range(LANES)]
+                results = _batch(builder, expressions, BATCHES[name], given)
                 values |= {
                     ("_work", first + LANES + place): result for place, result in enumerate(results)
                 }
@@ -353,6 +406,10 @@ def emit(kernel: KernelText, builder: Any, pointers: Mapping[str, Any]) -> None:
 
 def _batch(builder: Any, expressions: _Expressions, name: str, lanes: Sequence[Any]) -> list[Any]:
     """Results of an elementary function for a batch of arguments, lane by lane."""
+    if lanes[0].type != DOUBLE:
+        # Vectors already, of samples.
+        found = [expressions.elementary(name, lane) for lane in lanes]
+        return [results[k] for k in range(len(RESULTS[name])) for results in found]
     places = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
     parts = []
     for first in range(0, LANES, WIDTH):

@@ -10,7 +10,7 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from vehiclemor.codegen.llvm_kernels import DOUBLE, KernelText, emit
+from vehiclemor.codegen.llvm_kernels import DOUBLE, KernelText, Rows, emit
 
 WORD = ir.IntType(64)
 
@@ -78,6 +78,41 @@ def call_kernel(
     return types.void(kernels, place, x, u, constants, result), generate
 
 
+@intrinsic
+def call_lanes(
+    typing_context: Any,
+    kernels: Any,
+    place: Any,
+    path: Any,
+    inputs: Any,
+    constants: Any,
+    result: Any,
+    first: Any,
+) -> Any:
+    """See `loop_types.call_lanes`; the matrices must have as many rows and columns."""
+    del typing_context
+    _require_plain(path, inputs, constants, result)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place, first = (context.cast(builder, args[k], sig.args[k], types.intp) for k in (1, 6))
+        address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
+        pointers, strides = [], []
+        for k in range(2, 6):
+            array = context.make_array(sig.args[k])(context, builder, args[k])
+            pointers.append(array.data)
+            if sig.args[k].ndim == 2:
+                strides.append(cgutils.unpack_tuple(builder, array.shape)[1])
+                pointers[-1] = builder.gep(array.data, [builder.mul(first, strides[-1])])
+        kinds = [DOUBLE.as_pointer()] * len(pointers) + [WORD] * len(strides)
+        kind = ir.FunctionType(ir.VoidType(), kinds)
+        function = builder.inttoptr(address, kind.as_pointer())
+        builder.call(function, pointers + strides, attrs=("nounwind",))
+        return context.get_dummy_value()
+
+    arguments = kernels, place, path, inputs, constants, result, first
+    return types.void(*arguments), generate
+
+
 def inlined_kernel(text: str) -> Any:
     """A kernel whose instructions are written where a loop calls it, given its arrays."""
     kernel = KernelText(text)
@@ -92,11 +127,11 @@ def inlined_kernel(text: str) -> Any:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             kinds = sig.args[0]
             given = cgutils.unpack_tuple(builder, args[0], len(kinds))
-            pointers = [
-                context.make_array(kind)(context, builder, value).data
+            rows = [
+                Rows(context.make_array(kind)(context, builder, value).data)
                 for kind, value in zip(kinds, given, strict=True)
             ]
-            emit(kernel, builder, dict(zip(kernel.pointers, pointers, strict=True)))
+            emit(kernel, builder, dict(zip(kernel.pointers, rows, strict=True)))
             return context.get_dummy_value()
 
         void: Any = types.void

@@ -36,6 +36,19 @@ def call_kernel(
     raise NotImplementedError(COMPILED_ONLY)
 
 
+def call_lanes(
+    kernels: IntVector,
+    place: int,
+    path: Matrix,
+    inputs: Matrix,
+    constants: Vector,
+    result: Matrix,
+    first: int,
+) -> None:
+    """Call such a kernel for `LANES` samples at once, from row `first` of the matrices on."""
+    raise NotImplementedError(COMPILED_ONLY)
+
+
 def declared_arguments(entry: Any) -> dict[str, Any]:
     """Declared types of the arguments of a loop's entry by name."""
     return {name: kind for name, kind in entry.__annotations__.items() if name != "return"}

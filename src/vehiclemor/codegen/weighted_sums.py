@@ -22,6 +22,8 @@ DOUBLE = ir.DoubleType()
 VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # Sums in turn, so that no addition waits for the one before it.
 CHAINS = 2
+# Sums of lanes that a loop makes at once.
+AT_ONCE = 12
 
 
 def weighted_sums(
@@ -43,7 +45,7 @@ def weighted_sums(
     vectors = padded(targets) // WIDTH
     chains: list[list[Any]] = [[None] * vectors for _ in range(CHAINS)]
     for j, term in enumerate(terms):
-        factor = spread(builder, term)
+        factor = spread(builder, term, WIDTH)
         sums = chains[j % CHAINS]
         for v in range(vectors):
             place = builder.gep(
@@ -73,11 +75,44 @@ def reach(call: ast.Call, targets: int) -> int:
     return first.value + padded(targets) * len(terms.elts)
 
 
-def spread(builder: Any, value: Any) -> Any:
+def sums_of_lanes(
+    builder: Any, coefficients: Any, terms: Iterable[Any], targets: int
+) -> list[ir.Value]:
+    """The same where terms are vectors of samples, in loops: written out it compiles slowly."""
+    factors = list(terms)
+    kind, count, word = factors[0].type, len(factors), ir.IntType(64)
+    with builder.goto_entry_block():
+        stored = builder.alloca(kind, count)
+    for j, factor in enumerate(factors):
+        builder.store(factor, builder.gep(stored, [word(j)]))
+    totals: list[Any] = []
+    for first in range(0, targets, AT_ONCE):
+        before, body = builder.block, builder.append_basic_block()
+        builder.branch(body)
+        builder.position_at_end(body)
+        j = builder.phi(word)
+        j.add_incoming(word(0), before)
+        own = range(first, min(first + AT_ONCE, targets))
+        sums = [builder.phi(kind) for _ in own]
+        row = builder.mul(j, word(padded(targets)))
+        factor = builder.load(builder.gep(stored, [j]))
+        for i, total in zip(own, sums, strict=True):
+            weight = builder.load(builder.gep(coefficients, [builder.add(row, word(i))]))
+            product = builder.fmul(spread(builder, weight, kind.count), factor, flags=FLAGS)
+            totals.append(builder.fadd(total, product, flags=FLAGS))
+            total.add_incoming(ir.Constant(kind, [0.0] * kind.count), before)
+            total.add_incoming(totals[-1], body)
+        following = builder.add(j, word(1))
+        j.add_incoming(following, body)
+        after = builder.append_basic_block()
+        builder.cbranch(builder.icmp_unsigned("<", following, word(count)), body, after)
+        builder.position_at_end(after)
+    return totals
+
+
+def spread(builder: Any, value: Any, width: int = WIDTH) -> Any:
     """A vector with the same value in all places."""
-    single = builder.insert_element(
-        ir.Constant(VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
-    )
-    nowhere = ir.Constant(VECTOR, ir.Undefined)
-    first = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    nowhere = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
+    single = builder.insert_element(nowhere, value, ir.Constant(ir.IntType(32), 0))
+    first = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
     return builder.shuffle_vector(single, nowhere, first)

@@ -159,7 +159,7 @@ class ModelDefinition(ShortRepr):
         outputs = tuple(output.name for output in self.outputs)
         return completed(self.report, self.kind, len(self.coordinates), outputs)
 
-    @property
+    @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the coordinates and, after them, of the speeds."""
         return tuple(q.name for q in (*self.coordinates, *self.speeds))

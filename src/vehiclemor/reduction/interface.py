@@ -95,6 +95,9 @@ class Method(ShortRepr):
         DOI of the publication, if there is one.
     refusal
         Model of such a kind -> why the method can't reduce it all the same; empty if it can.
+    own_limits
+        Whether its runs tell themselves when they leave what the model knows, or it knows no
+        bounds; else a run beyond the inputs of the training runs is not trusted.
     check
         (model, settings): raises `InputError` if valid settings don't fit the model or each other.
     presets
@@ -111,6 +114,7 @@ class Method(ShortRepr):
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all
+    own_limits: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

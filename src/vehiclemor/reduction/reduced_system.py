@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -11,13 +12,21 @@ from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+
+# Encoded starts that are kept.
+MOST_STARTS = 64
 
 
 def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
     return state
+
+
+def _nothing_told(_: Run, __: np.ndarray) -> None:
+    return
 
 
 def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
@@ -45,6 +54,8 @@ class ReducedSystem(ShortRepr):
     lift
         (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
         default the run's own.
+    judge
+        (run of the system, inputs) -> what the model tells of it; nothing by default.
     project
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     """
@@ -58,21 +69,47 @@ class ReducedSystem(ShortRepr):
     tolerance: float
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
+    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
     project: Callable[[np.ndarray], np.ndarray] | None = None
 
-    def run(self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None) -> Run:
-        """Path of the reduced states."""
+    def run(
+        self,
+        maneuver: Maneuver,
+        start: Start,
+        times: np.ndarray | None = None,
+        direct_until: float = np.inf,
+        begin: float = 0.0,
+    ) -> Run:
+        """Path of the reduced states, from a full state at a time; see `System.run`."""
         check_inputs(maneuver, self.model.definition)
-        state = self.encode(self.model.start(start), maneuver.at(np.zeros(1))[0])
-        how = Solver(self.solver, self.tolerance, times)
-        return self.system.run(maneuver, state, self.spaces, how)
+        # Output times begin with zero.
+        first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
+        state = self._encoded(start, first[0])
+        how = Solver(self.solver, self.tolerance, times, begin=begin)
+        return self.system.run(maneuver, state, self.spaces, how, direct_until)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Integrate, then lift to full states at the maneuver's output times."""
-        run = self.run(maneuver, start)
-        inputs = maneuver.at(run.times)
+    def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """State of a start; kept where it is a named one."""
+        if not isinstance(start, str):
+            return self.encode(self.model.start(start), inputs)
+        key = start, inputs.tobytes()
+        if key not in self._starts:
+            if len(self._starts) >= MOST_STARTS:
+                self._starts.clear()
+            self._starts[key] = self.encode(self.model.start(start), inputs)
+        return self._starts[key]
+
+    @cached_property
+    def _starts(self) -> dict[tuple[str, bytes], np.ndarray]:
+        return {}
+
+    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
+        """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+        run = self.run(maneuver, start, begin=begin)
+        inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
-        return self.model.recorded(maneuver, run, inputs, states)
+        found = self.model.recorded(maneuver, run, inputs, states)
+        return found.judged(self.judge(run, inputs))
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Projection of full states (samples, 2 n), if there is a subspace."""
@@ -85,6 +122,7 @@ def transformed_system(
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
     offline: Offline,
     settings: OnlineSettings,
+    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told,
 ) -> ReducedSystem:
     """Equations in other states than the model's.
 
@@ -94,6 +132,8 @@ def transformed_system(
         The equations; its kernel `full_state` gives the full state of a transformed one.
     encode
         (full state (2 n,), inputs) -> transformed state (dim,).
+    judge
+        See `ReducedSystem`.
     """
     dim = len(system.reference)
 
@@ -110,4 +150,5 @@ def transformed_system(
         settings.tolerance,
         encode,
         lift,
+        judge,
     )

@@ -25,7 +25,7 @@ def solved_path(
     """
     path = np.full((len(times), len(model.coordinates)), np.nan)
     solution = Solution(path, new_counts())
-    status, seconds = timed(prepare(solution), solution.counts)
+    status, seconds = timed(prepare(solution))
     sample = int(solution.counts[SAMPLE])
     failure = (status, sample) if status else None
     return model.trajectory(times, inputs, path, solution.counts, seconds, failure), sample

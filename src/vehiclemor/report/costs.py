@@ -50,6 +50,7 @@ def _row(data: xr.Dataset, counts: list[str]) -> dict[str, object]:
     spread = float(data["seconds_upper"] - data["seconds_lower"])
     status = str(data["status"].item())
     speed_ups = {name: float(data[name]) for name in ("speed_up", "speed_up_strongest")}
+    loops = {f"loop_{name}": float(data[f"loop_{name}"]) for name in speed_ups}
     # Time saved in a run; a run that has failed saves nothing.
     saved = [own * (ratio - 1.0) if status == "ok" else 0.0 for ratio in speed_ups.values()]
     even = [offline / s if s > 0.0 and offline > 0.0 else float("nan") for s in saved]
@@ -65,6 +66,8 @@ def _row(data: xr.Dataset, counts: list[str]) -> dict[str, object]:
         "tolerance": float(data["tolerance"]),
         "quartile_spread": spread / own if own > 0.0 else 0.0,
         **speed_ups,
+        "loop_us": float(data["loop_seconds"]) * 1e6,
+        **loops,
         **{f"rms_{o}": float(data["rms_error"].sel(output=o)) for o in data["output"].values},
         "offline_us": offline * 1e6,
         "break_even": even[0],

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import DESIGN_START
@@ -21,7 +22,9 @@ from vehiclemor.simulation.checks import (
     checked_inputs,
     output_times,
 )
+from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 
@@ -29,7 +32,7 @@ from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
-SOLVERS = ("newton", "newton_dense", "chord")
+SOLVERS = ("newton", "newton_dense", "chord", "newton_lanes")
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -41,6 +44,10 @@ REASONS = {
     newton_loops.SINGULAR: "the matrix of a linear system is singular",
     newton_loops.OFF_BRANCH: "Newton's method does not contract, however short the step",
 }
+
+
+# Times, inputs, and these as loops take them.
+Sampled = tuple[np.ndarray, np.ndarray, Ready]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +171,9 @@ class AlgebraicModel(Model):
             `newton`, the default: fresh Jacobians, generated elimination, started at the previous
             sample.  `newton_dense`: the same with dense elimination and partial pivoting.
             `chord`: constant inverse of the design position, started at a quadratic extrapolation;
-            where it does not contract, a fresh inverse, then Newton's method.
+            where it does not contract, a fresh inverse, then Newton's method.  `newton_lanes`:
+            Newton's method started at a quadratic extrapolation, the samples in vector lanes; where
+            that fails, `newton`.
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default.
 
@@ -176,14 +185,27 @@ class AlgebraicModel(Model):
             If an iteration fails; time and reachable range are named.
         """
         self.start(start)
+        if times is None:
+            sampled = self.sampled(maneuver)
+        else:
+            times = output_times(times, maneuver, repeats=True)
+            inputs = self.inputs_of(maneuver, times)
+            sampled = times, inputs, ready(newton_loops.Samples(inputs))
+        tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
+        return self._solved(sampled, "newton" if solver is None else solver, tolerance)
+
+    def sampled(self, maneuver: Maneuver) -> Sampled:
+        """Output times (samples,) in s of a maneuver and its inputs, which are ready for loops.
+
+        They are kept, so they can't be written.
+
+        Raises
+        ------
+        InputError
+            As of `inputs_of`.
+        """
         check_inputs(maneuver, self.definition)
-        times = output_times(times, maneuver, repeats=True)
-        return self.solve_path(
-            times,
-            self.inputs_of(maneuver, times),
-            "newton" if solver is None else solver,
-            NEWTON_TOLERANCE if tolerance is None else tolerance,
-        )
+        return _sampled(maneuver)
 
     def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
         """Inputs (samples, number of inputs) of a maneuver as the loops want them.
@@ -204,34 +226,77 @@ class AlgebraicModel(Model):
         tolerance: float = NEWTON_TOLERANCE,
     ) -> Trajectory:
         """Full-order solution for inputs (samples, number of inputs); see `simulate`."""
-        check_positive("tolerance", tolerance)
         times = checked_array(times, np.size(times), "times", self.name)
         inputs = checked_inputs(inputs, times, self.inputs)
+        sampled = times, inputs, ready(newton_loops.Samples(inputs))
+        return self._solved(sampled, solver, tolerance)
+
+    def _solved(self, sampled: Sampled, solver: str, tolerance: float) -> Trajectory:
+        check_positive("tolerance", tolerance)
+        times, inputs, given = sampled
+        if solver == "newton_lanes":
+            found, solver = self._side_by_side(sampled, tolerance), "newton"
+            if found is not None:
+                return found
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
-        further: tuple[str, ...] = ()
-        how: Any
-        if solver in ("newton", "newton_dense"):
-            entry, how = "newton_path", int(solver == "newton_dense")
-        elif solver != "chord":
-            raise unknown("solver", solver, SOLVERS)
-        else:
-            inverse = np.linalg.inv(self.jacobian(self.design, np.zeros(len(self.inputs))))
-            entry, how, further = "chord_path", inverse.T.copy(), ("simulation.chord_loops",)
-        mechanism, iteration = self._mechanism, self._iteration(tolerance, SHORTEST_STEP)
-        arguments = (mechanism, inputs, how, iteration, solution, self._buffer())
-        loop = self.loop(entry, *further)
-        status, seconds = timed(loop.prepared(*arguments), solution.counts)
-        stopped = int(solution.counts[newton_loops.SAMPLE]) if status else len(times)
-        beyond = np.flatnonzero((np.abs(path[:stopped]) > mechanism.stops).any(axis=1))
-        if not (status or len(beyond)):
+        loop, how = self._full_order(solver)
+        iteration, buffer = self._iteration(tolerance, SHORTEST_STEP), self._buffer()
+        run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
+        status, seconds = timed(run)
+        if not status:
             return self.trajectory(times, inputs, path, solution.counts, seconds)
-        sample = int(beyond[0]) if len(beyond) else stopped
-        path[sample:] = np.nan
+        sample = int(solution.counts[newton_loops.SAMPLE])
         self._check_reach(times, inputs, sample)
         failure = int(status), sample
         failed = self.trajectory(times, inputs, path, solution.counts, seconds, failure)
         raise ConvergenceError(f"{self.name}: {failed.message} ({solver})", failed)
+
+    def _side_by_side(self, sampled: Sampled, tolerance: float) -> Trajectory | None:
+        """Solution with the samples in vector lanes; none if it has failed."""
+        times, inputs, given = sampled
+        n, m, samples = len(self.coordinates), len(self.outputs), len(times)
+        if samples < LANES:
+            return None
+        # One table is written faster than two.
+        table = np.empty((samples, n + m))
+        solution = newton_loops.Solution(table, new_counts())
+        loop, kernels = self._full_order("newton_lanes")
+        iteration = self._iteration(tolerance, SHORTEST_STEP)
+        buffer = np.empty(LANES * (5 * n + len(self.inputs) + m) + n * (n + 2))
+        run = loop.prepared(self._ready_mechanism, given, kernels, iteration, solution, buffer)
+        status, seconds = timed(run)
+        if status:
+            return None
+        path, outputs = table[:, :n], table[:, n:]
+        return self.trajectory(times, inputs, path, solution.counts, seconds, None, outputs)
+
+    def _full_order(self, solver: str) -> tuple[Loop, Any]:
+        """Loop of a solver, and what it needs beside the mechanism; kept for further runs."""
+        if solver not in self._kept:
+            how: Any
+            if solver in ("newton", "newton_dense"):
+                modules, how = ("newton_path",), int(solver == "newton_dense")
+            elif solver == "chord":
+                modules = "chord_path", "simulation.chord_loops"
+                jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
+                how = np.linalg.inv(jacobian).T.copy()
+            elif solver == "newton_lanes":
+                modules, names = ("lane_path", "simulation.lane_loops"), ("newton_step", "outputs")
+                addresses = [address_of(self.kernels, name, LANES) for name in names]
+                how = np.array(addresses, dtype=np.int64)
+            else:
+                raise unknown("solver", solver, SOLVERS)
+            self._kept[solver] = self.loop(*modules), how
+        return self._kept[solver]
+
+    @cached_property
+    def _kept(self) -> dict[str, tuple[Loop, Any]]:
+        return {}
+
+    @cached_property
+    def _ready_mechanism(self) -> Ready:
+        return ready(self._mechanism)
 
     def _iteration(self, tolerance: float, shortest: float) -> newton_loops.Iteration:
         return newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, shortest)
@@ -244,8 +309,12 @@ class AlgebraicModel(Model):
         counts: np.ndarray,
         seconds: float,
         failure: tuple[int, int] | None = None,
+        outputs: np.ndarray | None = None,
     ) -> Trajectory:
-        """Trajectory of a path of coordinates; `failure` is (status, sample) of a stopped loop."""
+        """Trajectory of a path of coordinates; `failure` is (status, sample) of a stopped loop.
+
+        Outputs are those of the path where none are given.
+        """
         status, message = "ok", ""
         if failure is not None:
             status = "diverged"
@@ -255,7 +324,7 @@ class AlgebraicModel(Model):
             inputs,
             path,
             np.empty((len(path), 0)),
-            self.along("outputs", path, inputs),
+            self.along("outputs", path, inputs) if outputs is None else outputs,
             {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=False)},
             seconds,
             status,
@@ -289,6 +358,13 @@ class AlgebraicModel(Model):
                 f"(from {heights.min():.4g} to {heights.max():.4g} m are asked for); the reachable "
                 f"range is {low:.4f} to {high:.4f} m (rack at {rack:g} m)"
             )
+
+
+@lru_cache(maxsize=64)
+def _sampled(maneuver: Maneuver) -> Sampled:
+    times, inputs = recorded_inputs(maneuver)
+    checked_inputs(inputs, times, maneuver.inputs)
+    return times, inputs, ready(newton_loops.Samples(inputs))
 
 
 def new_counts() -> np.ndarray:

@@ -1,14 +1,17 @@
 """Checks at the border of a model that is ready to run, and of what its runs give."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import quoted, real_array
+from vehiclemor.arguments import number, quoted, real_array, within
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
+
+OFF_GROUND = "off the ground for a time"
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -79,6 +82,12 @@ def check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
     if not isinstance(maneuver, Maneuver):
         wrong = quoted(maneuver)
         raise InputError(f"{wrong} is not a maneuver: get one by its name from the registry")
+    _check_inputs(maneuver, definition)
+
+
+# A maneuver is checked once for all its runs.
+@lru_cache(maxsize=64)
+def _check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
     names = tuple(quantity.name for quantity in definition.inputs)
     if maneuver.inputs != names:
         raise InputError(
@@ -140,6 +149,7 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
         raise InputError(f"{name} is {quoted(value)}; it must be a finite number, {bound}")
 
 
+@lru_cache(maxsize=64)
 def cut_short(maneuver: Maneuver) -> str:
     """That a maneuver goes on after the end of its run, if it does."""
     last = max(maneuver.break_points, default=0.0)
@@ -148,8 +158,10 @@ def cut_short(maneuver: Maneuver) -> str:
     return f"the maneuver would end at {last:.4g} s, after the run"
 
 
-def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.ndarray:
-    """Output times (samples,) in s; the maneuver's where none are given.
+def output_times(
+    given: Any, maneuver: Maneuver, repeats: bool = False, begin: float = 0.0
+) -> np.ndarray:
+    """Output times (samples,) in s; the maneuver's from `begin` on where none are given.
 
     Parameters
     ----------
@@ -161,8 +173,11 @@ def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.nd
     InputError
         If they don't increase within the maneuver.
     """
+    if begin:
+        within("begin", number("begin", begin), (0.0, maneuver.duration), " s")
     if given is None:
-        return maneuver.times
+        times = maneuver.times
+        return times[times >= begin] if begin else times
     try:
         times = loop_array(given)
     except (TypeError, ValueError):
@@ -173,14 +188,35 @@ def output_times(given: Any, maneuver: Maneuver, repeats: bool = False) -> np.nd
     steps = np.diff(times)
     if not (np.isfinite(times).all() and np.all(steps >= 0.0 if repeats else steps > 0.0)):
         raise InputError("output times must be finite and increasing")
-    if len(times) == 0 or times[0] < 0.0 or times[-1] > maneuver.duration + slack:
-        raise InputError(f"output times must lie within the maneuver, 0 to {maneuver.duration:g} s")
+    if len(times) == 0 or times[0] < begin or times[-1] > maneuver.duration + slack:
+        raise InputError(
+            f"output times must lie within the run, {begin:g} to {maneuver.duration:g} s"
+        )
     return times
 
 
+def limits_of(definition: ModelDefinition) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """What outputs are watched for.
+
+    Returns
+    -------
+    tuple
+        Names of the outputs with a range of validity; numbers (limits,) of these and, after them,
+        of the loads; their smallest and largest values (limits, 2).
+    """
+    names = [quantity.name for quantity in definition.outputs]
+    # An input is checked before the run.
+    valid = {name: r for name, r in definition.validity.items() if name in names}
+    # The smallest positive number: no load is none.
+    ranges = [*valid.values(), *((5e-324, np.inf) for _ in definition.loads)]
+    places = np.array([names.index(name) for name in (*valid, *definition.loads)], dtype=np.int64)
+    return list(valid), places, np.array(ranges, dtype=float).reshape(-1, 2)
+
+
 def left_validity(
-    validity: Mapping[str, tuple[float, float]],
+    definition: ModelDefinition,
     names: Sequence[str],
+    first: Sequence[int],
     times: np.ndarray,
     outputs: np.ndarray,
 ) -> tuple[str, int]:
@@ -188,42 +224,38 @@ def left_validity(
 
     Parameters
     ----------
-    validity
-        Output -> (smallest, largest) value at which the model means anything.
-    names, times, outputs
-        Names of the outputs, times (samples,) in s, histories (samples, outputs).
+    names, first
+        Outputs with a range, and first sample of each that is outside; samples if none is.
+    times, outputs
+        Times (samples,) in s, histories (samples, outputs).
     """
-    first, message = len(times), ""
-    for name, (low, high) in validity.items():
-        # An input: it is checked before the run.
-        if name not in names:
-            continue
-        values = outputs[:, names.index(name)]
-        outside = np.flatnonzero(~((values >= low) & (values <= high)))
-        if len(outside) and outside[0] < first:
-            first = int(outside[0])
-            message = (
-                f"{name} is {values[first]:.4g} at t = {times[first]:.6g} s; the model holds "
-                f"from {low:g} to {high:g}"
-            )
-    return message, first
+    sample = min(first, default=len(times))
+    if sample == len(times):
+        return "", sample
+    name = names[first.index(sample)]
+    low, high = definition.validity[name]
+    value = outputs[sample, [quantity.name for quantity in definition.outputs].index(name)]
+    return (
+        f"{name} is {value:.4g} at t = {times[sample]:.6g} s; the model holds "
+        f"from {low:g} to {high:g}"
+    ), sample
 
 
-def lifted_wheels(
-    loads: Sequence[str], names: Sequence[str], times: np.ndarray, outputs: np.ndarray
-) -> str:
+def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:
     """Which wheels have been off the ground, and when first; empty if none."""
-    off = {}
-    for name in loads:
-        lifted = np.flatnonzero(outputs[:, names.index(name)] <= 0.0)
-        if len(lifted):
-            off[name.removeprefix("Fz_")] = float(times[lifted[0]])
-    if not off:
+    if min(first, default=len(times)) == len(times):
         return ""
+    off = {
+        name.removeprefix("Fz_"): times[sample]
+        for name, sample in zip(loads, first, strict=True)
+        if sample < len(times)
+    }
     wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
-    return f"off the ground for a time: {wheels}"
+    return f"{OFF_GROUND}: {wheels}"
 
 
 def loop_array(values: Any) -> np.ndarray:
     """Floats in the one kind of array that the loops are compiled for."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.carray:
+        return values
     return np.require(real_array(values), float, ("C", "A", "W"))

@@ -20,6 +20,7 @@ from vehiclemor.simulation.newton_loops import (
     scratch,
     small_solve,
     stopped,
+    within,
 )
 
 # Largest ratio of the first two corrections: the same inverse across a fold can't contract.
@@ -107,9 +108,9 @@ def chord_path(
             taken = approach(q, u, target, mechanism, iteration, work)
             evaluations += abs(taken)
             jacobians += abs(taken)
-            if taken < 0:
-                status = OFF_BRANCH
-                break
+        if taken < 0 or not within(q, mechanism.stops):
+            status = OFF_BRANCH
+            break
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):

@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.simulation.checks import check_inputs, cut_short, left_validity, lifted_wheels
+from vehiclemor.simulation.checks import (
+    check_inputs,
+    cut_short,
+    left_validity,
+    lifted_wheels,
+    limits_of,
+    loop_array,
+)
+from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Run, Solver, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
+NO_PLACES = np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +135,7 @@ class DynamicModel(Model):
         solver: str | None = None,
         tolerance: float | None = None,
         longest_step: float | None = None,
+        begin: float = 0.0,
     ) -> Trajectory:
         """Full-order trajectory at the given times (the maneuver's output times by default).
 
@@ -143,6 +157,8 @@ class DynamicModel(Model):
             Largest local error of a state relative to its typical size plus its own.
         longest_step
             In s; unlimited by default.
+        begin
+            Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
 
         Raises
         ------
@@ -159,6 +175,7 @@ class DynamicModel(Model):
             REFERENCE_TOLERANCE if tolerance is None else tolerance,
             times,
             longest_step,
+            begin,
         )
         if trajectory.status != "ok":
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
@@ -173,6 +190,7 @@ class DynamicModel(Model):
         tolerance: float,
         times: np.ndarray | None = None,
         longest_step: float | None = None,
+        begin: float = 0.0,
     ) -> Trajectory:
         """Trajectory of the full or a projected system; a divergence is recorded in it.
 
@@ -186,19 +204,25 @@ class DynamicModel(Model):
         check_inputs(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
-        how = Solver(solver, tolerance, times, longest_step)
-        run = self.system.run(maneuver, state, windows, how)
-        return self.recorded(maneuver, run, maneuver.at(run.times), run.path)
+        how = Solver(solver, tolerance, times, longest_step, begin)
+        run = self.system.run(maneuver, state, windows, how, 0.0)
+        whole = times is None and not begin
+        inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
+        return self.recorded(maneuver, run, inputs, run.path)
 
     def recorded(
         self, maneuver: Maneuver, run: Run, inputs: np.ndarray, states: np.ndarray
     ) -> Trajectory:
-        """Trajectory of a run whose path has been brought to states (samples, 2 n) of the model."""
-        trajectory = self.trajectory(
-            run.times, inputs, states, run.counts, run.seconds, run.failure
-        )
-        remarks = (trajectory.remark, cut_short(maneuver))
-        return replace(trajectory, remark="; ".join(remark for remark in remarks if remark))
+        """Trajectory of a run whose path has been brought to the model's states.
+
+        Parameters
+        ----------
+        inputs
+            At the output times (samples, inputs).
+        states
+            Where the run is recorded: 2 n columns, and what may follow them.
+        """
+        return self._told(run, inputs, states, cut_short(maneuver))
 
     def trajectory(
         self,
@@ -210,23 +234,71 @@ class DynamicModel(Model):
         failure: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        outputs = self.along("outputs", states, inputs)
-        message, sample = failure, len(times)
-        if not failure:
-            message, sample = left_validity(self.definition.validity, self.outputs, times, outputs)
-            # What follows means nothing.
-            states[sample:], outputs[sample:] = np.nan, np.nan
-        status = "diverged" if message else "ok"
+        run = Run(times, states, np.asarray(counts), seconds, failure)
+        return self._told(run, loop_array(inputs), loop_array(states), "")
+
+    def _told(self, run: Run, inputs: np.ndarray, states: np.ndarray, remark: str) -> Trajectory:
+        """See `recorded`; a remark is added to what there is to remark."""
+        states, outputs, first = self._delivered(run, inputs, states)
+        (names, *_), times = self._limits, run.times
+        message, sample = run.failure, len(times)
+        if not message:
+            of_outputs = first[: len(names)]
+            message, sample = left_validity(self.definition, names, of_outputs, times, outputs)
+            if message:
+                # What follows means nothing.
+                states[sample:], outputs[sample:] = np.nan, np.nan
+        lifted = lifted_wheels(self.definition.loads, first[len(names) :], times)
         n = len(self.coordinates)
         return Trajectory(
             times,
             inputs,
             states[:, :n],
-            states[:, n:],
+            states[:, n : 2 * n],
             outputs,
-            {name: int(count) for name, count in zip(DYNAMIC_COUNTS, counts, strict=True)},
-            seconds,
-            status,
+            dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            run.seconds,
+            "diverged" if message else "ok",
             message,
-            lifted_wheels(self.definition.loads, self.outputs, times, outputs),
+            "; ".join(text for text in (lifted, remark) if text),
         )
+
+    @cached_property
+    def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+        return limits_of(self.definition)
+
+    @cached_property
+    def _observers(self) -> dict[int, Ready]:
+        return {}
+
+    def _observer(self, lanes: int) -> Ready:
+        if lanes not in self._observers:
+            kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
+            observer = Observer(kernel, self.constants, *self._limits[1:])
+            self._observers[lanes] = ready(observer)
+        return self._observers[lanes]
+
+    def _delivered(
+        self, run: Run, inputs: np.ndarray, states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, list[int]]:
+        """States and outputs at the samples, and when each output is first out of its limits.
+
+        That is the number of all samples where it never is.
+        """
+        samples, size = len(run.times), len(self.outputs)
+        outputs = np.empty((samples, size))
+        first = np.empty(len(self._limits[1]), dtype=np.int64)
+        observer = self._observer(LANES if len(states) >= LANES else 1)
+        whole, scratch, places = states, NO_PLACES, NO_PLACES
+        if run.points is not None:
+            inputs, places = run.points.inputs, run.points.places
+            whole = np.empty((samples, 2 * len(self.coordinates)))
+            scratch = np.empty((len(states), size))
+        arguments = states, inputs, places, observer, scratch, whole, outputs, first
+        path_loops()["delivered"](*arguments)
+        found = first.tolist()
+        if run.failure:
+            # From the failure on there are no numbers, which says nothing of limits.
+            reached = int(np.isfinite(whole).all(axis=1).sum())
+            found = [samples if sample == reached else sample for sample in found]
+        return whole, outputs, found

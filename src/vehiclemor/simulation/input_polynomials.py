@@ -14,11 +14,21 @@ import numpy as np
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
 DEGREE = 5
+
+
+@lru_cache(maxsize=64)
+def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+    """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
+    times = maneuver.times
+    inputs = loop_array(maneuver.at(times))
+    times.flags.writeable = inputs.flags.writeable = False
+    return times, inputs
 
 
 @lru_cache(maxsize=64)

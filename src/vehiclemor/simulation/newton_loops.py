@@ -69,6 +69,12 @@ class Mechanism(NamedTuple):
     orientation: Int
 
 
+class Samples(NamedTuple):
+    """Inputs at the samples (samples, INPUTS), to be made ready once."""
+
+    inputs: Matrix
+
+
 class Work(NamedTuple):
     """Scratch space: a step (N,), coordinates to return to (N,), a matrix (N, N + 1)."""
 
@@ -102,6 +108,7 @@ INLINED = (
     "newton",
     "largest_of",
     "stopped",
+    "within",
 )
 
 
@@ -326,6 +333,8 @@ def newton_path(
                 if taken < 0:
                     return stopped(counts, iterations, iterations, OFF_BRANCH)
                 break
+        if not within(q, mechanism.stops):
+            return stopped(counts, iterations, iterations, OFF_BRANCH)
         for i in range(INPUTS):
             previous[i] = target[i]
         for i in range(N):

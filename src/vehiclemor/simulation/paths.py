@@ -8,6 +8,7 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
 from vehiclemor.simulation.checks import checked_path
 
@@ -40,21 +41,42 @@ def along(
     """
     states = checked_path(paths[0], sizes[0], "states", finite=finite)
     inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
-    result = np.empty((len(states), sizes[2]))
-    address = np.array([address_of(kernels, name)], dtype=np.int64)
-    path_loops()["kernel_path"](states, inputs, address, constants, result)
+    return results(kernels, name, constants, (states, inputs), sizes[2])
+
+
+def results(
+    kernels: Kernels,
+    name: str,
+    constants: np.ndarray,
+    paths: tuple[np.ndarray, np.ndarray],
+    size: int,
+) -> np.ndarray:
+    """The same of paths that are known to be what the kernel reads."""
+    states, inputs = paths
+    result = np.empty((len(states), size))
+    if len(states) < LANES:
+        address = np.array([address_of(kernels, name)], dtype=np.int64)
+        path_loops()["kernel_path"](states, inputs, address, constants, result)
+    else:
+        address = np.array([address_of(kernels, name, LANES)], dtype=np.int64)
+        path_loops()["lane_path"](states, inputs, address, constants, result)
     return result
 
 
-def address_of(kernels: Kernels, name: str) -> int:
+def address_of(kernels: Kernels, name: str, lanes: int = 1) -> int:
     """Address of a kernel for compiled loops, which don't look before they call it.
+
+    Parameters
+    ----------
+    lanes
+        Samples that it takes at once.
 
     Raises
     ------
     InputError
         If there is none.
     """
-    address = kernels.address(name)
+    address = kernels.address(name, lanes)
     if not address:
         raise InputError(f"the equations have no {name}")
     return address
@@ -62,4 +84,4 @@ def address_of(kernels: Kernels, name: str) -> int:
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    return loops(PATH_LOOPS, ("kernel_path", "jacobian_at"))
+    return loops(PATH_LOOPS, ("kernel_path", "lane_path", "delivered", "jacobian_at"))

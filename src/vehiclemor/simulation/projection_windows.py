@@ -47,28 +47,30 @@ class ProjectionWindows(ShortRepr):
     def _spans(self) -> dict[tuple[bytes, float], Ready]:
         return {}
 
-    def spans(self, breaks: np.ndarray, end: float) -> Ready:
-        """Spans without a break point or window edge inside, from 0 to `end`; kept for more runs.
+    def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
+        """Spans from `begin` to `end`, no break point or window edge inside; whole ones are kept.
 
         Parameters
         ----------
         breaks
             Ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
         """
+        if begin:
+            return ready(smooth_spans(breaks, self.edges, end, begin))
         key = breaks.tobytes(), end
         if key not in self._spans:
             self._spans[key] = ready(smooth_spans(breaks, self.edges, end))
         return self._spans[key]
 
 
-def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float) -> Spans:
-    """Spans from 0 to `end` without a break point of the inputs or a window edge inside."""
-    cuts = np.unique(np.concatenate([breaks, edges, [0.0, end]]))
-    cuts = cuts[cuts <= end]
+def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float = 0.0) -> Spans:
+    """Spans from `begin` to `end` without a break point of the inputs or a window edge inside."""
+    cuts = np.unique(np.concatenate([breaks, edges, [begin, end]]))
+    cuts = cuts[(cuts >= begin) & (cuts <= end)]
     # Times that differ by rounding are one.
     cuts = cuts[np.concatenate([[True], np.diff(cuts) > 1e-9 * max(end, 1.0)])]
     # Also a run that ends at once has a span, to be recorded in.
-    cuts = np.array([0.0, end]) if len(cuts) == 1 else cuts
+    cuts = np.array([begin, end]) if len(cuts) == 1 else cuts
     cuts[-1] = end
     middles = (cuts[1:] + cuts[:-1]) / 2.0
     segments = np.clip(np.searchsorted(breaks, middles) - 1, 0, len(breaks) - 2)

@@ -11,14 +11,16 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, Ready, ready
+from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, loop_array, output_times
-from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.step_text import Frame
 from vehiclemor.simulation.integrators.structures import (
+    NODES,
     NOT_FINITE,
     SINGULAR,
     STEP_TOO_SMALL,
@@ -35,12 +37,16 @@ from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
+# Maneuvers whose plans are kept.
+MOST_PLANS = 64
 REASONS = {
     TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side",
     NOT_FINITE: "a state is not finite",
     SINGULAR: "the matrix of a linear system is singular",
     STEP_TOO_SMALL: "the step size has become too small",
 }
+# Of a run that is recorded at the samples: no inputs, points and places.
+NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
 # Kernels that a formulation calls; a fused step comes besides.
 CALLED = {
     "full": ("derivative",),
@@ -48,6 +54,22 @@ CALLED = {
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
 }
+
+
+class Points(NamedTuple):
+    """Points at which a run is recorded, see `structures.Output`.
+
+    Attributes
+    ----------
+    inputs, moments
+        Inputs (points, inputs) at the points, and their times (points,) in s.
+    places
+        How the samples follow from them (samples, 2).
+    """
+
+    inputs: np.ndarray
+    moments: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -59,13 +81,15 @@ class Run:
     times
         Output times (samples,) in s.
     path
-        States (samples, dim) at these times; NaN from a failure on.
+        States (samples, dim) at these times, NaN from a failure on; or at `points`.
     counts
         Numbers in the order of `DYNAMIC_COUNTS`.
     seconds
         Time spent in the compiled loop.
     failure
         Why the run has ended early, empty if it has not.
+    points
+        Where it is recorded, if not at the output times.
     """
 
     times: np.ndarray
@@ -73,6 +97,7 @@ class Run:
     counts: np.ndarray
     seconds: float
     failure: str
+    points: Points | None = None
 
 
 class Solver(NamedTuple):
@@ -88,12 +113,15 @@ class Solver(NamedTuple):
         Output times (samples,) in s, the maneuver's by default.
     longest_step
         In s; unlimited by default.
+    begin
+        Time in s at which the run begins with its state, in mid-maneuver if it isn't 0.
     """
 
     name: str
     tolerance: float
     times: np.ndarray | None = None
     longest_step: float | None = None
+    begin: float = 0.0
 
 
 class RunArguments(NamedTuple):
@@ -109,6 +137,28 @@ class RunArguments(NamedTuple):
     output: Output
     buffer: np.ndarray
     integers: np.ndarray
+
+
+class Plan(NamedTuple):
+    """What runs of a system over the same maneuver share.
+
+    Attributes
+    ----------
+    arguments
+        Those that are not shared are empty.
+    sizes
+        Numbers of states, of floats of scratch space and of integers.
+    windows
+        Kept alive: a plan is found by the object.
+    cubic
+        Whether dense output is a cubic in each step, and the run may be recorded at points.
+    """
+
+    loop: Loop
+    arguments: RunArguments
+    sizes: tuple[int, int, int]
+    windows: ProjectionWindows
+    cubic: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,55 +328,113 @@ class System(ShortRepr):
         return self._ready[key]
 
     def run(
-        self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
+        self,
+        maneuver: Maneuver,
+        state: np.ndarray,
+        windows: ProjectionWindows,
+        solver: Solver,
+        direct_until: float = np.inf,
     ) -> Run:
         """Integrate from a state (n,) over a maneuver.
+
+        Parameters
+        ----------
+        direct_until
+            Time in s from which on the run may be recorded at points, see `structures.Output`.
 
         Raises
         ------
         InputError
             If a value is out of bounds or a name is unknown.
         """
-        loop, arguments = self.prepared(maneuver, state, windows, solver)
+        loop, arguments = self.prepared(maneuver, state, windows, solver, direct_until)
         output = arguments.output
-        status, seconds = timed(loop.prepared(*arguments), output.counts)
+        status, seconds = timed(loop.prepared(*arguments))
         failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
-        return Run(output.samples, output.path, output.counts, seconds, failure)
+        path, times, places = output.path, output.samples, output.places
+        if not len(places):
+            return Run(times, path, output.counts, seconds, failure)
+        reached = int(places[:, 0].argmax()) if status else -1
+        row, part = places[reached].tolist()
+        # Kernels take so many at once.
+        end = max(int(row) + (1 if part < 0.0 else NODES), LANES)
+        points = Points(output.inputs[:end], output.moments[:end], places)
+        return Run(times, path[:end], output.counts, seconds, failure, points)
 
     def prepared(
-        self, maneuver: Maneuver, state: np.ndarray, windows: ProjectionWindows, solver: Solver
+        self,
+        maneuver: Maneuver,
+        state: np.ndarray,
+        windows: ProjectionWindows,
+        solver: Solver,
+        direct_until: float = np.inf,
     ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
         longest = solver.longest_step
         check_positive("tolerance", solver.tolerance, SMALLEST_TOLERANCE)
         if longest is not None:
             check_positive("longest_step", longest)
+        key = maneuver, id(windows), solver.name
+        whole = solver.times is None and not solver.begin
+        plan = self._plans.get(key) if whole else None
+        if plan is None:
+            plan = self._plan(maneuver, windows, solver)
+            if whole:
+                if len(self._plans) >= MOST_PLANS:
+                    self._plans.clear()
+                self._plans[key] = plan
+        arguments = plan.arguments
+        n, floats, integers = plan.sizes
+        assert len(state) == n, f"{len(state)} states in a space of {n} dimensions"
+        times, counts = arguments.output.samples, np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
+        size, points = len(times), NO_POINTS
+        if plan.cubic and direct_until < times[-1] and size >= LANES:
+            given = recorded_inputs(maneuver)[1]
+            inputs, moments = np.empty((size, self.inputs)), np.empty(size)
+            points = given, inputs, moments, np.empty((size, 2))
+        output = Output(times, np.empty((size, n)), counts, *points, direct_until)
+        return plan.loop, arguments._replace(
+            start=loop_array(state),
+            control=catalogue.control_of(
+                solver.name, float(solver.tolerance), float(longest or np.inf)
+            ),
+            output=output,
+            buffer=np.empty(floats),
+            integers=np.empty(integers, dtype=np.int64),
+        )
+
+    @cached_property
+    def _plans(self) -> dict[tuple, Plan]:
+        return {}
+
+    def _plan(self, maneuver: Maneuver, windows: ProjectionWindows, solver: Solver) -> Plan:
+        """What runs of a maneuver share."""
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
-        times = output_times(solver.times, maneuver)
+        times = output_times(solver.times, maneuver, begin=solver.begin)
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
         steps = self.steps(name) if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
-        dim, n = int(windows.ranks.max()), len(state)
-        assert dim == n or not full, f"{n} states in a space of {dim} dimensions"
+        dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
+        nothing = np.empty(0)
         arguments = RunArguments(
-            loop_array(state),
+            nothing,
             self.called(formulation, name if steps else ""),
             signal,
-            windows.spans(signal.bundle.edges, end),
+            windows.spans(signal.bundle.edges, end, solver.begin),
             windows.subspaces,
             self.method(name, active),
-            catalogue.control_of(name, float(solver.tolerance), float(longest or np.inf)),
-            Output(
-                times,
-                np.full((len(times), n), np.nan),
-                np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64),
-            ),
-            np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, steps)),
-            np.empty(dim + 8, dtype=np.int64),
+            windows.subspaces,
+            Output(times, nothing, nothing, *NO_POINTS, np.inf),
+            nothing,
+            nothing,
         )
-        return catalogue.time_loop(chosen, formulation, steps), arguments
+        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
+        loop = catalogue.time_loop(chosen, formulation, steps)
+        whole = solver.times is None and not solver.begin
+        cubic = whole and "cubic" in chosen.modules
+        return Plan(loop, arguments, (n, floats, dim + 8), windows, cubic)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.validation import checked_fit, checked_run
+from vehiclemor.reduction.vehicle.acceptance import no_vehicle
+from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.study.experiment import Experiment, Keep
+from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.input_range import input_range
 from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.method_settings import default_settings, for_method
 from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
@@ -28,6 +31,8 @@ from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from vehiclemor.simulation.dynamic import DynamicModel
 
 # How a fitted model is integrated: experiments that differ in these alone are fitted once.
 ONLINE = ("solver", "tolerance")
@@ -63,7 +68,7 @@ def _evaluated(experiment: Experiment, model: Model, kept: bool) -> xr.Dataset:
     for scenario in experiment.test:
         outcome = refused or attempt(partial(solve, model, scenario), "the full-order reference: ")
         if isinstance(outcome, Trajectory):
-            outcome = _tested(model, reduced, scenario, outcome, experiment.keep)
+            outcome = _tested(model, reduced, scenario, outcome, experiment)
         outcomes.append(outcome)
     if experiment.keep == "errors":
         return errors_dataset(model, experiment, outcomes, reduced)
@@ -174,7 +179,7 @@ def _tested(
     reduced: ReducedModel | Failure,
     scenario: Scenario,
     reference: Trajectory,
-    keep: Keep,
+    experiment: Experiment,
 ) -> Outcome | Failure:
     """One test scenario, simulated with the reduced model."""
     if isinstance(reduced, Failure):
@@ -182,8 +187,10 @@ def _tested(
 
     def run() -> Outcome:
         start = start_of(model, scenario)
-        if keep == "errors":
-            return Outcome(_sound(model, reduced, scenario, start), reference)
+        if experiment.keep == "errors":
+            trajectory = _sound(model, reduced, scenario, start)
+            trajectory = _warned(model, experiment, scenario, trajectory)
+            return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
         trajectory = _sound(model, reduced, scenario, start)
@@ -198,6 +205,22 @@ def _tested(
         return Outcome(trajectory, reference, floor)
 
     return attempt(run)
+
+
+def _warned(
+    model: Model, experiment: Experiment, scenario: Scenario, run: Trajectory
+) -> Trajectory:
+    """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
+    if run.trust or component("method", experiment.method).own_limits:
+        return run
+    return run.judged(input_range(model, experiment.training).trust(model, scenario))
+
+
+def _estimate(model: Model, run: Trajectory) -> ErrorEstimate | None:
+    """Errors by the residual, of a vehicle's run that may be wrong by its model's own account."""
+    if run.trust is None or not run.finished or no_vehicle(model):
+        return None
+    return estimated_errors(cast("DynamicModel", model), run)
 
 
 def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:

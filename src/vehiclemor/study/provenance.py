@@ -18,6 +18,7 @@ FILES = (
     "steering_maneuvers.py",
     "metrics.py",
     "study/scenario.py",
+    "study/input_range.py",
     "study/method_settings.py",
     "study/failure.py",
     "study/evaluate.py",

@@ -11,6 +11,7 @@ import numpy as np
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import Offline, ReducedModel
+from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset, with_units
@@ -34,11 +35,14 @@ class Outcome:
     ----------
     floor
         RMS errors (outputs,) of the best approximation in the same subspaces, if there is one.
+    estimate
+        Errors estimated without the full-order run, where there are any.
     """
 
     trajectory: Trajectory
     reference: Trajectory
     floor: np.ndarray | None = None
+    estimate: ErrorEstimate | None = None
 
 
 def metrics_dataset(
@@ -126,9 +130,15 @@ def errors_dataset(
     errors = zip(*[_errors(o) if o else missing for o in finished], strict=True)
     names = ("rms_error", "max_error", "largest_output")
     found: dict[str, object] = dict(zip(names, map(np.array, errors), strict=True))
+    nothing = ErrorEstimate(*missing[:2])
+    estimates = [o.estimate if o and o.estimate else nothing for o in finished]
+    found["estimated_rms_error"] = np.array([estimate.rms for estimate in estimates])
+    found["estimated_max_error"] = np.array([estimate.largest for estimate in estimates])
     found["seconds"] = np.array([o.trajectory.seconds if o else np.nan for o in finished])
     for name in ("status", "message"):
         found[name] = np.array([getattr(end, name) for end in ends], dtype=object)
+    remarks = [o.trajectory.remark if o else "" for o in finished]
+    found["remark"] = np.array(remarks, dtype=object)
     trusted = [o.trajectory.trust if o else None for o in finished]
     found["trust_indicator"] = np.array([t.indicator if t else np.nan for t in trusted])
     found["trusted_until"] = np.array([t.until if t else np.inf for t in trusted])

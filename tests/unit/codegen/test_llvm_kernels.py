@@ -14,7 +14,7 @@ from tests.unit.programs import run
 from vehiclemor.codegen import arctangent, exponential, sincos
 from vehiclemor.codegen.kernel_text import kernel_source, reference_source
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.llvm_kernels import KernelText, emit
+from vehiclemor.codegen.llvm_kernels import KernelText, Rows, emit
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
@@ -157,10 +157,10 @@ def test_what_is_not_straight_line_is_refused(line):
     text = f"def odd(_x, _work, _result):\n    {line}\n    _result[0] = 1.0\n"
     kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()] * 2)
     function = ir.Function(ir.Module(), kind, "odd")
-    pointers = dict(zip(("_x", "_result"), function.args, strict=True))
+    rows = {name: Rows(given) for name, given in zip(("_x", "_result"), function.args, strict=True)}
     builder = ir.IRBuilder(function.append_basic_block())
     with pytest.raises(ValueError, match=r"straight-line|unknown|index|shape"):
-        emit(KernelText(text), builder, pointers)
+        emit(KernelText(text), builder, rows)
 
 
 def test_arrays_of_another_kind_are_refused():

@@ -296,7 +296,7 @@ def test_flipped_bits_in_cached_code_give_no_wrong_number(
     assert sorted({path.parent.name for path in contents}) == ["derivations", "kernels", "loops"]
     # What is made again takes no time here: it is what the compiler has made before.
     made = {p.name.partition("-")[0]: whole.split(b"\n", 1)[1] for p, whole in contents.items()}
-    monkeypatch.setattr(llvm_kernels, "kernel_module", lambda kernels: kernels[0].name)
+    monkeypatch.setattr(llvm_kernels, "kernel_module", lambda kernels, _: kernels[0].name)
     monkeypatch.setattr(compiler, "compiled_module", lambda name: made[name])
     monkeypatch.setattr(compiler, "compiled_loops", lambda *_: made["path_loops"])
     places = list(contents)

@@ -1,11 +1,14 @@
 """Full-order solvers: accuracy, counts, branch safety, and errors that name what is reachable."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
@@ -59,7 +62,7 @@ def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: Algebrai
     assert model.solve_path(times, np.column_stack([heights, racks])).status == "ok"
 
 
-@pytest.mark.parametrize("solver", ["newton", "newton_dense", "chord"])
+@pytest.mark.parametrize("solver", ["newton", "newton_dense", "chord", "newton_lanes"])
 def test_sudden_jumps_of_the_input_stay_on_the_branch(model: AlgebraicModel, solver: str) -> None:
     low, high = model.reach()
     stops = 0.99 * np.array([high, low, high, 0.0])
@@ -115,7 +118,46 @@ def test_chord_solver_goes_as_far_as_newton(model: AlgebraicModel, nominal: Mane
     assert chord.counts["iterations"] == chord.counts["residual_evaluations"]
 
 
-@pytest.mark.parametrize("solver", ["newton", "newton_dense", "chord"])
+@pytest.mark.parametrize("samples", [1, 7, 8, 9, 15, 16, 1000, 1001])
+@pytest.mark.parametrize("name", ["travel_and_rack", "travel_and_rack_multisine"])
+def test_lanes_give_the_solution_of_newton_for_any_number_of_samples(
+    model: AlgebraicModel, name: str, samples: int
+) -> None:
+    maneuver = component("maneuver", name).perturbed(1.8, -1.1)
+    few = replace(maneuver, samples=samples, duration=0.01 * samples)
+    newton, lanes = model.simulate(few), model.simulate(few, solver="newton_lanes")
+    assert lanes.status == "ok"
+    np.testing.assert_allclose(lanes.coordinates, newton.coordinates, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(lanes.outputs, newton.outputs, rtol=0, atol=1e-13)
+    if samples == 1001:
+        # It begins nearer.
+        assert lanes.counts["iterations"] < 0.8 * newton.counts["iterations"]
+        # One Newton step from there: its error is the square of the last step's.
+        loose = model.simulate(few, solver="newton_lanes", tolerance=1e-4)
+        assert np.abs(loose.coordinates - newton.coordinates).max() < 1e-7
+
+
+def test_lanes_that_fail_are_solved_sample_by_sample(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    heights = np.random.default_rng(3).uniform(-0.2, 0.28, 100)
+    jumps = np.column_stack([heights, np.zeros(100)])
+    newton, lanes = (
+        model.solve_path(np.arange(100.0), jumps, solver) for solver in ("newton", "newton_lanes")
+    )
+    np.testing.assert_array_equal(lanes.coordinates, newton.coordinates)
+    assert lanes.counts == newton.counts
+    with pytest.raises(UnreachableError, match=r"at t = 7\.\d+ s"):
+        model.simulate(nominal.perturbed(amplitude=2.2), solver="newton_lanes")
+    # A stop is not gone beyond, though there are solutions.
+    times = np.linspace(0.0, 10.0, 1001)
+    low, _ = model.reach(0.05)
+    turned = np.column_stack([1.02 * low * times / 10.0, np.full(1001, 0.05)])
+    with pytest.raises(UnreachableError, match=r"rack at 0\.05 m"):
+        model.solve_path(times, turned, "newton_lanes")
+
+
+@pytest.mark.parametrize("solver", ["newton", "newton_dense", "chord", "newton_lanes"])
 def test_a_run_that_diverges_tells_its_counts(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory, solver: str
 ) -> None:

@@ -32,7 +32,9 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     asked: list[str] = []
     machine, loops = codegen_kernels._machine, catalogue.loops
     monkeypatch.setattr(
-        codegen_kernels, "_machine", lambda source: asked.append(source.name) or machine(source)
+        codegen_kernels,
+        "_machine",
+        lambda source, lanes: asked.append(source.name) or machine(source, lanes),
     )
     monkeypatch.setattr(
         catalogue, "loops", lambda modules, *rest: asked.extend(modules) or loops(modules, *rest)

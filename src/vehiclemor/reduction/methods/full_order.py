@@ -1,7 +1,7 @@
 """The full-order model itself: the baseline of every comparison."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -21,10 +21,11 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class AlgebraicSettings(Settings):
     """How algebraic equations are solved."""
 
-    solver: Literal["newton", "newton_dense", "chord"] = Field(
+    solver: Literal["newton", "newton_dense", "chord", "newton_lanes"] = Field(
         "newton",
         description="newton: fresh Jacobians; newton_dense: without the generated elimination; "
-        "chord: constant inverse and predictor",
+        "chord: constant inverse and predictor; newton_lanes: newton with predictor, eight samples "
+        "at once",
     )
     tolerance: StepTolerance = NEWTON_TOLERANCE
 
@@ -59,10 +60,17 @@ class FullOrderModel(ShortRepr):
         """Number of coordinates."""
         return len(self.model.coordinates)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Full-order trajectory at the maneuver's output times; it may have diverged."""
+    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
+        """Full-order trajectory at the output times; it may have diverged.
+
+        Parameters
+        ----------
+        begin
+            Time in s at which a dynamic model begins with the start, in mid-maneuver if not 0.
+        """
+        later: dict[str, Any] = {"begin": begin} if begin else {}
         try:
-            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance)
+            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance, **later)
         except ConvergenceError as error:
             if error.trajectory is None:
                 raise
@@ -91,4 +99,5 @@ METHOD = Method(
         "dae": _strongest("ros34pw2", 7e-4),
     },
     fit=fit,
+    own_limits=True,
 )

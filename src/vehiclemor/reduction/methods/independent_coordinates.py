@@ -56,4 +56,5 @@ METHOD = Method(
     settings={"dae": OnlineSettings},
     refusal=no_closed_forms,
     fit=fit,
+    own_limits=True,
 )

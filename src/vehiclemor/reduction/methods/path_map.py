@@ -1,103 +1,136 @@
-"""Path map: the coordinates of a mechanism with one degree of freedom as polynomials in its travel.
+"""Path map: coordinates and outputs of a mechanism as polynomials of its inputs.
 
-At a constant rack displacement the configurations of a suspension form a curve.  It is smooth, so
-that least squares on Chebyshev polynomials converge geometrically with the degree (L. N. Trefethen,
-Approximation Theory and Approximation Practice, 2013, chapter 8).  No equation is solved online.
+The configurations of a suspension form a surface over wheel travel and rack displacement, a curve
+where the rack rests.  It is analytic, so that interpolation in Chebyshev points converges
+geometrically with the degree, and with the size of the cells at the order of the degree plus one
+(L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, chapter 8).  The training
+runs only tell between which inputs: the equations are solved in all of that box.  Online none is.
 """
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
-from vehiclemor.errors import InputError
+from vehiclemor.codegen.loops import Loop, Ready, ready
+from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.kernels import map_loop
-from vehiclemor.reduction.polynomials.map_loops import BLOCK
+from vehiclemor.reduction.polynomials.kernels import map_loop, monomials
+from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.run_timer import timed
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
-# Above this degree, powers of the travel lose digits to rounding.
+# Above this degree, powers lose digits to rounding.
 HIGHEST_DEGREE = 20
-# Tolerance of the range of training, relative to the range of the travel.
-SLACK = 1e-9
+# Solved positions that a fit may ask for.
+MOST_NODES = 300_000
+# Part of an input's range in training that is added at either end: its peaks lie between samples.
+MARGIN = 0.005
+# An input that changes by less (m) rests; runs may leave the ranges by as much.
+RESTING = 1e-9
+# Quantities (rad or m) that differ by less are one, such as an output that is a coordinate.
+SAME = 1e-15
 
 
 class PathMapSettings(Settings):
     """Settings for a kinematic model."""
 
-    degree: int = Field(10, ge=1, description="degree of the polynomials in the travel")
-    outside: Literal["stop", "extrapolate"] = Field(
-        "stop",
-        description="stop: a run that leaves the inputs of training has diverged; extrapolate: it "
-        "goes on",
+    degree: int = Field(4, ge=1, description="total degree of the polynomials in a cell")
+    cells: int = Field(8, ge=1, description="equal cells along each input that moves in training")
+    outside: Literal["extrapolate", "stop"] = Field(
+        "extrapolate",
+        description="extrapolate: a run that leaves the inputs of training goes on, untrusted; "
+        "stop: it has diverged",
     )
 
 
 @dataclass(frozen=True)
 class PathMapModel(ShortRepr):
-    """Coordinates as polynomials of the travel.
+    """Coordinates and outputs as polynomials of the inputs.
 
     Attributes
     ----------
-    centre, scale
-        The polynomials' argument is (travel - centre) * scale; m and 1/m.
-    coefficients
-        Those of the highest power first (degree + 1, n), rad or m.
-    travel, rack
-        Lowest and highest travel, and the rack displacement, of training, in m.
+    ranges
+        Lowest and highest value (inputs, 2) of each input in training, with the margins.
+    degree
+        Total degree of the polynomials.
+    cells
+        What the loop evaluates.
+    columns
+        Column of the coefficients for each coordinate and output; equal ones share one.
     stops
-        Whether a run stops that leaves them.
+        Whether a run ends where it leaves the ranges.
     """
 
     model: AlgebraicModel
-    centre: float
-    scale: float
-    coefficients: np.ndarray
-    travel: tuple[float, float]
-    rack: float
+    ranges: np.ndarray
+    degree: int
+    cells: Cells
+    columns: tuple[int, ...]
     stops: bool
     offline: Offline
 
     @property
     def effective_rank(self) -> int:
-        """The travel is the only coordinate."""
-        return 1
+        """Number of inputs that move."""
+        return len(self.cells.moving)
+
+    @cached_property
+    def _loop(self) -> Loop:
+        return map_loop(len(self.ranges), self.effective_rank, self.degree, self.columns)
+
+    @cached_property
+    def _ready(self) -> Ready:
+        return ready(self.cells)
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Polynomials at the maneuver's output times."""
-        model, times = self.model, maneuver.times
+        model, samples = self.model, maneuver.samples
         model.start(start)
-        inputs = model.inputs_of(maneuver, times)
-        degree, n = len(self.coefficients) - 1, len(model.coordinates)
-        (low, high), slack = self.travel, SLACK * (self.travel[1] - self.travel[0])
-        limits = np.array([low - slack, high + slack, self.rack - slack, self.rack + slack])
-        if not self.stops:
-            limits = np.array([-np.inf, np.inf, -np.inf, np.inf])
-        loop, buffer = map_loop(n, degree), np.zeros(BLOCK * (n + 1))
-        fixed = (inputs, self.centre, self.scale, limits, self.coefficients)
-        found, sample = solved_path(
-            model, times, inputs, lambda to: loop.prepared(*fixed, to, buffer)
+        times, inputs, given = model.sampled(maneuver)
+        size = samples * len(self.columns)
+        space = np.empty(size + TOLD + self.effective_rank)
+        _, seconds = timed(self._loop.prepared(given, self._ready, space))
+        table = space[:size].reshape(samples, -1)
+        indicator, left = space[size : size + TOLD].tolist()
+        status, message, until, reason = "ok", "", np.inf, ""
+        if left < samples:
+            left = int(left)
+            status, until, reason = "untrusted", float(times[left]), self._outside(inputs[left])
+            message = f"from t = {until:.4g} s on {reason}"
+            if self.stops:
+                status, message = "diverged", f"at t = {until:.6g} s {reason}"
+                table[left:] = np.nan
+        n = len(model.coordinates)
+        return Trajectory(
+            times,
+            inputs,
+            table[:, :n],
+            np.empty((samples, 0)),
+            table[:, n:],
+            dict.fromkeys(model.counts, 0),
+            seconds,
+            status,
+            message,
+            trust=Trust(indicator, until, reason),
         )
-        if found.status == "ok":
-            return found
-        return replace(found, message=self._outside(float(times[sample]), *inputs[sample].tolist()))
 
-    def _outside(self, moment: float, travel: float, rack: float) -> str:
-        low, high = self.travel
+    def _outside(self, inputs: np.ndarray) -> str:
         return (
-            f"height {travel:.5g} m with the rack at {rack:.5g} m at t = {moment:.6g} s is outside "
-            f"of the training: {low:.5g} to {high:.5g} m with the rack at {self.rack:.5g} m"
+            f"{_named(self.model, inputs[:, None])} is outside of the training: "
+            f"{_named(self.model, self.ranges)}"
         )
 
     def best_approximation(self, states: np.ndarray) -> None:
@@ -105,61 +138,121 @@ class PathMapModel(ShortRepr):
         del states
 
 
+def _named(model: AlgebraicModel, values: np.ndarray) -> str:
+    """Values or ranges (inputs, 1 or 2) of the inputs by their names and units."""
+    return ", ".join(
+        f"{quantity.name} {' to '.join(f'{v:.5g}' for v in dict.fromkeys(row.tolist()))} "
+        f"{quantity.unit}"
+        for quantity, row in zip(model.definition.inputs, values, strict=True)
+    )
+
+
 def check(model: Model, settings: PathMapSettings) -> None:
-    """Raise `InputError` if the degree is too high for powers of the travel."""
+    """Raise `InputError` if the degree is too high for powers, or the nodes are too many."""
     if settings.degree > HIGHEST_DEGREE:
         raise InputError(f"degree {settings.degree} is above {HIGHEST_DEGREE}")
+    nodes = (settings.cells * (settings.degree + 1)) ** len(model.inputs)
+    if nodes > MOST_NODES:
+        raise InputError(
+            f"{settings.cells} cells of degree {settings.degree} need {nodes} solved positions; "
+            f"at most {MOST_NODES}"
+        )
 
 
 def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) -> PathMapModel:
-    """Least squares over all output times of the training runs.
+    """Interpolation of positions that are solved at the Chebyshev points of all cells.
 
     Raises
     ------
     InputError
-        If the rack moves in training, or the travel takes too few values for the degree.
+        If no input moves in training, or not all of the box that they span can be reached.
     """
     began = time.process_time()
-    degree = settings.degree
-    runs = [run.recorded() for run in training]
-    inputs = np.concatenate([run.inputs for run in runs])
-    travel, racks = inputs[:, 0], inputs[:, 1]
-    low, high = float(travel.min()), float(travel.max())
-    if np.ptp(racks) > SLACK * (high - low):
-        raise InputError(
-            f"path_map needs a constant rack: in training it moves from {racks.min():.4g} to "
-            f"{racks.max():.4g} m"
-        )
-    centre, scale = 0.5 * (low + high), 2.0 / (high - low) if high > low else 0.0
-    x = (travel - centre) * scale
-    # Heights nearer to each other than the tolerance count once.
-    heights = len(np.unique(np.round(x / SLACK)))
-    if heights <= degree:
-        raise InputError(f"degree {degree} needs {degree + 1} heights; training has {heights}")
-    samples = np.concatenate([run.coordinates for run in runs])
-    # The fit is ill-conditioned in powers, their evaluation is not.
-    series = np.linalg.lstsq(chebyshev.chebvander(x, degree), samples, rcond=None)[0]
-    powers = np.zeros((degree + 1, samples.shape[1]))
-    for i, column in enumerate(series.T):
-        power = chebyshev.cheb2poly(column)
-        powers[: len(power), i] = power
-    return PathMapModel(
-        model,
-        centre,
-        scale,
-        loop_array(powers[::-1]),
-        (low, high),
-        float(racks[0]),
-        settings.outside == "stop",
-        offline_cost(began, model, runs),
+    every = np.concatenate([model.sampled(run.maneuver)[1] for run in training])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margins = MARGIN * (high - low)
+    ranges = np.column_stack([low - margins, high + margins])
+    centres, widths = ranges.mean(axis=1), np.ptp(ranges, axis=1)
+    moving = np.flatnonzero(widths > RESTING)
+    if not len(moving):
+        raise InputError("path_map: no input moves in training")
+    places = np.arange(settings.cells)[:, None] + 0.5 + 0.5 * _nodes(settings.degree)
+    rates = settings.cells / widths[moving]
+    grid = [low + places.ravel() / rate for low, rate in zip(ranges[moving, 0], rates, strict=True)]
+    inputs = np.tile(centres, (len(grid[0]) ** len(grid), 1))
+    inputs[:, moving] = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, len(grid))
+    try:
+        solved = model.solve_path(np.zeros(len(inputs)), inputs)
+    except UnreachableError:
+        box = _named(model, ranges)
+        raise InputError(f"path_map: what training spans is not all in reach: {box}") from None
+    values, columns = _distinct(np.hstack([solved.coordinates, solved.outputs]))
+    cells = Cells(
+        centres,
+        1.0 / (0.5 * widths + RESTING),
+        moving,
+        np.full(len(moving), settings.cells),
+        loop_array(ranges[moving, 0]),
+        rates,
+        _coefficients(values, len(moving), settings),
     )
+    cost = offline_cost(began, model, [solved])
+    stops = settings.outside == "stop"
+    return PathMapModel(model, ranges, settings.degree, cells, columns, stops, cost)
+
+
+def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Columns (nodes, columns) that differ, and which of them stands for each that was given."""
+    kept: list[np.ndarray] = []
+    columns = []
+    for column in values.T:
+        same = (k for k, other in enumerate(kept) if np.abs(other - column).max() < SAME)
+        columns.append(next(same, len(kept)))
+        if columns[-1] == len(kept):
+            kept.append(column)
+    return np.column_stack(kept), tuple(columns)
+
+
+def _nodes(degree: int) -> np.ndarray:
+    return chebyshev.chebpts1(degree + 1)
+
+
+def _coefficients(values: np.ndarray, moving: int, settings: PathMapSettings) -> np.ndarray:
+    """Coefficients (cells, monomials, quantities) from values (nodes, quantities) of all cells."""
+    degree, number = settings.degree, settings.cells
+    size = degree + 1
+    values = values.reshape(*[number, size] * moving, values.shape[1])
+    values = np.moveaxis(values, range(0, 2 * moving, 2), range(moving))
+    # Series first: they say what to leave out, and are well-conditioned.
+    series = np.linalg.inv(chebyshev.chebvander(_nodes(degree), degree))
+    for axis in range(moving, 2 * moving):
+        values = _along(series, values, axis)
+    beyond = np.indices([size] * moving).sum(axis=0) > degree
+    values[(slice(None),) * moving + (beyond,)] = 0.0
+    powers = np.zeros((size, size))
+    for order in range(size):
+        powers[: order + 1, order] = chebyshev.cheb2poly(np.eye(size)[order, : order + 1])
+    for axis in range(moving, 2 * moving):
+        values = _along(powers, values, axis)
+    values = values.reshape(number**moving, *[size] * moving, -1)
+    terms = monomials(moving, degree)
+    chosen = tuple(np.array([[t.count(k) for t in terms] for k in range(moving)]))
+    found = values[(slice(None), *chosen)]
+    padding = padded(found.shape[-1]) - found.shape[-1]
+    return loop_array(np.pad(found, ((0, 0), (0, 0), (0, padding))))
+
+
+def _along(matrix: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
+    """Products with a matrix along one axis."""
+    return np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
 
 
 METHOD = Method(
     name="path_map",
-    summary="the coordinates as polynomials in the wheel travel: no equation is solved",
+    summary="coordinates and outputs as polynomials of the inputs: no equation is solved",
     reference="10.1137/1.9781611975949",
     settings={"ae": PathMapSettings},
     check=check,
     fit=fit,
+    own_limits=True,
 )

@@ -9,12 +9,13 @@ of the full model is evaluated online.
 import math
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.codegen.loops import Loop
+from vehiclemor.codegen.loops import Loop, Ready, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
@@ -104,21 +105,26 @@ class PolynomialResidualModel(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the polynomial equations at the maneuver's output times."""
-        model, times = self.model, maneuver.times
+        model = self.model
         began_at = self.reduced(model.start(start)[None, :])[0]
-        inputs = model.inputs_of(maneuver, times)
-        rank = self.basis.rank
-        polynomials = Polynomials(
-            np.concatenate([self.mean_inputs, self.basis.mean]),
-            loop_array((self.basis.vectors * self.scales).T),
-            loop_array(self.response),
-            loop_array(self.coefficients),
-            derivatives(self.coefficients, rank, self.degree),
-            self.tolerance / self.scales,
-        )
-        given = (inputs, loop_array(began_at), polynomials, int(self.newton), ITERATION_LIMIT)
+        times, inputs, _ = model.sampled(maneuver)
+        rank, start_at = self.basis.rank, loop_array(began_at)
+        given = (inputs, start_at, self._polynomials, int(self.newton), ITERATION_LIMIT)
         loop, buffer = self._loop("reduced_path"), np.empty(6 * rank + rank * (rank + 1))
         return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]
+
+    @cached_property
+    def _polynomials(self) -> Ready:
+        return ready(
+            Polynomials(
+                np.concatenate([self.mean_inputs, self.basis.mean]),
+                loop_array((self.basis.vectors * self.scales).T),
+                loop_array(self.response),
+                loop_array(self.coefficients),
+                derivatives(self.coefficients, self.basis.rank, self.degree),
+                self.tolerance / self.scales,
+            )
+        )
 
     def reduced(self, states: np.ndarray) -> np.ndarray:
         """Scaled reduced coordinates (samples, r) of states (samples, n)."""

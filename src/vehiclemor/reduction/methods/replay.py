@@ -91,4 +91,5 @@ METHOD = Method(
     summary="returns the training trajectory, whatever the input: the null hypothesis",
     settings=dict.fromkeys(KINDS, Settings),
     fit=fit,
+    own_limits=True,
 )

@@ -29,19 +29,28 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.landing import after_landing, landed
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable, feature_table
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import Target, finishes, improved, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import (
+    Target,
+    finishes,
+    improved,
+    spread,
+    targets,
+)
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Accuracy of the reduced runs on which the heading is fitted.
 REFIT_TOLERANCE = 1e-6
-REFIT_RIDGE = 1e-9
+# The part of the terms that is left by each round of elimination, and for how many of them all
+# training runs are looked at; with more terms it is fewer runs, but so many at least.
+SHRINKING, WANTED, FEW = 0.4, 60, 20
 
 
 class SlowManifoldSettings(OnlineSettings):
@@ -54,22 +63,29 @@ class SlowManifoldSettings(OnlineSettings):
         "slip terms; rich: and cubic terms that change with the speed",
     )
     ridge: float = Field(1e-10, ge=0.0, description="weight of the coefficients' size in the fit")
-    refits: int = Field(2, ge=0, description="how often the heading is fitted on reduced runs")
+    symmetric: int = Field(
+        2, ge=0, description="symmetric modes (or pairs) that are integrated with them"
+    )
     sweeps: int = Field(
         4, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
     )
     terms: int = Field(
-        20,
+        24,
         ge=0,
-        description="lateral nonlinear terms that the equations keep, those that whole runs need "
-        "most, and a quarter as many symmetric ones; 0: all; only with sweeps, which are done "
-        "again after it",
+        description="nonlinear terms that the equations keep, those that whole runs need most; "
+        "0: all; only with sweeps",
     )
     hull: float = Field(
         1.1,
         gt=0.0,
         description="arguments of nonlinear terms are held beyond this multiple of their training "
         "range",
+    )
+    trusted: float = Field(
+        0.93,
+        gt=0.0,
+        description="a run whose arguments leave this multiple of their training range isn't "
+        "trusted",
     )
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 2e-3
@@ -80,16 +96,16 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     began = time.process_time()
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
-    modes = slow_modes(shape, settings.fastest)
-    samples = shape_samples(shape, runs)
-    table = feature_table(shape, modes, samples, settings.hull, settings.nonlinearity)
+    modes = slow_modes(shape, settings.fastest, settings.symmetric)
+    samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
+    table = feature_table(
+        shape, modes, samples, settings.nonlinearity, settings.hull, settings.trusted
+    )
     reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
-    for _ in range(settings.refits):
-        reduced = _with_heading(reduced, training, runs, table.odd, len(modes.rates) + 1)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
-        slow = np.column_stack(modes.coordinates(samples.deviations, samples.inputs))
-        reduced = _fitted_on_runs(reduced, table, slow, goals, settings)
+        reduced = landed(reduced, modes, runs)
+        reduced = _fitted_on_runs(reduced, table, goals, settings)
     return replace(
         reduced,
         offline=offline_cost(began, model, runs, len(samples.inputs)),
@@ -104,25 +120,28 @@ def _fitted_on_rates(
     """Equations fitted on the rates of the training runs, exact at straight running."""
     u, motion = samples.inputs, samples.motion
     z, speed = modes.coordinates(samples.deviations, u)
-    k, inputs = len(modes.rates), u.shape[1]
+    k, n, inputs = modes.lateral, len(modes.rates), u.shape[1]
     odd, even = table.odd, table.even
     odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
     columns = feature_columns(table.features, np.column_stack([z, speed]), u, table.parameters)
     slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
-    linear = z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
-    c = np.zeros((len(table.features.terms), k + 1 + PLANAR))
-    c[odd_nonlinear, :k] = ridge_fit(columns[:, odd_nonlinear], slow_rates - linear, ridge)
+    slow_rates -= z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
+    c = np.zeros((len(table.features.terms), n + 1 + PLANAR))
+    c[odd_nonlinear, :k] = ridge_fit(columns[:, odd_nonlinear], slow_rates[:, :k], ridge)
     # Linear terms are scaled by the ranges of the training runs.
-    c[odd[:k], :k] = modes.rates.T * largest(z)[:, None]
-    c[odd[k], :k] = modes.drive * largest(u)[0]
+    ranges = largest(z)
+    c[odd[:k], :k] = modes.rates[:k, :k].T * ranges[:k, None]
+    c[odd[k], :k] = modes.drive[:k] * largest(u)[0]
     # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
-    even_columns = columns[:, even_nonlinear]
-    c[even_nonlinear, k] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
-    c[odd, k + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
-    c[even[0], k + 2], c[even[1], k + 2] = shape.speed, 1.0
-    forward = motion[:, 1] - shape.speed - speed
-    c[even_nonlinear, k + 2] = ridge_fit(even_columns, forward, ridge)
-    c[odd, k + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
+    own, forward = even[2 : table.straight_count], shape.linearised.motion_a[1] @ modes.right[:, k:]
+    c[own, k:n] = modes.rates[k:, k:].T * ranges[k:, None]
+    c[even[0], n + 2], c[even[1], n + 2], c[own, n + 2] = shape.speed, 1.0, forward * ranges[k:]
+    even_columns, ahead = columns[:, even_nonlinear], motion[:, 1] - shape.speed - speed
+    c[even_nonlinear, k:n] = ridge_fit(even_columns, slow_rates[:, k:], ridge)
+    c[even_nonlinear, n] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
+    c[even_nonlinear, n + 2] = ridge_fit(even_columns, ahead - z[:, k:] @ forward, ridge)
+    c[odd, n + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
+    c[odd, n + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
     return ReducedVehicle(
         shape.model,
         shape,
@@ -132,7 +151,7 @@ def _fitted_on_rates(
         ridge_fit(columns, samples.deviations, ridge),
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
-        np.concatenate([3.0 * largest(z), [10.0, 1.0, 10.0, 10.0]]),
+        np.concatenate([3.0 * ranges, [10.0, 1.0, 10.0, 10.0]]),
         Offline(),
         "dopri5",
         REFIT_TOLERANCE,
@@ -143,48 +162,23 @@ def _fitted_on_rates(
 def _fitted_on_runs(
     reduced: ReducedVehicle,
     table: FeatureTable,
-    slow: np.ndarray,
     goals: Sequence[Target],
     settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
     """Coefficients improved on whole runs; then with as few terms as the settings allow."""
-    reduced = improved(reduced, goals, table.free, settings.sweeps)
-    if not settings.terms or not finishes(reduced, goals):
+    if not finishes(reduced, goals):
         return reduced
-    fewer, kept = pruned(reduced, table, goals, slow, settings.terms)
-    fewer = improved(fewer, goals, kept.free, settings.sweeps)
-    # With too few terms a training run may fail.
-    return fewer if finishes(fewer, goals) else reduced
-
-
-def _with_heading(
-    reduced: ReducedVehicle,
-    training: Training,
-    runs: Sequence[Trajectory],
-    odd: Sequence[int],
-    column: int,
-) -> ReducedVehicle:
-    """The heading's coefficients fitted on its integral along reduced training runs."""
-    integrals, headings = [], []
-    k, heading = reduced.features.states, reduced.model.planar[2]
-    for run, true in zip(training, runs, strict=True):
-        path = reduced.path(run.maneuver, run.start)
-        if path is None:
-            continue
-        columns = feature_columns(reduced.features, path[:, :k], true.inputs, reduced.parameters)[
-            :, odd
-        ]
-        steps = np.diff(true.time)[:, None]
-        sums = np.cumsum(0.5 * steps * (columns[1:] + columns[:-1]), axis=0)
-        integrals.append(np.vstack([np.zeros(len(odd)), sums]))
-        headings.append(true.states[:, heading] - true.states[0, heading])
-    if not integrals:
-        return reduced
-    along = np.concatenate(integrals)
-    gap = np.concatenate(headings) - along @ reduced.coefficients[odd, column]
-    coefficients = reduced.coefficients.copy()
-    coefficients[odd, column] += ridge_fit(along, gap, REFIT_RIDGE)
-    return replace(reduced, coefficients=coefficients)
+    count = len(table.odd_nonlinear) + len(table.even_nonlinear)
+    while settings.terms and count > settings.terms:
+        some = spread(goals, max(WANTED / count, FEW / len(goals)))
+        reduced = improved(reduced, some, table.free, 1)
+        count = max(settings.terms, round(SHRINKING * count))
+        fewer, table = pruned(reduced, table, some, count)
+        # With too few terms a training run may fail.
+        if not finishes(fewer, goals):
+            return reduced
+        reduced = fewer
+    return improved(reduced, goals, table.free, settings.sweeps)
 
 
 METHOD = Method(

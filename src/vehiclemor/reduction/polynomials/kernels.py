@@ -73,13 +73,33 @@ def _nested(array: str, first: int, row: int, rank: int, degree: int) -> str:
     return part(())
 
 
+def map_kernel(variables: int, degree: int, columns: tuple[int, ...]) -> str:
+    """Text of the kernel `polynomials`: each monomial is one of a degree less times a variable.
+
+    Parameters
+    ----------
+    columns
+        Column of the coefficients for each result; several may share one.
+    """
+    every = monomials(variables, degree)
+    places = {term: place for place, term in enumerate(every)}
+    lines = [f"x{j} = _x[{j}]" for j in range(variables)]
+    lines.append("m0 = 1.0")
+    lines += [f"m{places[term]} = m{places[term[:-1]]} * x{term[-1]}" for term in every[1:]]
+    values = ", ".join(f"v{i}" for i in range(max(columns) + 1))
+    powers = ", ".join(f"m{place}" for place in range(len(every)))
+    lines.append(f"({values},) = weighted_sums(_coefficients, 0, ({powers},))")
+    lines += [f"_result[{i}] = v{column}" for i, column in enumerate(columns)]
+    return "\n    ".join(["def polynomials(_x, _coefficients, _result):", *lines]) + "\n"
+
+
 @cache
-def map_loop(states: int, degree: int) -> Loop:
-    """Compiled loop of `states` polynomials of that degree in one variable."""
-    sizes = {"N": states, "DEGREE": degree}
-    return loops((*NEWTON, "reduction.polynomials.map_loops"), ("map_path",), sizes=sizes)[
-        "map_path"
-    ]
+def map_loop(inputs: int, variables: int, degree: int, columns: tuple[int, ...]) -> Loop:
+    """Compiled loop of polynomials of that total degree in so many of the inputs."""
+    sizes = {"INPUTS": inputs, "MOVING": variables, "QUANTITIES": len(columns)}
+    modules = (*NEWTON, "reduction.polynomials.map_loops")
+    kernels = {"polynomials": map_kernel(variables, degree, columns)}
+    return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 
 
 @cache

@@ -1,64 +1,78 @@
-"""Coordinates of a mechanism as polynomials in its travel: a compiled loop.
+"""Coordinates and outputs of a mechanism as polynomials of its inputs in cells: a compiled loop.
 
-Samples are taken in blocks.  The number of powers is known to the compiler: they are unrolled, and
-what is left is a loop over a block, which becomes vector code.
+The polynomials are a kernel that `kernels.py` writes for their number and degree.
 """
 
-from vehiclemor.codegen.loop_types import Float, Int, Matrix, Vector, matrix, vector
-from vehiclemor.simulation.newton_loops import CONVERGED, SAMPLE, Solution
+from typing import NamedTuple
 
-BLOCK = 64
-OUTSIDE = 1
-# Sizes that the compiler knows: coordinates, degree.
-N, DEGREE = 0, 0
+from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
+from vehiclemor.simulation.newton_loops import CONVERGED
+
+# Sizes that the compiler knows: inputs, those of them that move, quantities.
+INPUTS, MOVING, QUANTITIES = 0, 0, 0
+# Places of what a run tells: the largest indicator, and the first sample at which it is above 1, or
+# the number of samples; how much that is.
+INDICATOR, LEFT, TOLD = range(3)
 
 
-def map_path(
-    inputs: Matrix,
-    centre: Float,
-    scale: Float,
-    limits: Vector,
-    coefficients: Matrix,
-    solution: Solution,
-    buffer: Vector,
-) -> Int:
-    """Polynomials at every sample, by Horner's scheme; stops where an input is outside the limits.
+class Cells(NamedTuple):
+    """A box of inputs in equal cells, with a polynomial in each.
+
+    Attributes
+    ----------
+    centres, scales
+        The indicator of inputs is the largest |input - centre| * scale (INPUTS,).
+    moving, numbers
+        Which inputs move (MOVING,), and the number of cells along each.
+    lowest, rates
+        Of these: the lowest value, and cells by unit (MOVING,).
+    coefficients
+        Of each monomial for each quantity, padded (cells, monomials, quantities); the cells of the
+        last input stand together.
+    """
+
+    centres: Vector
+    scales: Vector
+    moving: IntVector
+    numbers: IntVector
+    lowest: Vector
+    rates: Vector
+    coefficients: Cube
+
+
+def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:
+    """Quantities at a place x (MOVING,) of a cell, from -1 to 1: a kernel inside of the loop."""
+
+
+def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
+    """Polynomials at every sample, outside of the box those of the nearest cell.
 
     Parameters
     ----------
     inputs
-        Travel (m) and rack displacement (m) at the samples (samples, 2).
-    centre, scale, coefficients
-        As of `PathMapModel`.
-    limits
-        Lowest and highest travel, lowest and highest rack displacement (4,) in m.
-    buffer
-        Scratch space (BLOCK (N + 1),), zero at first.
+        At the samples (samples, INPUTS).
+    space
+        Quantities of all samples, then what the run tells, by place, see above, then scratch space
+        (MOVING,): one array is sooner handed over than three.
     """
-    path, counts = solution.path, solution.counts
-    low, high, left, right = limits[0], limits[1], limits[2], limits[3]
-    arguments, results = vector(buffer, 0, BLOCK), matrix(buffer, BLOCK, N, BLOCK)
-    samples, first = inputs.shape[0], 0
-    while first < samples:
-        count = 0
-        for sample in range(first, min(first + BLOCK, samples)):
-            travel, rack = inputs[sample, 0], inputs[sample, 1]
-            if not (low <= travel <= high and left <= rack <= right):
-                break
-            arguments[count] = (travel - centre) * scale
-            count += 1
-        # Places beyond the count are computed, and not used: so every sample meets the same code.
-        for i in range(N):
-            for place in range(BLOCK):
-                x, total = arguments[place], coefficients[0, i]
-                for power in range(1, DEGREE + 1):
-                    total = total * x + coefficients[power, i]
-                results[i, place] = total
-        for place in range(count):
-            for i in range(N):
-                path[first + place, i] = results[i, place]
-        first += count
-        if count < BLOCK and first < samples:
-            counts[SAMPLE] = first
-            return OUTSIDE
+    centres, scales, moving, numbers, lowest, rates, coefficients = cells
+    samples = inputs.shape[0]
+    table, end = matrix(space, 0, samples, QUANTITIES), samples * QUANTITIES
+    told, x = vector(space, end, TOLD), vector(space, end + TOLD, MOVING)
+    largest, left = 0.0, samples
+    for sample in range(samples):
+        indicator = 0.0
+        for i in range(INPUTS):
+            indicator = max(indicator, abs(inputs[sample, i] - centres[i]) * scales[i])
+        largest = max(largest, indicator)
+        if indicator > 1.0 and sample < left:
+            left = sample
+        cell = 0
+        for k in range(MOVING):
+            place = (inputs[sample, moving[k]] - lowest[k]) * rates[k]
+            number = int(min(max(place, 0.0), numbers[k] - 1.0))
+            x[k] = 2.0 * (place - number) - 1.0
+            cell = cell * numbers[k] + number
+        polynomials(x, coefficients[cell], table[sample])
+    told[INDICATOR], told[LEFT] = largest, left
     return CONVERGED

@@ -54,8 +54,8 @@ class AlgebraicProjection(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
-        model, times = self.model, maneuver.times
-        inputs = model.inputs_of(maneuver, times)
+        model = self.model
+        times, inputs, _ = model.sampled(maneuver)
         n, windows = len(model.coordinates), len(self.bases)
         bases, tests = np.zeros((windows, n, n)), np.zeros((windows, n, n))
         for k, basis in enumerate(self.bases):

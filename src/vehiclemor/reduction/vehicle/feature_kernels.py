@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,24 @@ from vehiclemor.simulation.integrators.exponential_functions import (
     MIDDLE,
     SECOND,
 )
+
+
+class Layout(NamedTuple):
+    """Where the shape of a vehicle stands in its states.
+
+    Attributes
+    ----------
+    size
+        Number of states.
+    kept, planar, pairs
+        Numbers of the states that make the shape, of the place and the heading, and of pairs that
+        turn with the heading.
+    """
+
+    size: int
+    kept: Sequence[int]
+    planar: Sequence[int]
+    pairs: Sequence[tuple[int, int]]
 
 
 def diagonal_blocks(sizes: Sequence[int]) -> tuple[tuple[int, ...], ...]:
@@ -59,6 +78,30 @@ def columns_text(features: Features) -> str:
     lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
     lines += [f"_result[{i}] = {_constants(text)}" for i, text in enumerate(features.terms)]
     return _function("columns", lines)
+
+
+def lifting_text(features: Features, layout: Layout, parameters: int, modes: int) -> str:
+    """Source of the kernel that gives full states, and after them what is watched.
+
+    Constants are the features' parameters, then rows of coefficients: of the terms, of the shape at
+    straight running, and two of each mode of the transient, whose parts follow the inputs.
+    """
+    k, first = features.states, features.inputs
+    lines = [f"z{i} = _x[{i}]" for i in range(k)] + _inputs_at(features, 0)
+    lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
+    factors = [_constants(text) for text in features.terms]
+    factors += ["1.0", *(f"_u[{first + i}]" for i in range(2 * modes))]
+    names = ", ".join(f"s{i}" for i in layout.kept)
+    lines.append(f"({names},) = weighted_sums(_constants, {parameters}, ({', '.join(factors)},))")
+    lines.append(f"sine, cosine = sincos_one(_x[{k}])")
+    results = dict.fromkeys(range(layout.size), "0.0") | {i: f"s{i}" for i in layout.kept}
+    results |= zip(layout.planar, (f"_x[{i}]" for i in (k + 1, k + 2, k)), strict=True)
+    for a, b in layout.pairs:
+        results[a] = f"cosine * s{a} - sine * s{b}"
+        results[b] = f"sine * s{a} + cosine * s{b}"
+    results |= enumerate((_constants(text) for text, _ in features.watched), layout.size)
+    lines += [f"_result[{i}] = {text}" for i, text in results.items()]
+    return _function("full_state", lines)
 
 
 def _inputs_at(features: Features, first: int) -> list[str]:

@@ -37,6 +37,9 @@ class Features:
     diagonal
         Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
         Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
+    watched
+        (expression, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
+        what the features were made for.
     """
 
     states: int
@@ -45,6 +48,7 @@ class Features:
     terms: tuple[str, ...]
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
     diagonal: tuple[int, ...] = ()
+    watched: tuple[tuple[str, str], ...] = ()
 
     @property
     def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:

@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable
@@ -23,45 +22,23 @@ from vehiclemor.reduction.vehicle.trajectory_fit import Target, normal_matrix
 
 # Of the normal matrix, scaled to a diagonal of ones: nearly dependent features are told apart.
 REGULARISATION = 1e-11
-# Number of symmetric terms for each lateral one.
-SYMMETRIC = 0.25
 
 
 def pruned(
-    reduced: ReducedVehicle,
-    table: FeatureTable,
-    goals: Sequence[Target],
-    slow: np.ndarray,
-    kept: int,
+    reduced: ReducedVehicle, table: FeatureTable, goals: Sequence[Target], kept: int
 ) -> tuple[ReducedVehicle, FeatureTable]:
-    """A reduced vehicle of `kept` lateral terms beyond the linear ones; the lifting keeps its own.
+    """A reduced vehicle of `kept` nonlinear terms; the lifting keeps its own.
 
-    Its coefficients are best near the goals, all of which it must finish; `slow` are slow
-    coordinates and speed (samples, states) of the training runs.
+    Its coefficients are best near the goals, all of which it must finish.
     """
-    k = reduced.features.states - 1
     normal = normal_matrix(reduced, goals, table.free)
     c = reduced.coefficients.copy()
-    odd, even = table.odd_nonlinear, table.even_nonlinear
-    places = [(i, column) for terms, column in table.free for i in terms]
-    rows, columns = np.array(places).T
-    numbers = {place: n for n, place in enumerate(places)}
-    lateral = sorted({column for _, column in places})
-    groups = [[numbers[i, column] for column in lateral] for i in odd]
+    rows, columns = np.array([(i, column) for terms, column in table.free for i in terms]).T
+    nonlinear = sorted([*table.odd_nonlinear, *table.even_nonlinear])
+    groups = [np.flatnonzero(rows == i) for i in nonlinear]
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
-    # The symmetric equations are fitted to rates; each counts by its nonlinear part.
-    inputs = np.concatenate([goal.inputs for goal in goals])
-    values = feature_columns(reduced.features, slow, inputs, reduced.parameters)[:, even]
-    symmetric = c[np.ix_(even, [k, k + 2])]
-    sizes = np.mean((values @ symmetric) ** 2, axis=0)
-    weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
-    normal = np.kron(np.diag(weights), values.T @ values)
-    groups = [[i, len(even) + i] for i in range(len(even))]
-    most = min(len(even), max(1, round(SYMMETRIC * kept)))
-    left_even, changed = surviving(normal, symmetric.T.ravel(), groups, most)
-    c[np.ix_(even, [k, k + 2])] = changed.reshape(2, -1).T
-    linear = [*table.odd[: table.linear_count], *table.even[:2]]
-    stay = sorted([*linear, *(odd[i] for i in left), *(even[i] for i in left_even)])
+    linear = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
+    stay = sorted([*linear, *(nonlinear[i] for i in left)])
     fewer = table.with_only(stay)
     return (
         replace(

@@ -10,43 +10,17 @@ from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system import Run, System
+from vehiclemor.simulation.system import Points, System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
-
-
-@dataclass(frozen=True)
-class Transient:
-    """Decaying motion that the reduced coordinates leave out, from a start that is no equilibrium.
-
-    Linear, in closed form: the sum over modes of right w^T d exp(rate t), with d the deviation of
-    the start's shape.
-
-    Attributes
-    ----------
-    rates
-        Eigenvalues (m,) in 1/s, one of each conjugate pair.
-    left, right
-        Eigenvectors (m, n), scaled so that real parts of the sum are the motion.
-    """
-
-    rates: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-
-    def at(self, times: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-        """Shapes (samples, n) to be added, for the start's deviation (n,)."""
-        amplitudes = self.left @ deviation
-        return np.real(np.exp(np.outer(times, self.rates)) * amplitudes @ self.right)
-
-
-NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +100,6 @@ class ReducedVehicle(ShortRepr):
             self.solver,
             self.tolerance,
             self.encoded,
-            self.lifted,
         )
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -136,16 +109,14 @@ class ReducedVehicle(ShortRepr):
         x, y, heading = self.model.planar
         return np.concatenate([z, state[[heading, x, y]]])
 
-    def lifted(self, run: Run, inputs: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Full states (samples, 2 n) of a run from a full state (2 n,)."""
-        k = self.features.states
-        features = self.lifted_features or self.features
-        columns = feature_columns(features, run.path[:, :k], inputs, self.parameters)
-        shapes = self.shape.reference + columns @ self.lifting
-        if len(self.transient.rates):
-            deviation = self.shape.of(start[None])[0] - self.shape.reference
-            shapes += self.transient.at(run.times, deviation)
-        return self.shape.states(shapes, run.path[:, [k + 1, k + 2, k]])
+    @cached_property
+    def lift(self) -> Lifting:
+        """The compiled way back to full states."""
+        shape, features = self.shape, self.lifted_features or self.features
+        coefficients, reference = self.lifting, shape.reference
+        return Lifting(
+            features, self.parameters, coefficients, reference, shape.layout, self.transient
+        )
 
     def path(
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
@@ -156,7 +127,29 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        return self.equations.simulate(maneuver, start)
+        excited, inputs = self._excited(start), recorded_inputs(maneuver)[1]
+        run = self.equations.run(maneuver, start, direct_until=decayed(excited))
+        points = run.points or Points(inputs, run.times, run.times[:0])
+        states, trust = self.lift.states(points.moments, run.path, points.inputs, excited)
+        if run.points is None or run.points.places[0, 1] < 0.0:
+            # The start is known better than its slow part.
+            full = self.model.start(start)
+            states[0, : len(full)] = full
+        return self.model.recorded(maneuver, run, inputs, states).judged(trust)
+
+    def _excited(self, start: Start) -> np.ndarray:
+        """What of the transient a start excites; kept where it is a named one."""
+        if isinstance(start, str) and start in self._starts:
+            return self._starts[start]
+        state = self.model.start(start)
+        found = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+        if isinstance(start, str):
+            self._starts[start] = found
+        return found
+
+    @cached_property
+    def _starts(self) -> dict[str, np.ndarray]:
+        return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002
         """Lifted shapes lie on no subspace."""

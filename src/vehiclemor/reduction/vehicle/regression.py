@@ -2,6 +2,9 @@
 
 import numpy as np
 
+# Columns of which less than this share is left are sums of those chosen before.
+DEPENDENT = 1e-8
+
 
 def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
     """Coefficients (terms, ...) of the fit of values (samples, ...) on columns (samples, terms).
@@ -27,3 +30,39 @@ def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     scale = np.sqrt(np.diag(normal))
     scale[scale == 0.0] = 1.0
     return normal / np.outer(scale, scale), scale
+
+
+def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
+    """Numbers of the columns that explain most, one after the other (orthogonal least squares).
+
+    S. Chen, S. A. Billings, W. Luo, Int. J. Control 50 (1989), 1873-1896.
+
+    Parameters
+    ----------
+    columns
+        Columns (samples, terms); the first `given` are chosen already.
+    values
+        Values (samples, targets), scaled so that their squares may be added.
+    more
+        How many are chosen beside the given ones.
+    """
+    scale = np.sqrt(np.mean(columns**2, axis=0))
+    scale[scale == 0.0] = 1.0
+    columns = columns / scale
+    normal, products = columns.T @ columns, columns.T @ values
+    least = DEPENDENT * np.diag(normal)
+    chosen: list[int] = []
+    while len(chosen) < min(given + more, len(normal)):
+        if len(chosen) < given:
+            best = len(chosen)
+        else:
+            sizes = np.diag(normal)
+            gains = np.sum(products**2, axis=1) / np.maximum(sizes, least)
+            gains[(sizes <= least) | np.isin(np.arange(len(gains)), chosen)] = -1.0
+            best = int(np.argmax(gains))
+        chosen.append(best)
+        if normal[best, best] > least[best]:
+            row = normal[best] / normal[best, best]
+            products = products - np.outer(row, products[best])
+            normal = normal - np.outer(row, normal[best])
+    return chosen

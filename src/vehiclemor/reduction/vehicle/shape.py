@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.reduction.vehicle.feature_kernels import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -85,6 +86,13 @@ class VehicleShape:
     def speed(self) -> float:
         """Speed of straight running in m/s."""
         return float(self.motion(self.reference[None], self._no_input(1))[1][0, 1])
+
+    @property
+    def layout(self) -> Layout:
+        """Where it stands in the states."""
+        model = self.model
+        kept, planar = self.kept.tolist(), model.planar.tolist()
+        return Layout(2 * len(model.coordinates), kept, planar, self.pairs)
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """Shapes (samples, n) of states (samples, 2 n)."""

@@ -17,14 +17,15 @@ from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
+MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of roll", "steering")
 
 
 @dataclass(frozen=True)
 class FeatureTable:
     """Features with the numbers of those that are odd and even in the lateral quantities.
 
-    The first odd ones, `linear_count` of them, are the slow coordinates and the inputs, the first
-    two even ones are 1 and the speed.
+    The first odd ones, `linear_count` of them, are lateral coordinates and the inputs, the first
+    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.
     """
 
     features: Features
@@ -32,6 +33,7 @@ class FeatureTable:
     odd: list[int]
     even: list[int]
     linear_count: int
+    straight_count: int
 
     @property
     def odd_nonlinear(self) -> list[int]:
@@ -41,14 +43,16 @@ class FeatureTable:
     @property
     def even_nonlinear(self) -> list[int]:
         """Even features that are not linear."""
-        return self.even[2:]
+        return self.even[self.straight_count :]
 
     @property
     def free(self) -> list[tuple[list[int], int]]:
         """(features, column of C) of the coefficients that whole runs may change."""
-        k = self.features.states - 1
-        lateral = [(self.odd_nonlinear, column) for column in range(k)]
-        return [*lateral, (self.odd, k + 1), (self.odd, k + 3)]
+        (_, lateral), (_, symmetric) = self.features.groups
+        heading = self.features.states
+        free = [(self.odd_nonlinear, column) for column in lateral if column < heading]
+        free += [(self.odd, column) for column in lateral if column >= heading]
+        return [*free, *((self.even_nonlinear, column) for column in symmetric)]
 
     def with_only(self, kept: Sequence[int]) -> "FeatureTable":
         """Some of the features, by their numbers in order."""
@@ -60,20 +64,25 @@ class FeatureTable:
         groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
         features = replace(self.features, terms=terms, groups=groups)
         first, rest = list(numbers[: len(odd)]), list(numbers[len(odd) :])
-        return FeatureTable(features, self.parameters, first, rest, self.linear_count)
+        return replace(self, features=features, odd=first, even=rest)
 
 
 def feature_table(
-    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, hull: float, nonlinearity: str
+    shape: VehicleShape,
+    modes: SlowModes,
+    samples: ShapeSamples,
+    nonlinearity: str,
+    hull: float,
+    trusted: float,
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     u = samples.inputs
     z, speed = modes.coordinates(samples.deviations, u)
-    k, inputs = z.shape[1], u.shape[1]
+    k, n, inputs = modes.lateral, z.shape[1], u.shape[1]
     rows = _variables(shape, modes)
     # The axles' slips go as one over the speed where they come from motion, not from steering.
     at_speed = shape.speed / (shape.speed + speed)
-    values = np.column_stack([z, u[:, 0]]) @ rows[:, : k + 1].T
+    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
     values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
     reach = hull * float(largest(speed[:, None])[0] or 1.0)
     scales = 1.0 / (hull * largest(values))
@@ -88,8 +97,8 @@ def feature_table(
         # In [-1, 1]: nothing is known of what lies beyond the training runs.
         return f"0.5 * (abs({text} + 1.0) - abs({text} - 1.0))"
 
-    last = len(VARIABLES) * width + k + inputs
-    lines = [("part", f"p[{last}] / (p[{last}] + z{k})"), ("raw", f"p[{last + 1}] * z{k}")]
+    last = len(VARIABLES) * width + n + inputs
+    lines = [("part", f"p[{last}] / (p[{last}] + z{n})"), ("raw", f"p[{last + 1}] * z{n}")]
     lines.append(("m", held("raw")))
     for i in range(len(VARIABLES)):
         moved = " + ".join(f"p[{i * width + j}] * z{j}" for j in range(k))
@@ -99,8 +108,8 @@ def feature_table(
         lines += [(f"raw{i}", text), (f"v{i}", held(f"raw{i}"))]
     first = len(VARIABLES) * width
     v = [f"v{i}" for i in range(len(VARIABLES))]
-    straight = [f"p[{first + i}] * z{i}" for i in range(k)]
-    straight += [f"p[{first + k + j}] * u{j}" for j in range(inputs)]
+    own = [f"p[{first + i}] * z{i}" for i in range(n)]
+    straight = [*own[:k], *(f"p[{first + n + j}] * u{j}" for j in range(inputs))]
     scaled = straight[: k + 1]
     odd = [*straight, *(f"m * {t}" for t in scaled), *(f"m * m * {t}" for t in scaled)]
     odd += monomials(v, 3)
@@ -112,12 +121,22 @@ def feature_table(
         odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
     if nonlinearity == "rich":
         odd += [f"m * {term}" for term in monomials(v, 3)]
-    even = ["1.0", f"z{k}", *monomials(v, 2), *(f"m * {pair}" for pair in monomials(v, 2))]
+    odd += [f"{e} * {variable}" for e in own[k:] for variable in v]
+    even = [
+        "1.0",
+        f"z{n}",
+        *own[k:],
+        *monomials(v, 2),
+        *(f"m * {pair}" for pair in monomials(v, 2)),
+    ]
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
-    groups = ((lateral, (*range(k), k + 1, k + 3)), (symmetric, (k, k + 2)))
-    features = Features(k + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks)
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), k + inputs)
+    groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
+    edge = f"{hull / trusted!r} * raw"
+    watched = ((edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS)))
+    features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, watched)
+    counts = k + inputs, 2 + n - k
+    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
 
 
 def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:
@@ -125,15 +144,15 @@ def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:
 
     The steering moves the shape (last but one) and the wheels themselves (last).
     """
-    linear, outputs = shape.linearised, shape.model.outputs
+    linear, outputs, k = shape.linearised, shape.model.outputs, modes.lateral
 
     def row(name: str) -> np.ndarray:
         a, b = linear.output_a[outputs.index(name)], linear.output_b[outputs.index(name), 0]
-        return np.concatenate([a @ modes.right, [a @ modes.follow, b]])
+        return np.concatenate([a @ modes.right[:, :k], [a @ modes.follow, b]])
 
     front = 0.5 * (row("slip_angle_FL") + row("slip_angle_FR"))
     rear = 0.5 * (row("slip_angle_RL") + row("slip_angle_RR"))
     roll = row("roll")
-    rolling = np.concatenate([roll[:-2] @ modes.rates, [0.0, 0.0]])
-    steer = np.concatenate([np.zeros(len(roll) - 2), [1.0, 0.0]])
+    rolling = np.concatenate([roll[:k] @ modes.rates[:k, :k], [0.0, 0.0]])
+    steer = np.concatenate([np.zeros(k), [1.0, 0.0]])
     return np.array([front, rear, roll, rolling, steer])

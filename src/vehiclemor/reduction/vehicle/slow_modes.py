@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.reduced_vehicle import Transient
+from vehiclemor.reduction.vehicle.lifting import Transient
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.
@@ -22,10 +22,12 @@ STILL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SlowModes:
-    """Slow modes that steering moves, in real form.
+    """Slow modes in real form: those that steering moves, then the slowest symmetric ones.
 
     Attributes
     ----------
+    lateral
+        How many coordinates steering moves.
     rates
         Matrix (k, k), blocks of two for conjugate pairs.
     left, right
@@ -39,9 +41,10 @@ class SlowModes:
     speed_left, speed_right
         Mode of the speed (n,), scaled so that U grows by one.
     symmetric
-        Modes that steering does not move, as the transient of a start.
+        The other modes that steering does not move, as the transient of a start.
     """
 
+    lateral: int
     rates: np.ndarray
     left: np.ndarray
     right: np.ndarray
@@ -72,8 +75,8 @@ class SlowModes:
         )
 
 
-def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
-    """Slow modes with |lambda| up to `fastest` (1/s).
+def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
+    """Slow modes with |lambda| up to `fastest` (1/s), and so many symmetric ones (or pairs).
 
     The inputs are the steering and its derivatives, as many as the model has.
     """
@@ -88,16 +91,24 @@ def slow_modes(shape: VehicleShape, fastest: float) -> SlowModes:
     moving = np.abs(values) >= STILL
     moving[still] = False
     w, v = real_modes(values, left, right, steers & moving & (np.abs(values) <= fastest))
+    lateral = len(w)
+    quiet = np.flatnonzero(
+        ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & apart(values)
+    )
+    quiet = quiet[np.argsort(np.abs(values[quiet]))]
+    if symmetric:
+        chosen = np.isin(np.arange(len(values)), quiet[:symmetric])
+        more_w, more_v = real_modes(values, left, right, chosen)
+        w, v = np.vstack([w, more_w]), np.hstack([v, more_v])
+        quiet = quiet[symmetric:]
     rates = w @ linear.a @ v
     b = w @ linear.b
     feedthrough, drive = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.motion_a[1] @ right[:, still].real
-    quiet = np.flatnonzero(
-        ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & apart(values)
-    )
     double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
     return SlowModes(
+        lateral,
         rates,
         w,
         v,

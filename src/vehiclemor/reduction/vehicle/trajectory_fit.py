@@ -20,12 +20,15 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
 from vehiclemor.simulation.trajectory import Trajectory
 
-# Errors that count the same: heading in rad, lateral position in m, part of a slow coordinate's
-# range.
-HEADING, POSITION, PART = 1e-4, 0.02, 0.01
-# Runs are compared at every fifth output time.
-STRIDE = 5
+# Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
+HEADING, PLACE, PART = 7.6e-5, 0.03, 0.02
+# The variational equations take by default every so many output times, runs are compared at every
+# so many of their steps.
+STRIDE, COMPARED = 2, 4
+# Where the slow coordinates have come to rest, to this part of their range, steps are longer.
+REST, LONG_STRIDE = 3e-4, 25
 DIFFERENCE = 1e-6
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
 # (numbers of features, column) of the coefficients that may change.
@@ -42,25 +45,47 @@ class Target:
         Output times (samples,) in s, and inputs (samples, inputs) then.
     states
         Reduced states (samples, states + 3): coordinates, heading, place.
+    steps
+        Numbers of the output times that the variational equations step on.
     """
 
     run: TrainingRun
     times: np.ndarray
     inputs: np.ndarray
     states: np.ndarray
+    steps: np.ndarray
+
+    @property
+    def compared(self) -> np.ndarray:
+        """Numbers of the output times at which runs are compared, the last one among them."""
+        return self.steps[(len(self.steps) - 1) % COMPARED :: COMPARED]
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Root of the part of the run's time that each of them stands for."""
+        widths = np.gradient(self.times[self.compared])
+        return np.sqrt(widths / widths.sum())
 
 
 def targets(
-    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
+    reduced: ReducedVehicle,
+    training: Training,
+    runs: Sequence[Trajectory],
+    stride: int = STRIDE,
 ) -> list[Target]:
-    """Training runs in reduced states."""
+    """Training runs in reduced states; the variational equations take every `stride`th time."""
     x, y, heading = reduced.model.planar
-    result = []
+    k, result = reduced.features.states - 1, []
     for run, true in zip(training, runs, strict=True):
         deviations = reduced.shape.of(true.states) - reduced.shape.reference
         z = deviations @ reduced.encoding.T - true.inputs @ reduced.feedthrough.T
         states = np.hstack([z, true.states[:, [heading, x, y]]])
-        result.append(Target(run, true.time, true.inputs, states))
+        moved = np.abs(z[:, :k] - z[-1, :k]).max(axis=1)
+        restless = np.flatnonzero(moved > REST * moved.max())
+        last = len(z) - 1
+        rest = int(restless[-1]) if len(restless) else 0
+        steps = [*range(0, rest, stride), *range(rest, last, LONG_STRIDE), last]
+        result.append(Target(run, true.time, true.inputs, states, np.array(steps)))
     return result
 
 
@@ -85,6 +110,11 @@ def improved(
                 break
             damping *= 10.0
     return reduced
+
+
+def spread(goals: Sequence[Target], share: float) -> list[Target]:
+    """A share of the goals, spread over them without a period (multiples of the golden ratio)."""
+    return [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
 
 
 def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
@@ -115,40 +145,45 @@ def _compared(reduced: ReducedVehicle, goals: Sequence[Target]) -> tuple[list[np
         if path is None:
             return [], np.inf
         paths.append(path)
-        total += float(np.sum(((path - goal.states)[::STRIDE] * scale) ** 2))
+        total += float(np.sum(_errors(goal, path, scale) ** 2))
     return paths, total
 
 
 def _scale(goals: Sequence[Target]) -> np.ndarray:
-    """Weights (states + 3,) of errors; the speed and the way along the road don't count."""
+    """Weights (states + 3,) of errors; the speed counts by the place."""
     slow = goals[0].states.shape[1] - PLANAR - 1
     ranges = np.max([np.abs(goal.states[:, :slow]).max(axis=0) for goal in goals], axis=0)
-    return np.concatenate([1.0 / (PART * ranges), [0.0, 1.0 / HEADING, 0.0, 1.0 / POSITION]])
+    return np.concatenate([1.0 / (PART * ranges), [0.0, 1.0 / HEADING, 1.0 / PLACE, 1.0 / PLACE]])
+
+
+def _errors(goal: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Weighted errors (compared times, states + 3) of a reduced run."""
+    return (path - goal.states)[goal.compared] * scale * goal.shares[:, None]
 
 
 def _normal_equations(
     reduced: ReducedVehicle, goals: Sequence[Target], paths: Sequence[np.ndarray], free: Free
 ) -> tuple[np.ndarray, np.ndarray]:
     scale = _scale(goals)
-    kept = np.flatnonzero(scale)
     size = sum(len(terms) for terms, _ in free)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for goal, path in zip(goals, paths, strict=True):
-        sensitivity = _sensitivities(reduced, goal, path, free)[:, kept] * scale[kept][:, None]
+        sensitivity = _sensitivities(reduced, goal, path, free)
+        sensitivity *= scale[:, None] * goal.shares[:, None, None]
         rows = sensitivity.reshape(-1, size)
-        error = ((path - goal.states)[::STRIDE] * scale)[:, kept].ravel()
         normal += rows.T @ rows
-        gradient += rows.T @ error
+        gradient += rows.T @ _errors(goal, path, scale).ravel()
     return normal, gradient
 
 
 def _sensitivities(
     reduced: ReducedVehicle, goal: Target, path: np.ndarray, free: Free
 ) -> np.ndarray:
-    """Derivatives (samples / STRIDE, states + 3, free coefficients) of a reduced run."""
+    """Derivatives (compared times, states + 3, free coefficients) of a reduced run."""
     k, c = reduced.features.states, reduced.coefficients
-    z, heading = path[:, :k], path[:, k]
-    columns = feature_columns(reduced.features, z, goal.inputs, reduced.parameters)
+    path, inputs = path[goal.steps], goal.inputs[goal.steps]
+    z, heading = np.ascontiguousarray(path[:, :k]), path[:, k]
+    columns = feature_columns(reduced.features, z, inputs, reduced.parameters)
     values = columns @ c
     dim, samples = k + PLANAR, len(path)
     cosine, sine = np.cos(heading), np.sin(heading)
@@ -162,9 +197,7 @@ def _sensitivities(
         width = DIFFERENCE * max(1.0, float(np.abs(z[:, j]).max()))
         shifted = z.copy()
         shifted[:, j] += width
-        change = (
-            feature_columns(reduced.features, shifted, goal.inputs, reduced.parameters) @ c - values
-        )
+        change = feature_columns(reduced.features, shifted, inputs, reduced.parameters) @ c - values
         jacobian[:, :, j] = np.einsum("nij,nj->ni", spread, change / width)
     forward, sideward = values[:, k + 1], values[:, k + 2]
     jacobian[:, k + 1, k] = -forward * sine - sideward * cosine
@@ -173,15 +206,15 @@ def _sensitivities(
         [spread[:, :, [column]] * columns[:, None, list(terms)] for terms, column in free], axis=2
     )
     # The trapezoidal rule, for all coefficients at once.
-    half = 0.5 * np.diff(goal.times)[:, None, None]
+    half = 0.5 * np.diff(goal.times[goal.steps])[:, None, None]
     identity = np.eye(dim)
     inverse = np.linalg.inv(identity - half * jacobian[1:])
     advance = inverse @ (identity + half * jacobian[:-1])
-    pushed = inverse @ (half * (forcing[1:] + forcing[:-1]))
+    pushed = (inverse * half) @ (forcing[1:] + forcing[:-1])
     current = np.zeros(forcing.shape[1:])
-    kept = [current]
-    for n in range(samples - 1):
-        current = advance[n] @ current + pushed[n]
-        if (n + 1) % STRIDE == 0:
+    kept, first = [current], (samples - 1) % COMPARED
+    for n in range(1, samples):
+        current = advance[n - 1] @ current + pushed[n - 1]
+        if (n - first) % COMPARED == 0:
             kept.append(current)
-    return np.array(kept)
+    return np.array(kept[-len(goal.compared) :])

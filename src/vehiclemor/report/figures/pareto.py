@@ -17,7 +17,7 @@ GREYS = (("#000000", "-"), ("#777777", "-"), ("#AAAAAA", "-"), ("#444444", "--")
 
 
 def figure_pareto(results: Results) -> Figure:
-    """Score (worst error as a multiple of its bound) over mean online time, one model."""
+    """Score (worst error over its bound) over the mean time of a whole call, one model."""
     (dataset,) = results.values()
     rows = method_rows(dataset, protocol_of(dataset))
     figure, axes = panels(1, 1, (6.7, 4.2))
@@ -36,8 +36,8 @@ def figure_pareto(results: Results) -> Figure:
     axis.set_yscale("log")
     axis.set_xscale("log")
     axis.set_ylim(top=top)
-    axis.set_xlabel("mean online time of a test run in µs")
-    axis.set_ylabel("worst error / bound, test set")
+    axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
+    axis.set_ylabel("worst error / bound, judged runs")
     figure.legend(loc="outside right upper", fontsize=7)
     return figure
 
@@ -46,7 +46,7 @@ def _draw_full_order(axis: Axes, rows: Sequence[Row]) -> None:
     """A line for each integrator, through its tolerances."""
     families: dict[str, list[tuple[float, float, float]]] = {}
     for row in rows:
-        points = families.setdefault(str(row["method"]).rsplit(" ", 1)[0], [])
+        points = families.setdefault(str(row["contestant"]), [])
         if np.isfinite(row["score"]) and row["score"] > 0.0:
             points.append((row["seconds"] * 1e6, row["score"], row["spread"]))
     for (family, points), (color, line) in zip(families.items(), cycle(GREYS), strict=False):
@@ -62,7 +62,7 @@ def _draw_reduced(axis: Axes, row: Row, look: tuple[str, str], top: float) -> No
     failed = not np.isfinite(row["score"])
     if not np.isfinite(row["seconds"]):
         return
-    words = f"{row['method']}{' (fails)' if failed else ''}{' (winner)' if winner else ''}"
+    words = f"{row['method']}{' (fails)' if failed else ''}{' (chosen)' if winner else ''}"
     place = row["seconds"] * 1e6, top / 1.5 if failed else row["score"]
     # Hollow, so that one shows through the other; bars: between the quartiles of the rounds.
     axis.errorbar(

@@ -1,5 +1,6 @@
 """Predictive comparison: reduced models on inputs that they have not seen, beside full order."""
 
+import json
 import math
 from pathlib import Path
 
@@ -7,14 +8,22 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from vehiclemor.report.predictive.equal_error import at_error
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
+from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
-from vehiclemor.study.plans.choice import scores
+from vehiclemor.simulation.trajectory import FINISHED
+from vehiclemor.study.plans.choice import outcomes
+from vehiclemor.study.plans.ledger import Drawn, ledger, pooled
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.study.plans.protocol_results import judged_part
 from vehiclemor.study.run import run_studies
 
 STUDY = "predictive"
+OUTSIDE = ("outside", "drawn_outside")
+# Column of seconds -> what is timed.
+CLOCKS = {"seconds": "whole call", "loop_seconds": "compiled loop"}
 
 
 def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd.DataFrame:
@@ -23,21 +32,23 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
     Returns
     -------
     pandas.DataFrame
-        `kind` tells what a row is.  `method`: one contestant on the test set, with the columns of
-        `method_rows`.  `outside`: its errors in one scenario outside of the training range.
-        `target`: what the winner must reach, with `id`, `bound`, `measured`, `unit`, `verdict`
-        (`met`, `missed` or `not_comparable`), `reason` and `threshold_source`.  `paper`: POD at the
-        paper's rank and control period, see `paper_terms`.  Errors
-        `worst_<measure>_<output>` are in SI units.
+        `kind` tells what a row is.  `method`: one contestant on what is judged, with the columns of
+        `method_rows`.  `target`: what the contender that validation has chosen must reach, with
+        `id`, `bound`, `measured`, `unit`, `verdict` (`met`, `missed` or `not_comparable`), `reason`
+        and `threshold_source`.  `draw`: a draw of the ledger.  `paper`: POD at the paper's rank and
+        control period, see `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
     """
     rows: list[Row] = []
     models: list[str] = []
     for dataset in run_studies(study, folder, jobs).values():
         protocol = protocol_of(dataset)
         models.append(protocol.model)
-        methods = method_rows(dataset, protocol)
-        rows += methods + outside_rows(dataset, protocol)
+        name = str(dataset.attrs["study"]).removeprefix(f"{STUDY}-")
+        draws = ledger(name, folder, bool(dataset.attrs["own"]))
+        methods = method_rows(dataset, protocol, draws)
+        rows += methods
         rows += target_rows(dataset, protocol, methods)
+        rows += [_draw_row(entry) for entry in draws]
     if study == STUDY:
         rows += paper_terms_rows(models, folder)
     return pd.DataFrame(rows)
@@ -48,63 +59,94 @@ def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
     return ProtocolFile.model_validate_json(dataset.attrs["configuration"])
 
 
-def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
-    """One row for each contestant, fastest full-order integrators as measures.
+def method_rows(
+    dataset: xr.Dataset, protocol: ProtocolFile, draws: list[Drawn] | None = None
+) -> list[Row]:
+    """One row for each contestant, full-order integrators as measures.
 
+    `runs` are judged; of these `misses` miss a bound, `silent` ones with the status ok; `flagged`
+    are those of which the model says that it has left what it knows.  `rate_bound`: largest rate of
+    misses that is not excluded at 95 %, of this draw, and `pooled_bound` of all of the ledger.
     `score` is the largest error of a bounded output as a multiple of its bound (infinite if a run
-    has failed), `seconds` the mean of the test scenarios that are ok, with the `spread` of their
-    rounds (interquartile range over median).  `ratio_equal_accuracy` is
-    against the fastest full-order row whose score is not larger (`equal_accuracy`; if there is
-    none, against the most accurate one and `equal_accuracy_reached` is false), `ratio_within`
-    against the fastest full-order row within the bounds.  `break_even`: runs after which the
-    offline seconds are earned against the first of them.
+    has failed), `seconds` the mean of whole calls, `loop_seconds` of their compiled loops, with the
+    `spread` of the rounds (interquartile range over median).  `ratio_equal` and `ratio_equal_loop`
+    are against the full order interpolated at the row's own score, `ratio_within` against the
+    fastest full-order row within the bounds.  `break_even`: runs after which the offline seconds
+    are earned against the first of them.
     """
-    test = dataset.isel(scenario=dataset["scenario_set"].values == "test")
-    rows: list[Row] = []
-    for label in test["row"].values:
-        part = test.sel(row=label)
-        ok = part["status"].values == "ok"
-        score = float(scores(part, protocol.bounds).max())
-        row: Row = {
-            "kind": "method",
-            "model": protocol.model,
-            "method": str(label),
-            "role": str(part["role"].item()),
-            "component": str(part["method"].item()),
-            "rank": int(part["effective_rank"]),
-            "settings": str(part["settings"].item()),
-            "score": score,
-            "within_bounds": score <= 1.0,
-            "winner": False,
-            "stable_share": float(ok.mean()),
-            "failure": _failure(part),
-            **_errors(part, protocol),
-            "validation_score": float(part["validation_score"]),
-            "candidates": str(part["validation"].item()),
-            "evaluations": _mean(part[dataset.attrs["evaluations"]].values, ok),
-            "seconds": _mean(part["seconds"].values, ok),
-            "spread": _spread(part, ok),
-            "offline_seconds": float(part["offline_seconds"]),
-            "offline_evaluations": int(part["offline_evaluations"]),
-        }
-        rows.append(row)
+    part = judged_part(dataset)
+    rows = [_method_row(dataset, part, str(label), protocol) for label in part["row"].values]
     full = [row for row in rows if row["role"] == FULL_ORDER and math.isfinite(row["score"])]
+    ladders = [
+        [row for row in full if row["contestant"] == name]
+        for name in dict.fromkeys(row["contestant"] for row in full)
+    ]
     for row in rows:
-        row.update(_against(row, full))
-    winner = find_winner(rows)
-    if winner is not None:
-        winner["winner"] = True
+        row.update(_against(row, full, ladders))
+        misses, silent, runs = pooled(draws or (), row["method"])
+        row |= {"pooled_misses": misses, "pooled_silent": silent, "pooled_runs": runs}
+        row["pooled_bound"] = upper_bound(misses, runs) if runs else math.nan
     return rows
+
+
+def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: ProtocolFile) -> Row:
+    part, bounds = judged.sel(row=label), protocol.bounds
+    found = outcomes(part, bounds)
+    beyond = np.isin(dataset["scenario_set"].values, OUTSIDE)
+    outside = outcomes(dataset.isel(scenario=beyond).sel(row=label), bounds)
+    # What has come to its end, trusted or not, is timed.
+    ok = np.isfinite(found.scores)
+    runs, misses = part.sizes["scenario"], int(found.missed.sum())
+    row: Row = {
+        "kind": "method",
+        "model": protocol.model,
+        "method": label,
+        "contestant": str(part["contestant"].item()),
+        "role": str(part["role"].item()),
+        "component": str(part["method"].item()),
+        "rank": int(part["effective_rank"]),
+        "settings": str(part["settings"].item()),
+        "bounds": json.dumps({o: (b.bound, b.reason) for o, b in bounds.items()}),
+        "winner": bool(part["winner"]),
+        "runs": runs,
+        "misses": misses,
+        "silent": int(found.silent.sum()),
+        "flagged": int(found.flagged.sum()),
+        "flagged_misses": int((found.missed & ~found.silent).sum()),
+        "rate_bound": upper_bound(misses, runs),
+        "score": float(found.scores.max()),
+        "within_bounds": misses == 0,
+        "stable_share": float(ok.mean()),
+        "failure": _failure(part),
+        "outside_runs": len(outside.scores),
+        "outside_misses": int(outside.missed.sum()),
+        "outside_silent": int(outside.silent.sum()),
+        "outside_flagged": int(outside.flagged.sum()),
+        **_errors(part, protocol),
+        "validation_score": float(part["validation_score"]),
+        "candidates": str(part["validation"].item()),
+        "evaluations": _mean(part[dataset.attrs["evaluations"]].values, ok),
+        "spread": _spread(part),
+        "offline_seconds": float(part["offline_seconds"]),
+        "offline_evaluations": int(part["offline_evaluations"]),
+    }
+    return row | {clock: _mean_time(part, clock) for clock in CLOCKS if clock in part}
 
 
 def _mean(values: np.ndarray, ok: np.ndarray) -> float:
     return float(np.mean(values[ok])) if ok.any() else math.nan
 
 
-def _spread(part: xr.Dataset, ok: np.ndarray) -> float:
+def _mean_time(part: xr.Dataset, name: str) -> float:
+    """Mean over the runs that were timed."""
+    values = part[name].values
+    return _mean(values, np.isfinite(values))
+
+
+def _spread(part: xr.Dataset) -> float:
     """Interquartile range of the rounds over their median, of all scenarios together."""
-    seconds = _mean(part["seconds"].values, ok)
-    width = _mean((part["seconds_upper"] - part["seconds_lower"]).values, ok)
+    seconds = _mean_time(part, "seconds")
+    width = _mean_time(part, "seconds_upper") - _mean_time(part, "seconds_lower")
     return width / seconds if seconds > 0.0 else 0.0
 
 
@@ -113,69 +155,57 @@ def _failure(part: xr.Dataset) -> str:
     for scenario, status, message in zip(
         part["scenario"].values, part["status"].values, part["message"].values, strict=True
     ):
-        if status != "ok":
+        if status not in FINISHED:
             return f"{status} in ({scenario}): {message}"
     return ""
 
 
 def _errors(part: xr.Dataset, protocol: ProtocolFile) -> Row:
-    """Worst error by output; of the runs that are ok only, since the others have none."""
+    """Worst and 99 % errors by output, of the runs that have come to their end."""
     found: Row = {}
-    for column, (output, measure) in error_columns(protocol).items():
+    for name, (output, measure) in error_columns(protocol).items():
         values = part[f"{measure}_error"].sel(output=output).values
         finite = values[np.isfinite(values)]
-        found[column] = float(finite.max()) if finite.size else math.nan
+        for word, share in (("worst", 1.0), ("most", 0.99)):
+            value = float(np.quantile(finite, share)) if finite.size else math.nan
+            found[f"{word}_{name}"] = value
     return found
 
 
-def _against(row: Row, full: list[Row]) -> Row:
-    """Ratios of a row to full-order rows, and its break-even."""
-    accurate = [other for other in full if other["score"] <= row["score"]]
+def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
+    """Ratios of a row to the full order, and its break-even."""
     within = [other for other in full if other["within_bounds"]]
-    equal = _fastest(accurate) or min(full, key=lambda o: o["score"], default=None)
-    best = _fastest(within)
-    saved = equal["seconds"] - row["seconds"] if equal and row["stable_share"] == 1.0 else -1.0
+    best = min(within, key=lambda other: other["seconds"], default=None)
+    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS if clock in row}
+    ratios = {c: e.seconds / row[c] if row[c] > 0.0 else math.nan for c, e in equal.items()}
+    saved = equal["seconds"].seconds - row["seconds"]
     return {
-        "equal_accuracy": equal["method"] if equal else "",
-        "equal_accuracy_reached": bool(accurate),
-        "ratio_equal_accuracy": ratio(equal, row),
+        "equal_rows": ", ".join(equal["seconds"].rows),
+        "ratio_equal": ratios["seconds"],
+        "ratio_equal_loop": ratios.get("loop_seconds", math.nan),
         "within": best["method"] if best else "",
         "ratio_within": ratio(best, row),
         "break_even": row["offline_seconds"] / saved if saved > 0.0 else math.inf,
     }
 
 
-def _fastest(rows: list[Row]) -> Row | None:
-    return min(rows, key=lambda row: row["seconds"], default=None)
+def chosen(rows: list[Row]) -> Row | None:
+    """The contender that validation has chosen."""
+    return next((row for row in rows if row["winner"]), None)
 
 
-def find_winner(rows: list[Row]) -> Row | None:
-    """The fastest reduced model within the bounds; if there is none, the most accurate one."""
-    racing = [r for r in rows if r["role"] != FULL_ORDER and r["component"] != "replay"]
-    within = [row for row in racing if row["within_bounds"] and row["stable_share"] == 1.0]
-    if within:
-        return _fastest(within)
-    return min(racing, key=lambda row: (row["score"], -row["stable_share"]), default=None)
-
-
-def outside_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
-    """Errors in every scenario outside of the training range, one by one."""
-    outside = dataset.isel(scenario=dataset["scenario_set"].values == "outside")
-    rows: list[Row] = []
-    for label in outside["row"].values:
-        for index in range(outside.sizes["scenario"]):
-            part = outside.sel(row=label).isel(scenario=[index])
-            rows.append(
-                {
-                    "kind": "outside",
-                    "model": protocol.model,
-                    "method": str(label),
-                    "role": str(part["role"].item()),
-                    "scenario": str(part["scenario"].item()),
-                    "score": float(scores(part, protocol.bounds).max()),
-                    "stable_share": float((part["status"].values == "ok").mean()),
-                    "failure": _failure(part),
-                    **_errors(part, protocol),
-                }
-            )
-    return rows
+def _draw_row(entry: Drawn) -> Row:
+    """A draw of the ledger: of the contender that was chosen then."""
+    label, row = next(
+        ((name, row) for name, row in entry.rows.items() if row.get("winner")), ("", {})
+    )
+    return {
+        "kind": "draw",
+        "model": entry.model,
+        "method": label,
+        "date": entry.date,
+        "digest": entry.digest,
+        "runs": entry.runs,
+        "apart": entry.apart,
+        **{name: row.get(name) for name in ("misses", "silent", "flagged")},
+    }

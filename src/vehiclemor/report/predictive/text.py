@@ -1,5 +1,6 @@
-"""The predictive comparison as text."""
+"""The predictive comparison as text: one screen a model."""
 
+import json
 import math
 
 import pandas as pd
@@ -13,23 +14,20 @@ from vehiclemor.report.verdicts import LARGEST_SPREAD, NOT_COMPARABLE, counted
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 LEGEND = {
-    "score": "largest error of a bounded output in any test scenario, as a multiple of its bound; "
-    "valid.: the same in validation, on which alone settings are chosen",
-    "us": "CPU time of a run, mean of the test set; off. s: offline; even: runs until that is "
-    "earned",
-    "x=": "times faster than the fastest full-order row at least as accurate (+: there is none, so "
-    "than the most accurate one); xb: than the fastest full-order row within the bounds",
-    "errors": "the worst of the test set, RMS, or largest where marked max; SI units; of reduced "
-    "models and of what the winner is measured against (all: --json)",
-    "outside": "scenarios beyond the training range; inf: the run has failed",
+    "miss": "runs outside of a bound; sil.: of these with the status ok; flag: runs of which the "
+    "model says that it has left what it knows; <: rate of misses excluded at 95 % "
+    "(Clopper-Pearson)",
+    "score": "largest error as a multiple of its bound; valid.: in validation, which alone chooses",
+    "us": "CPU time of a whole call, all outputs delivered; loop: of its compiled loop; x: times "
+    "faster than the full order interpolated at the same score; off.: offline, s",
     "bound": "with a * it is our own; n/c: not comparable, since the rounds scatter by more than "
     f"{100 * LARGEST_SPREAD:g} % (interquartile range over median)",
-    "*": "the winner",
+    "*": "chosen by validation",
 }
 
 
 def predictive_text(rows: pd.DataFrame) -> str:
-    """All models: summary, targets, methods on the test set, scenarios outside of the training."""
+    """All models: targets, errors of what was chosen, contenders, full order beside them."""
     records: list[Row] = [dict(row) for row in rows.to_dict(orient="records")]
     paper, targets = _of_kind(records, "paper"), _of_kind(records, "target")
     title = "Reduced models on inputs that they have not seen"
@@ -47,73 +45,17 @@ def predictive_text(rows: pd.DataFrame) -> str:
 
 
 def _model_text(model: str, rows: list[Row]) -> str:
-    columns, notes = _error_columns(rows), Footnotes()
-    methods, outside = _of_kind(rows, "method"), _of_kind(rows, "outside")
-    lines = [model, _target_table(_of_kind(rows, "target"), notes)]
-    lines += [_method_table(methods, notes), _error_table(methods, columns)]
-    lines += [_outside_table(outside, notes), notes.text()]
+    methods, draws, notes = _of_kind(rows, "method"), _of_kind(rows, "draw"), Footnotes()
+    winner = next((row for row in methods if row["winner"]), None)
+    lines = [f"{model}: {methods[0]['runs']:.0f} runs"]
+    lines += [_target_table(_of_kind(rows, "target"), notes)]
+    lines += [_error_table(winner) if winner else "", _method_table(methods, winner, notes)]
+    lines += [_draw_text(draws, winner), notes.text()]
     return "\n".join(text for text in lines if text)
 
 
 def _of_kind(rows: list[Row], kind: str) -> list[Row]:
     return [row for row in rows if row["kind"] == kind]
-
-
-def _error_columns(rows: list[Row]) -> dict[str, str]:
-    """Columns of errors that the model has -> their headings."""
-    columns = [column for column in rows[0] if column.startswith("worst_")]
-    found: dict[str, str] = {}
-    for column in columns:
-        if any(not math.isnan(row[column]) for row in rows):
-            kind, _, output = column.removeprefix("worst_").partition("_")
-            found[column] = label_of(output).short + (" max" if kind == "max" else "")
-    return found
-
-
-def _name(row: Row) -> str:
-    return f"{'*' if row['winner'] else ' '} {row['method']}"
-
-
-def _method_table(rows: list[Row], notes: Footnotes) -> str:
-    heads = ["", "rank", "score", "calls", "us", "x=", "xb", "off. s", "even"]
-    return table_text(heads, (Line(_costs(row, notes)) for row in rows))
-
-
-def _costs(row: Row, notes: Footnotes) -> list[str]:
-    offline = row["offline_seconds"]
-    even = "never" if math.isinf(row["break_even"]) else fixed(row["break_even"], 0)
-    share = f"{100 * row['stable_share']:.0f} % of the runs are stable: "
-    told = notes.marks(share + row["failure"] if row["failure"] else "")
-    cells = [f"{_name(row)} {told}".rstrip(), fixed(row["rank"], 0)]
-    cells += [short(row["score"]), fixed(row["evaluations"], 0), fixed(1e6 * row["seconds"], 1)]
-    reached = " " if row["equal_accuracy_reached"] else "+"
-    cells.append(fixed(row["ratio_equal_accuracy"]) + reached)
-    cells.append(fixed(row["ratio_within"]))
-    return [*cells, *((short(offline), even) if offline else ("-", "-"))]
-
-
-def _error_table(rows: list[Row], columns: dict[str, str]) -> str:
-    """Errors of reduced models and of what the winner is measured against."""
-    against = {row[name] for row in rows if row["winner"] for name in ("equal_accuracy", "within")}
-    lines = [
-        Line([_name(r), short(r["validation_score"]), *(short(r[column]) for column in columns)])
-        for r in rows
-        if r["role"] != FULL_ORDER or r["method"] in against
-    ]
-    return table_text(["  worst errors", "valid.", *columns.values()], lines)
-
-
-def _outside_table(rows: list[Row], notes: Footnotes) -> str:
-    """Scores of reduced models in the scenarios outside of the training range."""
-    reduced = [row for row in rows if row["role"] != FULL_ORDER]
-    scenarios = list(dict.fromkeys(row["scenario"] for row in reduced))
-    if not scenarios:
-        return ""
-    lines = []
-    for method in dict.fromkeys(row["method"] for row in reduced):
-        scores = [short(row["score"]) for row in reduced if row["method"] == method]
-        lines.append(Line([f"  {method}", *scores]))
-    return table_text(["  scores outside", *map(notes.marks, scenarios)], lines)
 
 
 def _target_table(rows: list[Row], notes: Footnotes) -> str:
@@ -125,4 +67,63 @@ def _target_table(rows: list[Row], notes: Footnotes) -> str:
         verdict = "n/c" if row["verdict"] == NOT_COMPARABLE else row["verdict"]
         cells = [f"  {row['item']}", short(row["bound"]) + own, short(row["measured"])]
         lines.append(Line([*cells, f"{verdict} {notes.marks(row['reason'])}"]))
-    return table_text(["target for the winner", "bound", "measured", "verdict"], lines, (0, 3))
+    return table_text(["target for what was chosen", "bound", "measured", "verdict"], lines, (0, 3))
+
+
+def _error_table(winner: Row) -> str:
+    """Errors of what was chosen, each beside its bound and the bound's reason."""
+    bounds = json.loads(winner["bounds"])
+    lines = []
+    for column in (c for c in winner if c.startswith("worst_")):
+        kind, _, output = column.removeprefix("worst_").partition("_")
+        if math.isnan(winner[column]):
+            continue
+        bound, reason = bounds.get(output, (math.nan, "reported"))
+        name = label_of(output).short + (" max" if kind == "max" else "")
+        values = (winner[column], winner[column.replace("worst_", "most_", 1)])
+        lines.append(Line([f"  {name}", short(bound), *map(short, values), reason]))
+    headings = [f"  errors of {winner['method']}", "bound", "worst", "99 %", "bound's source"]
+    return table_text(headings, lines, (0, 4))
+
+
+def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:
+    """Reduced models, and the full-order rows that what was chosen is measured against."""
+    against = set(winner["equal_rows"].split(", ")) | {winner["within"]} if winner else set()
+    heads = ["", "miss", "sil.", "flag", "< %", "valid.", "score", "us", "loop", "x", "x loop"]
+    lines = [
+        Line(_costs(row, notes))
+        for row in rows
+        if row["role"] != FULL_ORDER or row["method"] in against
+    ]
+    return table_text([*heads, "off."], lines)
+
+
+def _costs(row: Row, notes: Footnotes) -> list[str]:
+    share = f"{100 * row['stable_share']:.0f} % of the runs come to their end: "
+    told = notes.marks(share + row["failure"] if row["failure"] else "")
+    cells = [f"{'*' if row['winner'] else ' '} {row['method']} {told}".rstrip()]
+    cells += [f"{row[name]:.0f}" for name in ("misses", "silent", "flagged")]
+    cells += [
+        fixed(100.0 * row["rate_bound"], 1),
+        short(row["validation_score"]),
+        short(row["score"]),
+    ]
+    cells += [fixed(1e6 * row.get(clock, math.nan), 0) for clock in ("seconds", "loop_seconds")]
+    cells += [fixed(row["ratio_equal"], 1), fixed(row["ratio_equal_loop"], 1)]
+    return [*cells, short(row["offline_seconds"]) if row["offline_seconds"] else "-"]
+
+
+def _draw_text(draws: list[Row], winner: Row | None) -> str:
+    """The draws so far, and what they say together."""
+    if not draws or winner is None:
+        return ""
+    last = draws[-1]
+    runs, apart = (f"{last[name]:.0f}" for name in ("runs", "apart"))
+    missed, silent, of = (f"{winner[f'pooled_{n}']:.0f}" for n in ("misses", "silent", "runs"))
+    text = (
+        f"{runs} runs drawn on {str(last['date'])[:10]} (seal {str(last['digest'])[:10]}), {apart} "
+        f"more apart, on which the full order is sensitive. All {len(draws)} draws of the ledger "
+        f"together: {missed} misses, {silent} of them silent, of {of} runs of {winner['method']}: "
+        f"a rate below {short(100.0 * winner['pooled_bound'])} %."
+    )
+    return wrapped(text, 2, 2)

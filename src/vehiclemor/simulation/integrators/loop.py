@@ -8,6 +8,7 @@ import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
 from vehiclemor.simulation.formulations.full import error_norm, lift, project, rhs
+from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.dopri5 import (
     accept,
     begin,
@@ -19,6 +20,9 @@ from vehiclemor.simulation.integrators.dopri5 import (
 )
 from vehiclemor.simulation.integrators.structures import (
     FINISHED,
+    NODE_1,
+    NODE_2,
+    NODES,
     NOT_FINITE,
     REJECTED_STEPS,
     RHS_CALLS,
@@ -84,21 +88,22 @@ def integrate(
         if entered:
             project(problem, t, x, work.y, counts)
             while sample < len(samples) and samples[sample] <= t + 1e-12 * (1.0 + abs(t)):
-                lift(problem, work.y, path[sample])
+                lift(problem, work.y, path[next_point(output, sample)])
+                record_sample(output, sample)
                 sample += 1
         if segment >= 0 and spans.segments[span] != segment:
             h = min(h, control.restart)
         segment = spans.segments[span]
         times = (t, spans.edges[span + 1])
         status, t, h, sample = over_span(problem, times, h, method, control, work, output, sample)
-        if status != FINISHED:
-            buffer[0] = t
-            return status
         lift(problem, work.y, x)
         for i in range(n):
-            if not math.isfinite(x[i]):
-                buffer[0] = t
-                return NOT_FINITE
+            if status == FINISHED and not math.isfinite(x[i]):
+                status = NOT_FINITE
+        if status != FINISHED:
+            buffer[0] = t
+            leave_out(output, sample)
+            return status
     return FINISHED
 
 
@@ -134,7 +139,8 @@ def over_span(problem, times, h, method, control, work, output, sample):
     Takes the first step size to try in s, none if zero, and the number of the next sample; returns
     a status, the time, the step size for what follows and the number of the next sample.
     """
-    y, f, (t, end), (samples, path, counts) = work.y, work.f, times, output
+    y, f, (t, end) = work.y, work.f, times
+    samples, path, counts = output.samples, output.path, output.counts
     begin(problem, t, method, work)
     counts[RHS_CALLS] += 1
     if h <= 0.0:
@@ -179,10 +185,19 @@ def over_span(problem, times, h, method, control, work, output, sample):
         reached = t + h + 1e-12 * (1.0 + abs(t))
         if sample < len(samples) and samples[sample] <= reached:
             prepare_curve(h, work)
+            first = sample
             while sample < len(samples) and samples[sample] <= reached:
-                interpolate((samples[sample] - t) / h, h, work)
-                lift(problem, work.middle, path[sample])
                 sample += 1
+            own = first
+            if len(output.places) and sample - first > NODES + 1 and t >= output.direct_until:
+                # At the end of a span inputs may jump.
+                at_end = samples[sample - 1] >= end - 1e-9 * (1.0 + abs(end))
+                own = sample - 1 if at_end else sample
+                record_step(problem, (t, h), first, own, work, output)
+            for k in range(own, sample):
+                interpolate((samples[k] - t) / h, h, work)
+                lift(problem, work.middle, path[next_point(output, k)])
+                record_sample(output, k)
         # Proportional and integral control: Hairer, Wanner, Solving ODEs II (1996), section IV.2.
         error = max(error, 1e-10)
         factor = control.safety * error**-control.exponent * before**control.memory_exponent
@@ -202,6 +217,50 @@ def over_span(problem, times, h, method, control, work, output, sample):
         # A step that was cut at the end of the span says nothing against longer ones.
         tried = h * factor if whole else max(tried, h * factor)
     return FINISHED, t, tried, sample
+
+
+def next_point(output, sample):
+    """Row of the next point: the sample's own, or behind the point of the sample before it."""
+    if not len(output.places) or sample == 0:
+        return sample
+    row, part = int(output.places[sample - 1, 0]), output.places[sample - 1, 1]
+    return row + (1 if part < 0.0 else NODES)
+
+
+def record_sample(output, sample):
+    """A sample that is a point itself."""
+    if not len(output.places):
+        return
+    row = next_point(output, sample)
+    output.places[sample, 0], output.places[sample, 1] = row, -1.0
+    output.moments[row] = output.samples[sample]
+    for j in range(output.given.shape[1]):
+        output.inputs[row, j] = output.given[sample, j]
+
+
+def record_step(problem, step, first, following, work, output):
+    """Points of a step (time and length in s) for the samples from one to before another."""
+    t, h = step
+    row = next_point(output, first)
+    for node in range(NODES):
+        part = NODE_1 if node in (0, 3) else NODE_2
+        part = part if node < 2 else 1.0 - part
+        interpolate(part, h, work)
+        lift(problem, work.middle, output.path[row + node])
+        output.moments[row + node] = t + part * h
+        input_at(problem, t + part * h, output.inputs[row + node])
+    for k in range(first, following):
+        output.places[k, 0], output.places[k, 1] = row, max((output.samples[k] - t) / h, 0.0)
+
+
+def leave_out(output, sample):
+    """What has not been reached: no row, or not a number."""
+    for left in range(sample, len(output.samples)):
+        if len(output.places):
+            output.places[left, 0], output.places[left, 1] = -1.0, -1.0
+        else:
+            for i in range(output.path.shape[1]):
+                output.path[left, i] = math.nan
 
 
 def rhs_at(

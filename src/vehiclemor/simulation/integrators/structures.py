@@ -161,22 +161,64 @@ class Control(NamedTuple):
     halve_last: Float
 
 
+# Points of a step: the Chebyshev points of a cubic.
+NODES = 4
+NODE_1, NODE_2 = 0.03806023374435663, 0.30865828381745514
+
+
 class Output(NamedTuple):
     """Where a run is recorded.
+
+    A run with `places` is recorded at points instead: at the samples themselves where a step has
+    few, else at `NODES` points of the step, through which cubics give the samples, as dense output
+    of order 3 does.
 
     Attributes
     ----------
     samples
         Output times in s.
     path
-        States (samples, n) at these times.
+        States (samples, n) at these times, or at the points.
     counts
         By place, see above.
+    given
+        Inputs (samples, inputs) at the samples.
+    inputs, moments
+        Inputs (samples, inputs) at the points, and their times (samples,).
+    places
+        By sample (samples, 2): row of its point, or of the first of its step's, and which part of
+        the step has passed then; -1 where there is no row, and no step.
+    direct_until
+        Time up to which the points are the samples.
     """
 
     samples: Vector
     path: Matrix
     counts: IntVector
+    given: Matrix
+    inputs: Matrix
+    moments: Vector
+    places: Matrix
+    direct_until: Float
+
+
+class Observer(NamedTuple):
+    """How outputs follow from states, and what they are watched for.
+
+    Attributes
+    ----------
+    kernel
+        Address of the kernel of the outputs: for `LANES` samples, or for one on shorter paths.
+    constants
+        Of the kernel.
+    limited, ranges
+        Numbers (limits,) of outputs, and their smallest and largest values (limits, 2).
+    """
+
+    kernel: IntVector
+    constants: Vector
+    limited: IntVector
+    ranges: Matrix
 
 
 class Problem(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -43,11 +43,18 @@ class Validation:
 
 @dataclass(frozen=True)
 class Row:
-    """A contestant with the candidate that is reported, and the validation of all candidates."""
+    """A contestant with the candidate that is reported, and the validation of all candidates.
+
+    Attributes
+    ----------
+    winner
+        Whether it is the contender that validation has chosen.
+    """
 
     contestant: Contestant
     candidate: int
     validation: tuple[Validation, ...]
+    winner: bool = False
 
     @property
     def label(self) -> str:
@@ -73,6 +80,35 @@ def scores(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> np.ndarray:
     worst = np.max(parts, axis=0)
     ended = np.isin(dataset["status"].values, FINISHED)
     return np.where(ended & np.isfinite(worst), worst, np.inf)
+
+
+class Outcomes(NamedTuple):
+    """How each scenario (scenarios,) has ended.
+
+    Attributes
+    ----------
+    scores
+        Largest error as a multiple of its bound; inf if the run has not come to its end.
+    missed
+        A bound is missed, or the run has not come to its end.
+    flagged
+        The model says itself that it is not to be trusted, or that another has taken over.
+    silent
+        Missed with the status ok: the worst result that there is.
+    """
+
+    scores: np.ndarray
+    missed: np.ndarray
+    flagged: np.ndarray
+    silent: np.ndarray
+
+
+def outcomes(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> Outcomes:
+    """Outcomes of a row in its scenarios."""
+    found, status = scores(dataset, bounds), dataset["status"].values
+    missed = ~(found <= 1.0)
+    flagged = (status != "ok") | np.isfinite(dataset["trusted_until"].values)
+    return Outcomes(found, missed, flagged, missed & (status == "ok"))
 
 
 def choose(results: Sequence[Validation]) -> int:

@@ -8,17 +8,21 @@ from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
+from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.method_settings import Settings, complete_settings
+from vehiclemor.study.plans.boxes import check_boxes
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml
 
 SETS = ("training", "validation", "test", "outside")
-FULL_ORDER = "full order"
+# Drawn when all that they test is settled.
+DRAWN = ("drawn", "drawn_outside")
+FULL_ORDER, CONTENDER = "full order", "contender"
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,11 @@ class Protocol:
         """Name of its results."""
         return f"predictive-{self.path.stem}"
 
+    @property
+    def own(self) -> bool:
+        """Whether it is one of the package's."""
+        return self.path.is_relative_to(data_folder())
+
 
 def load_protocol(protocol: str) -> Protocol:
     """A protocol by the name of a file of the package's data, or by the path of a TOML file.
@@ -91,7 +100,7 @@ def load_protocol(protocol: str) -> Protocol:
 
 def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     model = build(definition.model)
-    outputs = [*definition.bounds, *definition.reported]
+    outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
     if definition.straight:
         outputs.append(definition.straight.output)
     for output in outputs:
@@ -99,6 +108,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
             raise unknown(f"output of {model.name}", output, model.outputs)
     sets = {key: _scenarios(model, key, getattr(definition, key)) for key in SETS}
     _check_apart(sets)
+    check_boxes(model, definition)
     contestants = tuple(_contestant(model, entry, sets) for entry in definition.contestants)
     labels = [label for contestant in contestants for label in contestant.row_labels]
     for label in labels:

@@ -1,7 +1,7 @@
 """Schema of protocol files, `data/protocols/*.toml`, validated on loading."""
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -48,6 +48,39 @@ class Group(FileSchema):
         if any(len(point) not in (2, 3) for point in self.points):
             raise ValueError("a point is [frequency, amplitude] or [frequency, amplitude, speed]")
         return self
+
+
+Range = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class Box(FileSchema):
+    """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
+
+    maneuver: str = Field(description="registered name")
+    share: float = Field(1.0, gt=0.0, description="of the runs, against the other boxes' shares")
+    frequency: Range = Field([1.0, 1.0], description="factors, from and to")
+    amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
+    both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
+    speed: Range | None = Field(None, description="m/s, the model's own by default")
+    start: list[str] = Field(
+        default_factory=list, description="initial conditions, equally likely; the model's first"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Box":
+        for low, high in filter(None, (self.frequency, self.amplitude, self.speed)):
+            if not (math.isfinite(low) and low <= high < math.inf):
+                raise ValueError("a range is [from, to] with finite numbers in order")
+        if self.frequency[0] <= 0.0:
+            raise ValueError("frequency factors are positive")
+        return self
+
+
+class Draw(FileSchema):
+    """Runs drawn from boxes once all that they test is settled; nobody can choose the seed."""
+
+    runs: int = Field(ge=1, le=100_000, description="how many")
+    boxes: list[Box] = Field(min_length=1, description="what they are drawn from")
 
 
 class ContestantEntry(FileSchema):
@@ -97,10 +130,33 @@ class ProtocolFile(FileSchema):
     )
     training: list[Group] = Field(min_length=1, description="what methods learn from")
     validation: list[Group] = Field(min_length=1, description="what candidates are chosen by")
-    test: list[Group] = Field(min_length=1, description="what is judged; no run stands twice")
+    test: list[Group] = Field(
+        default_factory=list, description="listed test runs; judged if none are drawn"
+    )
     outside: list[Group] = Field(
         default_factory=list, description="beyond what was trained: reported, not judged"
     )
+    drawn: Draw | None = Field(None, description="sealed test: drawn when all else is settled")
+    drawn_outside: Draw | None = Field(
+        None, description="the same beyond the boxes: whether models warn"
+    )
+    sensitive: dict[str, float] = Field(
+        default_factory=dict,
+        description="output -> largest value of the full order's run in the first 10 s; beyond it "
+        "(spin, rollover) a drawn run is reported apart",
+    )
     contestants: list[ContestantEntry] = Field(min_length=1, description="who competes")
     targets: list[SpeedTarget] = Field(default_factory=list, description="speed that is aimed at")
+    failure_rate: float | None = Field(
+        None, gt=0.0, le=1.0, description="rate of misses that the runs must exclude at 95 %"
+    )
+    flagged_misses: int = Field(
+        3, ge=0, description="runs outside of the bounds that the chosen model may have flagged"
+    )
     straight: Straight | None = Field(None, description="whether a car drives straight on")
+
+    @model_validator(mode="after")
+    def _tested(self) -> "ProtocolFile":
+        if not (self.test or self.drawn):
+            raise ValueError("there is nothing to test: neither test nor drawn is given")
+        return self

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import asdict
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.study.plans.choice import Row, Validation
-from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.plans.choice import Row, Validation, outcomes
+from vehiclemor.study.plans.ledger import Drawn
+from vehiclemor.study.plans.protocol import FULL_ORDER, Protocol
 from vehiclemor.study.provenance import attributes
 from vehiclemor.study.variables import variables
 
@@ -19,19 +21,34 @@ if TYPE_CHECKING:
 
 
 def protocol_dataset(
-    protocol: Protocol, rows: Sequence[Row], found: dict[str, list[xr.Dataset]], timed: xr.Dataset
+    protocol: Protocol,
+    rows: Sequence[Row],
+    found: dict[str, list[xr.Dataset]],
+    measured: tuple[xr.Dataset, dict[str, list[str]]],
+    digest: str,
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `row`, `scenario` and `output`.
 
-    `scenario_set` tells which scenarios are of the test set and which lie outside; `validation` of
-    a row is the JSON list of its candidates' settings and validation results.
+    `scenario_set` tells which set a scenario is of, `apart` why a drawn one is not judged;
+    `validation` of a row is the JSON list of its candidates' settings and validation results.
+
+    Parameters
+    ----------
+    found
+        Set -> results of the rows.
+    measured
+        Timing of the first scenarios of what is judged, and set -> why scenarios are not.
+    digest
+        Seal of the draw.
     """
+    timed, apart = measured
     import xarray as xr
 
     labels = [row.label for row in rows]
     parts = [
         xr.concat(datasets, dim="row", combine_attrs="drop").assign_coords(
-            scenario_set=("scenario", [purpose] * datasets[0].sizes["scenario"])
+            scenario_set=("scenario", [purpose] * datasets[0].sizes["scenario"]),
+            apart=("scenario", apart.get(purpose, [""] * datasets[0].sizes["scenario"])),
         )
         for purpose, datasets in found.items()
     ]
@@ -44,6 +61,8 @@ def protocol_dataset(
     dataset = dataset.assign_coords(row=labels)
     per_row: dict[str, list[Any]] = {
         "role": [row.contestant.role for row in rows],
+        "contestant": [row.contestant.label for row in rows],
+        "winner": [row.winner for row in rows],
         "method": [row.contestant.method for row in rows],
         "settings": [_settings(row) for row in rows],
         "validation": [_validation(row) for row in rows],
@@ -51,9 +70,11 @@ def protocol_dataset(
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
     dataset = dataset.assign(variables(per_row, "row"))
-    for name in ("seconds", "seconds_lower", "seconds_upper"):
+    judged = dataset["scenario_set"].values == judged_set(found)
+    places = np.flatnonzero(judged)[: timed.sizes["scenario"]]
+    for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
         online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
-        online[:, : timed.sizes["scenario"]] = timed[name].values
+        online[:, places] = timed[name].values
         dataset[name] = (("row", "scenario"), online, dict(timed[name].attrs))
     return dataset.assign_attrs(
         attributes(
@@ -63,7 +84,57 @@ def protocol_dataset(
             model=protocol.model.name,
             evaluations=protocol.model.evaluations,
             configuration=protocol.definition.model_dump_json(),
+            digest=digest,
+            own=int(protocol.own),
+            drawn_on=datetime.now(UTC).isoformat(timespec="seconds"),
         )
+    )
+
+
+def judged_set(sets: Container[str]) -> str:
+    """The set on which a protocol judges: what is drawn, else what is listed."""
+    return "drawn" if "drawn" in sets else "test"
+
+
+def judged_part(dataset: xr.Dataset) -> xr.Dataset:
+    """What is judged of a combined dataset: without runs on which the full order is sensitive."""
+    sets = dataset["scenario_set"].values
+    chosen = (sets == judged_set(set(sets))) & (dataset["apart"].values == "")
+    return dataset.isel(scenario=chosen)
+
+
+def entry_of(dataset: xr.Dataset, protocol: Protocol) -> Drawn:
+    """What the ledger keeps of a draw: every reduced model's misses, warnings and worst errors."""
+    part, bounds = judged_part(dataset), protocol.definition.bounds
+    rows: dict[str, dict[str, Any]] = {}
+    for label in part["row"].values:
+        row = part.sel(row=label)
+        if str(row["role"].item()) == FULL_ORDER:
+            continue
+        outcome = outcomes(row, bounds)
+        worst = {
+            output: float(row[f"{bound.measure}_error"].sel(output=output).max())
+            for output, bound in bounds.items()
+        }
+        rows[str(label)] = {
+            "method": str(row["method"].item()),
+            "settings": json.loads(str(row["settings"].item())),
+            "winner": bool(row["winner"]),
+            "misses": int(outcome.missed.sum()),
+            "silent": int(outcome.silent.sum()),
+            "flagged": int(outcome.flagged.sum()),
+            "worst": {k: float(f"{v:.4g}") for k, v in worst.items() if np.isfinite(v)},
+        }
+    apart = dataset["apart"].values[dataset["scenario_set"].values == "drawn"]
+    runs, attrs = part.sizes["scenario"], dataset.attrs
+    return Drawn(
+        str(attrs["drawn_on"]),
+        str(attrs["versions"]),
+        protocol.model.name,
+        str(attrs["digest"]),
+        runs,
+        int((apart != "").sum()),
+        rows,
     )
 
 

@@ -1,12 +1,14 @@
-"""Running a protocol: fit, validate, choose; only then test.
+"""Running a protocol: fit, validate, choose; only then draw the test, and test.
 
-The stages are functions of what they may see: `validate` gets no scenario of the test set.
+The stages are functions of what they may see: `validate` gets no scenario of the test set, and a
+draw is made when all that it tests is settled.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,10 +17,14 @@ import numpy as np
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
-from vehiclemor.study.plans.choice import Row, choose, validation_of
-from vehiclemor.study.plans.protocol import FULL_ORDER, Contestant, Protocol
+from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.plans.choice import MARGIN, Row, choose, validation_of
+from vehiclemor.study.plans.ledger import record
+from vehiclemor.study.plans.protocol import CONTENDER, DRAWN, FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.plans.protocol_results import protocol_dataset
+from vehiclemor.study.plans.protocol_results import entry_of, protocol_dataset
+from vehiclemor.study.plans.seal import seal, sealed_sets
+from vehiclemor.study.plans.sensitive import reasons, second_run
 from vehiclemor.study.plans.study_file import file_as_stored
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
@@ -27,6 +33,9 @@ from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# Runs that are timed: the first of a set.
+TIMED = 24
 
 
 def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
@@ -46,19 +55,26 @@ def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
         protocol.sets["validation"],
         workers,
     )
-    tested = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
-    found = test(protocol.model, rows, tested, workers)
-    timed = timed_rows(protocol, rows, found, folder)
+    rows = with_winner(protocol, rows, folder)
+    digest = seal(protocol, rows)
+    sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
+    sets |= sealed_sets(protocol, digest)
+    found = test(protocol.model, rows, sets, workers)
+    apart = _sensitive(protocol, sets, workers)
+    timed = timed_rows(protocol, rows, found, sets, folder)
     studies, keys = folder / "studies", sorted(workers.asked)
     parts = [layout_digest(), protocol.definition.model_dump_json(), *keys]
-    return stored(
+    dataset = stored(
         studies / f"{protocol.study}.nc",
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
-        lambda: protocol_dataset(protocol, rows, found, timed),
+        lambda: protocol_dataset(protocol, rows, found, (timed, apart), digest),
         [studies / f"timing-{protocol.study}.nc", *(result_path(folder, key) for key in keys)],
         file_as_stored(protocol.path, folder),
     )
+    if "drawn" in sets:
+        record(entry_of(dataset, protocol), protocol.path.stem, folder, protocol.own)
+    return dataset
 
 
 def validate(
@@ -103,22 +119,73 @@ def test(
     }
 
 
+def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[Row]:
+    """The rows, one of them marked as chosen among the contenders, by validation alone.
+
+    Of those that leave room to the bounds (`choice.MARGIN`) the one whose whole calls take the
+    least time, by our clock, on the first scenarios of the validation set; if there is none, the
+    one of the smallest score.
+    """
+    racing = [i for i, row in enumerate(rows) if row.contestant.role == CONTENDER]
+    results = {i: rows[i].validation[rows[i].candidate] for i in racing}
+    if not racing:
+        return list(rows)
+    fitting = [i for i in racing if results[i].stable == 1.0 and results[i].score <= MARGIN]
+    best = min(racing, key=lambda i: (-results[i].stable, results[i].score))
+    if len(fitting) > 1:
+        sample = protocol.sets["validation"][:TIMED]
+        experiments = {rows[i].label: _experiment(protocol, rows[i], sample) for i in fitting}
+        every = np.ones((len(experiments), len(sample)), dtype=bool)
+        timed = _timed(folder, f"timing-validation-{protocol.study}", experiments, every)
+        seconds = timed["seconds"].mean("scenario").values
+        best = fitting[int(np.argmin(seconds))]
+    elif fitting:
+        best = fitting[0]
+    return [replace(row, winner=index == best) for index, row in enumerate(rows)]
+
+
 def timed_rows(
-    protocol: Protocol, rows: Sequence[Row], tested: dict[str, list[xr.Dataset]], folder: Path
+    protocol: Protocol,
+    rows: Sequence[Row],
+    tested: dict[str, list[xr.Dataset]],
+    sets: dict[str, tuple[Scenario, ...]],
+    folder: Path,
 ) -> xr.Dataset:
-    """Stored timing of the rows on the test set, measured first if missing or out of date.
+    """Stored timing of the rows on the first test runs, measured first if missing or out of date.
 
     A run whose result in the test set is a failure is not timed.
     """
-    experiments = {
-        row.label: row.contestant.experiment(protocol.model, row.candidate, protocol.sets["test"])
-        for row in rows
-    }
-    finished = np.array([np.isin(found["status"].values, FINISHED) for found in tested["test"]])
+    name = "drawn" if "drawn" in sets else "test"
+    sample = sets[name][:TIMED]
+    experiments = {row.label: _experiment(protocol, row, sample) for row in rows}
+    ends = [found["status"].values[: len(sample)] for found in tested[name]]
+    finished = np.isin(np.array(ends), FINISHED)
+    return _timed(folder, f"timing-{protocol.study}", experiments, finished)
+
+
+def _experiment(protocol: Protocol, row: Row, scenarios: tuple[Scenario, ...]) -> Experiment:
+    return row.contestant.experiment(protocol.model, row.candidate, scenarios)
+
+
+def _timed(
+    folder: Path,
+    name: str,
+    experiments: dict[str, Experiment],
+    finished: np.ndarray,
+) -> xr.Dataset:
     content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(
         folder,
-        f"timing-{protocol.study}",
+        name,
         [content, timing.PROTOCOL_ROUNDS],
         lambda: timing.timed_tests(experiments, finished),
     )
+
+
+def _sensitive(
+    protocol: Protocol, sets: dict[str, tuple[Scenario, ...]], workers: Workers
+) -> dict[str, list[str]]:
+    """Why drawn runs are reported apart, by set."""
+    second = {n: second_run(protocol, sets[n]) for n in DRAWN if n in sets}
+    workers([[experiment] for experiment in second.values()])
+    return {name: reasons(protocol, workers.result(e)) for name, e in second.items()}

@@ -197,7 +197,7 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(
 
 
 def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
-    reduced = replace(fitted(vehicle, refits=0, sweeps=0), solver="dopri5", tolerance=1e-9)
+    reduced = replace(fitted(vehicle, sweeps=0), solver="dopri5", tolerance=1e-9)
     run = TrainingRun(vehicle, lane_change, "equilibrium")
     goal = targets(reduced, [run], [run.at(lane_change.times)])[0]
     term, k = 16, reduced.features.states
@@ -217,7 +217,7 @@ def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
 
 
 def test_sweeps_bring_reduced_runs_nearer_to_the_training_runs(vehicle: Any) -> None:
-    rough = replace(fitted(vehicle, refits=0, sweeps=0), solver="dopri5", tolerance=1e-7)
+    rough = replace(fitted(vehicle, sweeps=0), solver="dopri5", tolerance=1e-7)
     runs = [TrainingRun(vehicle, lane_change.perturbed(1.0, a), "equilibrium") for a in (0.8, 1.2)]
     goals = targets(rough, runs, [run.at(run.maneuver.times) for run in runs])
     k = rough.features.states

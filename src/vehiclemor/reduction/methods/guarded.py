@@ -1,0 +1,185 @@
+"""A fast model with a safe one behind it.
+
+The fast model runs.  Where it tells that it leaves what it knows, the safe one goes on from the
+full state at the last output time that it answers for, or does the whole run.
+"""
+
+import tomllib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.interface import Method, Offline, ReducedModel
+from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.registry import component
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+
+NAME = "guarded"
+ONLINE = ("solver", "tolerance")
+
+
+class GuardedSettings(OnlineSettings):
+    """Settings for a vehicle; solver and tolerance are the fast model's."""
+
+    fast: str = Field("slow_manifold", description="method of the fast model")
+    fast_settings: str = Field(
+        "", description="its other settings, as in TOML: terms = 12, ridge = 1e-9"
+    )
+    safe: Literal["full_order", "independent_coordinates", "frozen_inertia"] = Field(
+        "full_order", description="method of the safe model"
+    )
+    safe_solver: Solver = "etdrk4"
+    safe_tolerance: Tolerance = 2e-3
+    resume: Literal["departure", "start"] = Field(
+        "departure",
+        description="where the safe model takes over: where the fast one leaves, or "
+        "at the start of the run",
+    )
+    back: float = Field(0.0, ge=0.0, description="time in s before the departure, for resume")
+    solver: Solver = "etdrk4"
+    tolerance: Tolerance = 2e-3
+
+
+@dataclass(frozen=True, eq=False)
+class GuardedModel(ShortRepr):
+    """Both models.
+
+    Attributes
+    ----------
+    solver, tolerance
+        Of the fast model, if it has them.
+    safe_name
+        Method of the safe model.
+    back
+        How many seconds before the fast model leaves the safe one takes over.
+    """
+
+    fast: ReducedModel
+    safe: Any
+    safe_name: str
+    back: float
+    offline: Offline
+    solver: str
+    tolerance: float
+
+    @property
+    def effective_rank(self) -> int:
+        """Rank of the fast model."""
+        return self.fast.effective_rank
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Best approximation of the fast model."""
+        return self.fast.best_approximation(states)
+
+    @cached_property
+    def ahead(self) -> ReducedModel:
+        """The fast model as it is integrated."""
+        online = {name: getattr(self, name) for name in ONLINE}
+        if any(getattr(self.fast, name, value) != value for name, value in online.items()):
+            return replace(self.fast, **online)  # type: ignore[type-var]
+        return self.fast
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """The fast run; from where it can't be trusted on, the safe one."""
+        run = self.ahead.simulate(maneuver, start)
+        if run.status == "ok":
+            return run
+        trust = run.trust or Trust(np.inf)
+        # A run that has failed without a warning is trusted nowhere.
+        known = trust.until if np.isfinite(trust.until) else -np.inf
+        kept = int(np.searchsorted(run.time, known - self.back)) - 1
+        if kept <= 0:
+            kept, begin, state = 0, 0.0, start
+        else:
+            begin, state = float(run.time[kept]), run.states[kept]
+        later = self.safe.simulate(maneuver, state, begin)
+        why = trust.reason or run.message
+        told = f"from t = {begin:.4g} s on by {self.safe_name}: {why}"
+        remark = "; ".join(part for part in (told, later.remark) if part)
+        return replace(joined(run, later, kept), remark=remark, trust=trust)
+
+
+def joined(run: Trajectory, later: Trajectory, kept: int) -> Trajectory:
+    """The first samples of a run, and then the later one; with the later one's status."""
+
+    def rows(name: str) -> np.ndarray:
+        return np.concatenate([getattr(run, name)[:kept], getattr(later, name)])
+
+    return replace(
+        later,
+        time=rows("time"),
+        inputs=rows("inputs"),
+        coordinates=rows("coordinates"),
+        speeds=rows("speeds"),
+        outputs=rows("outputs"),
+        counts={name: count + later.counts[name] for name, count in run.counts.items()},
+        seconds=run.seconds + later.seconds,
+    )
+
+
+def fit(model: DynamicModel, training: Training, settings: GuardedSettings) -> GuardedModel:
+    """Fit both."""
+    fast = component("method", settings.fast).fit(model, training, _of_fast(model, settings))
+    safe = component("method", settings.safe).fit(model, training, _of_safe(model, settings))
+    parts = fast.offline, safe.offline
+    return GuardedModel(
+        fast,
+        safe,
+        settings.safe,
+        np.inf if settings.resume == "start" else settings.back,
+        Offline(sum(o.seconds for o in parts), sum(o.evaluations for o in parts)),
+        settings.solver,
+        settings.tolerance,
+    )
+
+
+def check(model: DynamicModel, settings: GuardedSettings) -> None:
+    """Raise `InputError` if a method or its settings don't fit the model."""
+    for name, of in ((settings.fast, _of_fast), (settings.safe, _of_safe)):
+        method: Method = component("method", name)
+        accepted, reason = method.accepts(model)
+        if not accepted or name == NAME:
+            raise InputError(f"{NAME}: {reason or f'{name} would guard itself'}")
+        method.check(model, of(model, settings))
+
+
+def _of_fast(model: DynamicModel, settings: GuardedSettings) -> Any:
+    """Settings of the fast model."""
+    method: Method = component("method", settings.fast)
+    text = settings.fast_settings
+    try:
+        given = tomllib.loads(f"given = {{ {text} }}")["given"]
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{NAME}: fast_settings: {error}") from None
+    known = method.names_of(model.kind)
+    online = {name: getattr(settings, name) for name in ONLINE if name in known}
+    for name in online:
+        if name in given:
+            raise InputError(f"{NAME}: fast_settings has {name}, which is a setting of its own")
+    return validated(method, model.kind, online | given)
+
+
+def _of_safe(model: DynamicModel, settings: GuardedSettings) -> Any:
+    """Settings of the safe model."""
+    online = {"solver": settings.safe_solver, "tolerance": settings.safe_tolerance}
+    return validated(component("method", settings.safe), model.kind, online)
+
+
+METHOD = Method(
+    name=NAME,
+    summary="a fast model where it can be trusted, a safe one from there on",
+    settings=dict.fromkeys(("ode", "dae"), GuardedSettings),
+    refusal=no_steered_vehicle,
+    check=check,
+    fit=fit,
+)

@@ -1,0 +1,234 @@
+"""Two-track model with roll: exact tires at quasi-static slips and wheel loads, fitted to runs.
+
+Lateral speed, yaw rate, roll and speed are the slow motion of a vehicle; hop, spins and linkages
+follow it (N. Fenichel, J. Differ. Equ. 31 (1979), 53-98).  So the slip and the load of every wheel
+are functions of the slow motion and of the steering, and the tires' own law makes forces of them
+(two-track model with load transfer: M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge, 5th
+ed., Springer 2014).  The accelerations are linear in these forces, in the coordinates and the
+steering, and in a few products that are chosen one after the other; their coefficients are fitted
+to the accelerations of training runs, then to whole runs.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.multibody.components.tire_coefficients import FIALA
+from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle import tire_features as tf
+from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
+from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.mirror import mirror
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
+
+# The states that are coordinates, and those of them whose rates are accelerations.
+COORDINATES = ("y_dot", "psi_dot", "phi", "phi_dot")
+ACCELERATIONS = (0, 1, 3)
+# Symmetric states for which the lifting has terms of its own.
+SEEN = ("theta", "z_dot")
+RIDGE = 1e-12
+
+
+class TwoTrackSettings(OnlineSettings):
+    """Settings for a vehicle."""
+
+    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
+    even_terms: int = Field(16, ge=0, description="chosen products in those of the speed")
+    wheel_terms: int = Field(
+        9, ge=0, description="chosen products in the slip, and in the load, of an axle's wheels"
+    )
+    lifted_terms: int = Field(
+        20, ge=0, description="products chosen for pitch and heave, beside those of the equations"
+    )
+    sweeps: int = Field(
+        25, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
+    )
+    hull: float = Field(
+        1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
+    )
+    saturation: float = Field(
+        1.5,
+        gt=0.0,
+        description="a run with a tire beyond this multiple of the slip at which all of its "
+        "contact slides is not trusted",
+    )
+    solver: Solver = "etdrk4"
+    tolerance: Tolerance = 1e-3
+
+
+class Samples(NamedTuple):
+    """Samples of all training runs.
+
+    Attributes
+    ----------
+    z, inputs
+        Reduced coordinates (samples, 5), inputs (samples, inputs).
+    rates
+        Their rates (samples, 5).
+    shape
+        Of the vehicle's shape.
+    """
+
+    z: np.ndarray
+    inputs: np.ndarray
+    rates: np.ndarray
+    shape: ShapeSamples
+
+
+def refusal(model: Model) -> str:
+    """Why a model has not the coordinates or the tires."""
+    if reason := no_steered_vehicle(model):
+        return reason
+    known = (*model.coordinates, *model.speeds, *model.parameters.entries)
+    missing = [name for name in (*COORDINATES, *FIALA) if name not in known]
+    return f"{model.name} has no {', '.join(missing)}" if missing else ""
+
+
+def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> ReducedVehicle:
+    """Fit slips, loads, accelerations and the other states to the training runs."""
+    began = time.process_time()
+    runs = [run.recorded() for run in training]
+    shape = VehicleShape(model)
+    modes = slow_modes(shape, np.inf)
+    of_shape = shape_samples(shape, runs)
+    encoding = np.zeros((tf.STATES, len(shape.names)))
+    for i, name in enumerate(COORDINATES):
+        encoding[i, shape.names.index(name)] = 1.0
+    encoding[tf.SPEED] = modes.speed_left
+    samples = Samples(
+        of_shape.deviations @ encoding.T, of_shape.inputs, of_shape.rates @ encoding.T, of_shape
+    )
+    outputs = np.concatenate([run.outputs for run in runs])
+    text = tire_text(shape, samples, outputs, settings)
+    reduced = fitted_on_rates(shape, modes, encoding, text, samples, settings)
+    if settings.sweeps:
+        goals = targets(reduced, training, runs, stride=1)
+        (odd, _), (even, symmetric) = reduced.features.groups
+        free = [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
+        reduced = improved(reduced, goals, free, settings.sweeps)
+    return replace(
+        reduced,
+        offline=offline_cost(began, model, runs, len(samples.inputs)),
+        solver=settings.solver,
+        tolerance=settings.tolerance,
+    )
+
+
+def tire_text(
+    shape: VehicleShape, samples: Samples, outputs: np.ndarray, settings: TwoTrackSettings
+) -> tf.Text:
+    """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
+    z, u = samples.z, samples.inputs
+    model, inputs = shape.model, u.shape[1]
+    reach = settings.hull * largest(tf.argument_values(shape.speed, z, u))
+    text = tf.arguments(shape.speed, reach)
+    linear = tf.linear_terms(inputs)
+    odd = [*linear, *tf.CUBIC, *tf.FASTER]
+    even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]
+    given = text.features(inputs, [*odd, *even])
+    columns = feature_columns(given, z, u, np.array(text.values))
+    parities = (
+        (odd, columns[:, : len(odd)], len(linear)),
+        (even, columns[:, len(odd) :], 1),
+    )
+
+    def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
+        return outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
+
+    for axle, wheels in enumerate(tf.AXLES):
+        slips, loads = np.tan(of_wheels("slip_angle", wheels)), of_wheels("Fz", wheels)
+        for name, values, mean_parity in (("slip", slips, 0), ("load", loads, 1)):
+            mean, half = values @ [0.5, 0.5], values @ [0.5, -0.5]
+            for end, target, parity in (("", mean, mean_parity), ("_half", half, 1 - mean_parity)):
+                terms, table, first = parities[parity]
+                chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
+                weights = ridge_fit(table[:, chosen], target, RIDGE)
+                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights)
+        parameters = {name: float(model.parameters[name]) for name in FIALA}
+        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
+    return text
+
+
+def fitted_on_rates(
+    shape: VehicleShape,
+    modes: SlowModes,
+    encoding: np.ndarray,
+    text: tf.Text,
+    samples: Samples,
+    settings: TwoTrackSettings,
+) -> ReducedVehicle:
+    """Equations fitted to the accelerations of the training runs."""
+    z, u, rates, of_shape = samples
+    inputs, parameters = u.shape[1], np.array(text.values)
+
+    def columns_of(terms: Sequence[str]) -> np.ndarray:
+        return feature_columns(text.features(inputs, terms), z, u, parameters)
+
+    def chosen(
+        given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
+    ) -> list[str]:
+        terms = [*given, *(term for term in others if term not in given)]
+        scaled = values / np.sqrt(np.mean(values**2, axis=0))
+        numbers = forward_selection(columns_of(terms), scaled, len(given), more)
+        return [terms[i] for i in numbers]
+
+    plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
+    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], settings.terms)
+    forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
+    symmetric = np.column_stack([rates[:, tf.SPEED], forward])
+    candidates = tf.even_candidates(inputs)
+    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, settings.even_terms)
+    terms = [*odd, "1.0", *even]
+    seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
+    lifted = chosen(terms, candidates, seen, settings.lifted_terms)
+    lifting_columns, other_side = columns_of(lifted), of_shape.deviations @ mirror(shape).T
+    sides = [
+        ridge_fit(part, 0.5 * (of_shape.deviations + sign * other_side), RIDGE)
+        for part, sign in zip(np.split(lifting_columns, [len(odd)], axis=1), (-1, 1), strict=True)
+    ]
+    columns = columns_of(terms)
+    k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
+    lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
+    c[:k, tf.LATERAL] = ridge_fit(columns[:, :k], lateral, RIDGE)
+    # Straight running at any speed is an equilibrium.
+    c[k, 6], c[k + 1, 6] = shape.speed, 1.0
+    c[k + 2 :, tf.SYMMETRIC] = ridge_fit(columns[:, k + 2 :], symmetric, RIDGE)
+    return ReducedVehicle(
+        shape.model,
+        shape,
+        text.features(inputs, terms, len(odd)),
+        parameters,
+        c,
+        np.vstack(sides),
+        encoding,
+        np.zeros((tf.STATES, inputs)),
+        np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
+        Offline(),
+        "dopri5",
+        1e-6,
+        modes.symmetric,
+        text.features(inputs, lifted),
+    )
+
+
+METHOD = Method(
+    name="two_track",
+    summary="two-track model with roll: exact tires at fitted slips and wheel loads",
+    reference="10.1007/978-3-658-05068-9",
+    settings=dict.fromkeys(("ode", "dae"), TwoTrackSettings),
+    refusal=refusal,
+    fit=fit,
+)

@@ -1,0 +1,146 @@
+"""From reduced states to full ones in one compiled pass, with what tells how far a run goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
+from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.paths import PATH_LOOPS, address_of
+from vehiclemor.simulation.trajectory import Trust
+
+# Part of a transient below which it needs no samples of its own.
+NEGLIGIBLE = 1e-4
+
+
+@dataclass(frozen=True)
+class Transient:
+    """Decaying motion that the reduced coordinates leave out, from a start that is no equilibrium.
+
+    Linear, in closed form: the sum over modes of right w^T d exp(rate t), with d the deviation of
+    the start's shape.
+
+    Attributes
+    ----------
+    rates
+        Eigenvalues (m,) in 1/s, one of each conjugate pair.
+    left, right
+        Eigenvectors (m, n), scaled so that real parts of the sum are the motion.
+    """
+
+    rates: np.ndarray
+    left: np.ndarray
+    right: np.ndarray
+
+
+NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Lifting(ShortRepr):
+    """How full states follow from reduced ones.
+
+    Attributes
+    ----------
+    features, parameters
+        Features of the shape, and the parameters in their text.
+    coefficients
+        Of the shape's deviation from straight running (terms, n).
+    reference
+        Shape (n,) of straight running.
+    layout
+        Where the shape stands in the states.
+    transient
+        What is added to the shapes.
+    """
+
+    features: Features
+    parameters: np.ndarray
+    coefficients: np.ndarray
+    reference: np.ndarray
+    layout: Layout
+    transient: Transient
+
+    @cached_property
+    def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+        return {}
+
+    def _kernel(self, modes: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
+        """Address and constants of the kernel; without modes for a start that excites none."""
+        if (modes, lanes) not in self._made:
+            right = self.transient.right[:modes]
+            pairs = np.stack([right.real, -right.imag], axis=1).reshape(2 * modes, right.shape[1])
+            shared = [self.coefficients, self.reference[None]]
+            rows = np.vstack([*shared, pairs] if modes else shared)
+            rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
+            text = lifting_text(self.features, self.layout, len(self.parameters), modes)
+            kernels = Kernels(kernel_sources(text))
+            address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
+            self._made[modes, lanes] = address, np.concatenate([self.parameters, rows.ravel()])
+        return self._made[modes, lanes]
+
+    def excited(self, deviation: np.ndarray) -> np.ndarray:
+        """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
+
+        Parameters
+        ----------
+        deviation
+            Of the start's shape from straight running (n,); m is zero if there is none.
+        """
+        rates = self.transient.rates if deviation.any() else self.transient.rates[:0]
+        amplitudes = self.transient.left[: len(rates)] @ deviation if len(rates) else rates
+        found = np.array([rates, amplitudes], dtype=complex)
+        return np.stack([found.real, found.imag], axis=2)
+
+    def states(
+        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, excited: np.ndarray
+    ) -> tuple[np.ndarray, Trust | None]:
+        """Full states, and behind them what is watched (samples, 2 n + watched); what this tells.
+
+        Parameters
+        ----------
+        times, path, inputs
+            Of the samples: in s, reduced states (samples, states + 3), inputs (samples, inputs).
+        excited
+            By the start, as `excited` gives it.
+        """
+        modes, watched = excited.shape[1], self.features.watched
+        if modes:
+            given = np.empty((len(times), inputs.shape[1] + 2 * modes))
+            _loops()["with_decay"](times, inputs, *excited, np.empty((modes, 2)), given)
+            inputs = given
+        kernel = self._kernel(modes, LANES if len(times) >= LANES else 1)
+        states = np.empty((len(times), self.layout.size + len(watched)))
+        largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
+        _loops()["lifted"](path, inputs, *kernel, states, largest, first)
+        return states, self._trust(times, largest.tolist(), first.tolist())
+
+    def _trust(self, times: np.ndarray, largest: list[float], first: list[int]) -> Trust | None:
+        """How far a run has gone; none if nothing tells."""
+        if not largest:
+            return None
+        sample = min(first)
+        if sample == len(times):
+            return Trust(max(largest))
+        name = self.features.watched[first.index(sample)][1]
+        reason = f"{name} leaves what the training runs have covered"
+        return Trust(max(largest), float(times[sample]), reason)
+
+
+def decayed(excited: np.ndarray) -> float:
+    """Time in s at which the modes of a transient have decayed; 0 if there are none."""
+    slowest = excited[0, :, 0].max(initial=-np.inf)
+    return float(np.log(NEGLIGIBLE) / slowest) if slowest < 0.0 else np.inf
+
+
+def _loops() -> Mapping[str, Loop]:
+    return loops((*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted"))

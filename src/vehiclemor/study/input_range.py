@@ -1,0 +1,70 @@
+"""The range of the inputs that a method has been trained on, as its least claim to knowledge."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.trust import trust_of
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import Trust
+from vehiclemor.study.scenario import Scenario, own_speed
+
+# Least part of the speed by which a run may start faster or slower.
+SPEED_SLACK = 0.01
+
+
+@dataclass(frozen=True)
+class InputRange:
+    """Inputs and speeds of the training runs.
+
+    Attributes
+    ----------
+    largest
+        Absolute values of the inputs (inputs,), and of a dynamic model of their rates beside them.
+    speed, reach
+        Middle of the initial speeds in m/s, and how far they lie from it.
+    """
+
+    largest: np.ndarray
+    speed: float
+    reach: float
+
+    def trust(self, model: Model, scenario: Scenario) -> Trust:
+        """How far a scenario goes in the range."""
+        values = _values(model, scenario.maneuver)
+        # An input that was zero in training may be nothing else.
+        used = values / np.maximum(self.largest, 1e-12)
+        off = np.full((len(values), 1), (_speed(model, scenario) - self.speed) / self.reach)
+        names = [f"input {name}" for name in model.inputs]
+        if model.kind != "ae":
+            names += [f"rate of {name}" for name in names]
+        return trust_of(scenario.maneuver.times, np.hstack([used, off]), [*names, "initial speed"])
+
+
+@lru_cache(maxsize=64)
+def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
+    """Range of some training scenarios."""
+    largest = [np.abs(_values(model, scenario.maneuver)).max(axis=0) for scenario in training]
+    speeds = [_speed(model, scenario) for scenario in training]
+    low, high = min(speeds), max(speeds)
+    middle = 0.5 * (low + high)
+    # One part in a million is rounding.
+    reach = max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0
+    return InputRange(np.max(largest, axis=0) * (1.0 + 1e-6), middle, reach * (1.0 + 1e-6))
+
+
+def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
+    """Inputs, and of a dynamic model their rates, at the output times."""
+    times = maneuver.times
+    values = maneuver.at(times)
+    if model.kind == "ae":
+        return values
+    rates = np.gradient(values, times, axis=0) if len(times) > 1 else np.zeros_like(values)
+    return np.hstack([values, rates])
+
+
+def _speed(model: Model, scenario: Scenario) -> float:
+    """Initial speed in m/s; zero of a model that has none."""
+    return scenario.speed or own_speed(model) or 0.0

@@ -1,0 +1,51 @@
+"""Drawn runs on which the full order itself is sensitive: found by rule, reported apart.
+
+Where two tolerances of the full order disagree by more than a bound, where the car spins, tips over
+or has a wheel in the air, no error against one of them tells anything of a reduced model.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vehiclemor.simulation.checks import OFF_GROUND
+from vehiclemor.study.experiment import Experiment, make_experiment
+from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.plans.choice import scores
+from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.scenario import Scenario
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def second_run(protocol: Protocol, scenarios: tuple[Scenario, ...]) -> Experiment:
+    """The full order at its default tolerance, a thousand times that of the references."""
+    model = protocol.model
+    settings = complete_settings(model, "full_order", {}, "recommended")
+    return make_experiment(model, "full_order", settings, (), scenarios, "errors")
+
+
+def reasons(protocol: Protocol, second: xr.Dataset) -> list[str]:
+    """Why each scenario of the second run is reported apart; empty if it is not."""
+    definition = protocol.definition
+    found = []
+    for index, score in enumerate(scores(second, definition.bounds)):
+        part = second.isel(scenario=index)
+        found.append(_reason(part, float(score), definition.sensitive))
+    return found
+
+
+def _reason(part: xr.Dataset, score: float, largest: dict[str, float]) -> str:
+    if not np.isfinite(score):
+        return f"full order: {part['message'].item()}"
+    if score > 1.0:
+        return f"two tolerances of the full order differ by {score:.2g} times a bound"
+    for output, limit in largest.items():
+        value = float(part["largest_output"].sel(output=output))
+        if value > limit:
+            return f"{output} of the full order reaches {value:.3g}, beyond {limit:g}"
+    remark = str(part["remark"].item())
+    return remark if remark.startswith(OFF_GROUND) else ""

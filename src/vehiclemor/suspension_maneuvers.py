@@ -1,0 +1,76 @@
+"""Wheel travel while the steering rack moves: inputs of a suspension that fill a rectangle.
+
+At an amplitude factor of 1 the wheel stays within 0.1 m of its design height (Masoudi et al., 2015,
+section 3.2), the rack within 0.03 m: six times a lane change at 20 m/s, and half of what parking
+takes.  All are smooth.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vehiclemor.maneuver import (
+    CHIRP_LAST_FREQUENCY,
+    TRAVEL_AMPLITUDE,
+    TRAVEL_FREQUENCY,
+    sine_travel,
+)
+
+RACK_AMPLITUDE = 0.03
+# The golden ratio is the number that fractions approach worst: the two sines never repeat.
+RACK_FREQUENCY = TRAVEL_FREQUENCY * 0.5 * (1.0 + np.sqrt(5.0))
+# First and last frequencies (Hz) of the sweeps, which cross.
+TRAVEL_SWEEP = TRAVEL_FREQUENCY, CHIRP_LAST_FREQUENCY
+RACK_SWEEP = 0.5, RACK_FREQUENCY
+# Frequencies (Hz), and phases after M. R. Schroeder, IEEE Trans. Inf. Theory 16 (1970), 85-89.
+TRAVEL_SINES = np.array([0.15, 0.35, 0.6, 0.95, 1.4])
+RACK_SINES = np.array([0.1, 0.25, 0.45, 0.7, 1.1])
+PHASES = -np.pi * np.arange(5) * np.arange(1, 6) / 5
+
+
+def _scaled(travel: np.ndarray, rack: np.ndarray, amplitude: float) -> np.ndarray:
+    """Inputs from shapes (n,) that stay within 1."""
+    return amplitude * np.column_stack([TRAVEL_AMPLITUDE * travel, RACK_AMPLITUDE * rack])
+
+
+def _sines(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    angle = 2.0 * np.pi * frequency * times
+    return _scaled(np.sin(TRAVEL_FREQUENCY * angle), np.sin(RACK_FREQUENCY * angle), amplitude)
+
+
+def _sweeps(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    angle = 2.0 * np.pi * frequency * times
+
+    def wave(first: float, last: float) -> np.ndarray:
+        return np.sin((first + 0.5 * (last - first) * times / sine_travel.duration) * angle)
+
+    return _scaled(wave(*TRAVEL_SWEEP), wave(*RACK_SWEEP), amplitude)
+
+
+def _multisines(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    angle = 2.0 * np.pi * frequency * times[:, None]
+
+    def waves(hertz: np.ndarray) -> np.ndarray:
+        return np.sin(hertz * angle + PHASES).mean(axis=1)
+
+    return _scaled(waves(TRAVEL_SINES), waves(RACK_SINES), amplitude)
+
+
+travel_and_rack = replace(
+    sine_travel,
+    name="travel_and_rack",
+    summary="wheel travel 0.1 m at 0.1 Hz, rack 0.03 m at 0.16 Hz, sines that never repeat, 10 s",
+    signal=_sines,
+)
+travel_and_rack_sweep = replace(
+    sine_travel,
+    name="travel_and_rack_sweep",
+    summary="wheel travel 0.1 m swept from 0.1 to 0.4 Hz, rack 0.03 m from 0.5 to 0.16 Hz, 10 s",
+    signal=_sweeps,
+)
+travel_and_rack_multisine = replace(
+    sine_travel,
+    name="travel_and_rack_multisine",
+    summary="wheel travel within 0.1 m at five frequencies up to 1.4 Hz, rack within 0.03 m, 10 s",
+    signal=_multisines,
+)

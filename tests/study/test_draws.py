@@ -1,0 +1,215 @@
+"""Sealed draws: what they depend on, what they hold, what is kept of them."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.report.predictive.equal_error import at_error
+from vehiclemor.report.predictive.rates import upper_bound
+from vehiclemor.study.plans.boxes import drawn
+from vehiclemor.study.plans.choice import Row, outcomes
+from vehiclemor.study.plans.ledger import Drawn, ledger, pooled, record
+from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol_file import Bound, Box, Draw
+from vehiclemor.study.plans.seal import seal, sealed_sets
+from vehiclemor.study.plans.sensitive import reasons
+
+BOX = Box(maneuver="sine_travel", frequency=[0.7, 1.8], amplitude=[0.5, 1.1], start=["equilibrium"])
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory, protocol_text):
+    path = tmp_path_factory.mktemp("draws") / "small.toml"
+    path.write_text(protocol_text)
+    return load_protocol(str(path))
+
+
+@pytest.fixture(scope="module")
+def rows(protocol):
+    return [Row(contestant, 0, ()) for contestant in protocol.contestants]
+
+
+def test_the_same_seal_draws_the_same_runs_and_another_others(protocol):
+    draw = Draw(runs=40, boxes=[BOX])
+    one, again, other = (drawn(protocol.model, draw, seed, "drawn") for seed in "aab")
+    assert one == again
+    assert not set(one) & set(other)
+    assert not set(one) & set(drawn(protocol.model, draw, "a", "drawn_outside"))
+
+
+def test_a_draw_fills_its_box_and_stays_inside(protocol):
+    runs = drawn(protocol.model, Draw(runs=400, boxes=[BOX]), "a", "drawn")
+    assert len({run.run_key for run in runs}) == 400
+    frequency = np.array([run.maneuver.frequency_factor for run in runs])
+    amplitude = np.array([run.maneuver.amplitude_factor for run in runs])
+    assert frequency.min() >= 0.7
+    assert frequency.max() <= 1.8
+    assert np.abs(amplitude).min() >= 0.5
+    assert np.abs(amplitude).max() <= 1.1
+    # Uniform: means and shares lie within five standard deviations.
+    assert abs(frequency.mean() - 1.25) < 5.0 * 1.1 / math.sqrt(12 * 400)
+    assert abs((amplitude > 0.0).mean() - 0.5) < 5.0 * 0.5 / 20.0
+
+
+def test_what_is_known_is_not_drawn(protocol):
+    draw = Draw(runs=10, boxes=[BOX])
+    first = drawn(protocol.model, draw, "a", "drawn")
+    assert not set(first) & set(drawn(protocol.model, draw, "a", "drawn", first))
+
+
+def test_a_box_without_room_is_refused(protocol):
+    point = Box(maneuver="sine_travel", both_signs=False)
+    with pytest.raises(InputError, match="fewer than 2 different runs"):
+        drawn(protocol.model, Draw(runs=2, boxes=[point]), "a", "drawn")
+
+
+def test_whatever_is_tested_changes_the_seal(protocol, rows):
+    first = seal(protocol, rows)
+    assert seal(protocol, rows) == first
+    other = [*rows[:-1], replace(rows[-1], candidate=1)]
+    trained = replace(rows[-1].contestant, training=rows[-1].contestant.training * 2)
+    learned = [*rows[:-1], replace(rows[-1], contestant=trained)]
+    bounds = protocol.definition.bounds | {"toe": Bound(measure="rms", bound=1.0)}
+    judged = replace(protocol, definition=protocol.definition.model_copy(update={"bounds": bounds}))
+    validated = replace(protocol, sets=protocol.sets | {"validation": ()})
+    seals = {first, seal(protocol, other), seal(protocol, learned)}
+    assert len(seals | {seal(judged, rows), seal(validated, rows)}) == 5
+    # Who wins is not tested: times differ from machine to machine.
+    assert seal(protocol, [replace(row, winner=True) for row in rows]) == first
+
+
+def test_drawn_sets_are_apart_from_all_others(protocol, rows):
+    sets = sealed_sets(protocol, seal(protocol, rows))
+    assert {name: len(runs) for name, runs in sets.items()} == {"drawn": 5, "drawn_outside": 2}
+    keys = [run.run_key for runs in (*protocol.sets.values(), *sets.values()) for run in runs]
+    assert len(set(keys)) == len(keys)
+
+
+def entry(digest, misses=0, runs=299, label="fast"):
+    row = {"misses": misses, "silent": misses, "flagged": 0}
+    return Drawn(f"2026-01-0{digest}", "v", "car", digest, runs, 0, {label: row})
+
+
+def test_the_ledger_keeps_every_draw(tmp_path):
+    for draw in (entry("2", misses=7), entry("1"), entry("2"), entry("3", runs=100)):
+        record(draw, "car", tmp_path, own=False)
+    found = ledger("car", tmp_path, own=False)
+    # Neither order nor a second try of the same draw changes what stands there.
+    assert [draw.digest for draw in found] == ["1", "2", "3"]
+    assert pooled(found, "fast") == (7, 7, 698)
+    assert pooled(found, "slow") == (0, 0, 0)
+    path = tmp_path / "draws" / "car.jsonl"
+    assert len(path.read_text().splitlines()) == 3
+    path.write_text("{}")
+    with pytest.raises(FileError, match="not a ledger of draws"):
+        ledger("car", tmp_path, own=False)
+
+
+@given(st.integers(0, 40), st.integers(1, 400))
+def test_the_bound_of_a_rate_is_exact(misses, runs):
+    misses = min(misses, runs)
+    bound = upper_bound(misses, runs)
+    if misses == runs:
+        assert bound == 1.0
+    else:
+        # At the bound so few misses have a probability of 5 %.
+        np.testing.assert_allclose(binom.cdf(misses, runs, bound), 0.05, rtol=1e-6)
+
+
+def test_299_runs_without_a_miss_prove_less_than_1_percent():
+    assert upper_bound(0, 298) > 0.01 > upper_bound(0, 299)
+
+
+def ladder(name, order, scores, factor=1.0):
+    return [
+        {"method": f"{name} {s}", "score": s, "seconds": factor * s ** (-1.0 / order)}
+        for s in scores
+    ]
+
+
+@given(st.floats(0.011, 0.99))
+def test_a_power_law_is_interpolated_exactly(error):
+    rows = ladder("a", 3.0, [1.0, 0.1, 0.01])
+    # A row that is slower and less accurate than another is no part of the curve.
+    rows.append({"method": "slip", "score": 0.5, "seconds": 50.0})
+    found = at_error([rows], error, "seconds")
+    np.testing.assert_allclose(found.seconds, error ** (-1.0 / 3.0), rtol=1e-12)
+    assert "slip" not in found.rows
+
+
+def test_the_fastest_ladder_counts_that_reaches_the_error():
+    slow, fast = ladder("slow", 3.0, [1.0, 0.001], 2.0), ladder("fast", 3.0, [1.0, 0.1])
+    assert at_error([slow, fast], 0.2, "seconds").rows == ("fast 1.0", "fast 0.1")
+    assert at_error([slow, fast], 0.05, "seconds").rows == ("slow 1.0", "slow 0.001")
+    assert at_error([slow, fast], 5.0, "seconds") == (1.0, ("fast 1.0",))
+    assert math.isnan(at_error([slow, fast], 1e-6, "seconds").seconds)
+
+
+def results(errors, statuses, until):
+    shape, remarks = ("scenario", "output"), [""] * len(errors)
+    remarks[2] = "off the ground for a time: FL"
+    return xr.Dataset(
+        {
+            "rms_error": (shape, np.array(errors)[:, None]),
+            "largest_output": (shape, np.array([[1.0]] * len(errors))),
+            "status": ("scenario", np.array(statuses, dtype=object)),
+            "message": ("scenario", np.array(["why"] * len(errors), dtype=object)),
+            "remark": ("scenario", np.array(remarks, dtype=object)),
+            "trusted_until": ("scenario", np.array(until)),
+        },
+        {"output": ["toe"]},
+    )
+
+
+def test_only_a_miss_without_a_word_is_silent():
+    bounds = {"toe": Bound(measure="rms", bound=1.0)}
+    statuses = ["ok", "ok", "untrusted", "diverged", "ok"]
+    part = results([0.5, 2.0, 2.0, np.nan, 0.5], statuses, [np.inf, np.inf, 3.0, np.inf, 3.0])
+    found = outcomes(part, bounds)
+    assert found.missed.tolist() == [False, True, True, True, False]
+    assert found.silent.tolist() == [False, True, False, False, False]
+    assert found.flagged.tolist() == [False, False, True, True, True]
+
+
+def test_runs_of_a_sensitive_full_order_are_found(protocol):
+    definition = protocol.definition.model_copy(
+        update={"bounds": {"toe": Bound(measure="rms", bound=1.0)}, "sensitive": {"toe": 2.0}}
+    )
+    second = results([0.1, 3.0, 0.1], ["ok"] * 3, [np.inf] * 3)
+    found = reasons(replace(protocol, definition=definition), second)
+    assert found[0] == ""
+    assert "differ by 3 times a bound" in found[1]
+    assert found[2].startswith("off the ground")
+    tipped = definition.model_copy(update={"sensitive": {"toe": 0.5}})
+    assert "reaches 1" in reasons(replace(protocol, definition=tipped), second)[0]
+
+
+def test_boxes_are_checked_when_a_protocol_is_read(tmp_path, protocol_text):
+    path = tmp_path / "wrong.toml"
+    for old, new, told in (
+        ("frequency = [0.7, 2.0], amplitude = [0.5, 1.1]", "frequency = [2.0, 0.7]", "in order"),
+        ("amplitude = [1.3, 1.4]", 'start = ["dropped"]', "drawn_outside, box 1"),
+        ("runs = 5", "runs = 0", "drawn"),
+    ):
+        assert old in protocol_text
+        path.write_text(protocol_text.replace(old, new))
+        with pytest.raises(FileError, match=told):
+            load_protocol(str(path))
+
+
+def test_the_ledger_of_the_package_can_be_read():
+    from vehiclemor.resources import data_folder
+
+    for path in (data_folder() / "draws").glob("*.jsonl"):
+        for line in path.read_text().splitlines():
+            draw = Drawn(**json.loads(line))
+            assert len(draw.digest) == 64
+            assert draw.runs > 0

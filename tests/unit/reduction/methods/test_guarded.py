@@ -1,0 +1,119 @@
+"""A fast model with a safe one behind it: where the fast one leaves, the safe one goes on."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vehiclemor.errors import InputError
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.reduction.methods.guarded import METHOD, GuardedModel
+from vehiclemor.reduction.validation import validated
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.trajectory import Trajectory, Trust
+
+TOLERANCE = 1e-8
+STEER = component("maneuver", "step_steer")
+
+
+@dataclass(frozen=True)
+class LeavesAt:
+    """A fast model that is right until it leaves; from then on nothing that it gives is."""
+
+    until: float
+    status: str = "untrusted"
+    told: bool = True
+    offline: Offline = field(default_factory=Offline)
+    effective_rank: int = 0
+
+    def simulate(self, *_: object) -> Trajectory:
+        full = whole()
+        late = full.time >= self.until
+        wrong = {
+            name: np.where(late[:, None], np.nan, getattr(full, name))
+            for name in ("coordinates", "speeds", "outputs")
+        }
+        trust = Trust(2.0, self.until, "the steering is beyond") if self.told else None
+        return replace(full, status=self.status, message="why", trust=trust, **wrong)
+
+
+def whole(cache: list[Trajectory] = []) -> Trajectory:  # noqa: B006
+    if not cache:
+        cache.append(model().simulate(STEER, "dropped", tolerance=TOLERANCE))
+    return cache[0]
+
+
+def model():
+    return build("independent_suspension_vehicle")
+
+
+def guarded(fast, back=0.0) -> GuardedModel:
+    safe = FullOrderModel(model(), "dopri5", TOLERANCE)
+    return GuardedModel(fast, safe, "full_order", back, Offline(), "", 0.0)
+
+
+@settings(max_examples=15)
+@given(until=st.floats(0.0, 5.0), back=st.sampled_from([0.0, 0.3, np.inf]))
+def test_the_safe_model_mends_the_run_wherever_the_fast_one_leaves(until, back):
+    run, full = guarded(LeavesAt(until), back).simulate(STEER, "dropped"), whole()
+    np.testing.assert_array_equal(run.time, full.time)
+    scale = np.abs(full.outputs).max(axis=0) + 1e-9
+    assert np.abs((run.outputs - full.outputs) / scale).max() < 1e-4
+    assert (run.status, run.message) == ("ok", "")
+    assert "by full_order: the steering is beyond" in run.remark
+    assert (run.trust.indicator, run.trust.until) == (2.0, until)
+    assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
+
+
+def test_a_trusted_run_is_the_fast_one():
+    fast = LeavesAt(np.inf, status="ok")
+    run, own = guarded(fast).simulate(STEER, "dropped"), fast.simulate()
+    assert (run.status, run.remark) == ("ok", own.remark)
+    np.testing.assert_array_equal(run.outputs, own.outputs)
+
+
+def test_a_fast_run_that_fails_without_a_warning_is_trusted_nowhere():
+    fast = LeavesAt(3.0, status="diverged", told=False)
+    run = guarded(fast).simulate(STEER, "dropped")
+    np.testing.assert_array_equal(run.outputs, whole().outputs)
+    assert run.remark.startswith("from t = 0 s on by full_order: why")
+
+
+def test_what_the_safe_model_tells_of_itself_is_kept():
+    class Doubtful(FullOrderModel):
+        def simulate(self, *given):
+            return super().simulate(*given).judged(Trust(3.0, 4.0, "an arm is beyond"))
+
+    safe = Doubtful(model(), "dopri5", TOLERANCE)
+    run = replace(guarded(LeavesAt(2.0)), safe=safe).simulate(STEER, "dropped")
+    assert (run.status, run.message) == ("untrusted", "from t = 4 s on an arm is beyond")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"fast": "guarded"}, "guard itself"),
+        ({"fast": "no_such"}, "no_such"),
+        ({"fast_settings": "terms = "}, "fast_settings"),
+        ({"fast_settings": "terms = 1.5"}, "terms"),
+        ({"fast_settings": "no_such = 1"}, "no_such"),
+        ({"fast_settings": "tolerance = 1e-3"}, "setting of its own"),
+        ({"safe": "frozen_inertia"}, "reduces kind dae"),
+    ],
+)
+def test_wrong_settings_are_named(given, words):
+    with pytest.raises(InputError, match=words):
+        METHOD.check(model(), validated(METHOD, "ode", given))
+
+
+def test_settings_reach_both_models():
+    vehicle = model()
+    given = {"fast": "full_order", "solver": "dopri5", "tolerance": 1e-4, "safe_tolerance": 1e-5}
+    fitted = METHOD.fit(vehicle, [], validated(METHOD, "ode", given))
+    assert (fitted.ahead.solver, fitted.ahead.tolerance) == ("dopri5", 1e-4)
+    assert (fitted.safe.solver, fitted.safe.tolerance) == ("etdrk4", 1e-5)
+    assert replace(fitted, tolerance=1e-3).ahead.tolerance == 1e-3

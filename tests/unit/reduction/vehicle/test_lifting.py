@@ -1,0 +1,94 @@
+"""Reduced states come back to full ones as the formulas say, with what tells how far they go."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vehiclemor.reduction.methods import slow_manifold
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.simulation.build import build
+from vehiclemor.steering_maneuvers import lane_change, rack_lane_change
+
+CARS = {"independent_suspension_vehicle": lane_change, "high_fidelity_vehicle": rack_lane_change}
+
+
+@pytest.fixture(scope="module", params=CARS)
+def reduced(request: pytest.FixtureRequest) -> ReducedVehicle:
+    model, maneuver = build(request.param), CARS[request.param]
+    factors = (1.0, 1.0), (1.3, -0.7), (0.8, 1.2)
+    runs = [TrainingRun(model, maneuver.perturbed(*f), "equilibrium") for f in factors]
+    settings = validated(slow_manifold.METHOD, model.kind, {"sweeps": 0})
+    return slow_manifold.fit(model, runs, settings)
+
+
+def lifted(reduced: ReducedVehicle, maneuver, start: str) -> np.ndarray:
+    """States (samples, 2 n) by the formulas, in NumPy."""
+    path = reduced.path(maneuver, start)
+    k, shape, decay = reduced.features.states, reduced.shape, reduced.transient
+    inputs = maneuver.at(maneuver.times)
+    columns = feature_columns(reduced.features, path[:, :k], inputs, reduced.parameters)
+    deviation = shape.of(reduced.model.start(start)[None])[0] - shape.reference
+    motion = np.exp(np.outer(maneuver.times, decay.rates)) * (decay.left @ deviation) @ decay.right
+    shapes = shape.reference + columns @ reduced.lifting + motion.real
+    return shape.states(shapes, path[:, [k + 1, k + 2, k]])
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+def test_the_compiled_lifting_is_the_formula(reduced, start):
+    model, maneuver = reduced.model, CARS[reduced.model.name].perturbed(1.2, 0.8)
+    run, states = reduced.simulate(maneuver, start), lifted(reduced, maneuver, start)
+    outputs = model.outputs_at(states, run.inputs)
+    excited = reduced._excited(start)
+    # At the samples themselves there is only rounding.
+    path = reduced.path(maneuver, start)
+    direct, _ = reduced.lift.states(maneuver.times, path, run.inputs, excited)
+    n = states.shape[1]
+    scale = np.abs(states).max(axis=0) + 1e-3
+    np.testing.assert_allclose(direct[:, :n] / scale, states / scale, atol=1e-9)
+    # Between the points of a step, a small part of the integrator's tolerance.
+    for name, tenth in (("lateral_position", 5e-3), ("yaw", 7.59e-6), ("pitch", 5.18e-5)):
+        column = model.outputs.index(name)
+        assert np.abs(run.outputs[:, column] - outputs[:, column]).max() < tenth, name
+    np.testing.assert_array_equal(run.inputs, maneuver.at(maneuver.times))
+
+
+def test_few_samples_are_lifted_alike(reduced):
+    maneuver = replace(CARS[reduced.model.name], duration=0.2, samples=5)
+    run, states = (
+        reduced.simulate(maneuver, "equilibrium"),
+        lifted(reduced, maneuver, "equilibrium"),
+    )
+    np.testing.assert_allclose(run.states, states, rtol=1e-9, atol=1e-12)
+
+
+def test_a_run_tells_how_far_it_has_gone(reduced):
+    maneuver, features = CARS[reduced.model.name], reduced.features
+    watched = replace(features, terms=tuple(name for name, _ in features.watched))
+
+    def indicator(run_of):
+        path = reduced.path(run_of, "equilibrium")[:, : features.states]
+        inputs = run_of.at(run_of.times)
+        return np.abs(feature_columns(watched, path, inputs, reduced.parameters))
+
+    known = reduced.simulate(maneuver.perturbed(1.0, 0.8), "equilibrium")
+    assert known.status == "ok"
+    assert known.trust.indicator < 1.0
+    assert known.trust.until == np.inf
+    beyond = maneuver.perturbed(1.0, 1.35)
+    run, expected = reduced.simulate(beyond, "equilibrium"), indicator(beyond)
+    assert run.status == "untrusted"
+    assert run.finished
+    assert run.trust.indicator == pytest.approx(expected.max(), rel=0.01)
+    first = beyond.times[(expected > 1.0).any(axis=1)][0]
+    assert run.trust.until == pytest.approx(first, abs=0.1)
+    named = {
+        text
+        for (_, text), column in zip(features.watched, expected.T, strict=True)
+        if column.max() > 1.0
+    }
+    assert any(run.trust.reason.startswith(text) for text in named)
+    assert run.message.startswith(f"from t = {run.trust.until:.4g} s on ")

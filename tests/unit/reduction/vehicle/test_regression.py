@@ -1,0 +1,34 @@
+"""Choice of regression terms one after the other."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vehiclemor.reduction.vehicle.regression import forward_selection
+
+
+def left_over(columns: np.ndarray, values: np.ndarray, chosen: list[int]) -> float:
+    part = columns[:, chosen]
+    return float(np.sum((values - part @ np.linalg.lstsq(part, values, rcond=None)[0]) ** 2))
+
+
+@given(seed=st.integers(0, 10**6), first=st.integers(0, 3))
+def test_each_term_is_the_one_that_explains_most(seed, first):
+    random = np.random.default_rng(seed)
+    columns = random.normal(size=(30, 8)) @ random.normal(size=(8, 8))
+    values = random.normal(size=(30, 2))
+    chosen = forward_selection(columns, values, first, 3)
+    assert chosen[:first] == list(range(first))
+    assert len(set(chosen)) == first + 3
+    for n in range(first, len(chosen)):
+        others = [i for i in range(8) if i not in chosen[:n]]
+        best = min(left_over(columns, values, [*chosen[:n], i]) for i in others)
+        assert left_over(columns, values, chosen[: n + 1]) == pytest.approx(best, rel=1e-6)
+
+
+def test_a_sum_of_chosen_terms_comes_last():
+    random = np.random.default_rng(3)
+    columns = random.normal(size=(40, 3))
+    both = np.column_stack([columns[:, 0], columns[:, 1], columns[:, :2].sum(axis=1), columns[:, 2]])
+    assert forward_selection(both, columns[:, :2], 2, 1) == [0, 1, 3]
