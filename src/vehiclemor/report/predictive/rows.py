@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.ledger import Drawn, ledger, pooled
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.study.plans.protocol_file import Bound, ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part
 from vehiclemor.study.run import run_studies
 
@@ -123,6 +124,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
         "outside_silent": int(outside.silent.sum()),
         "outside_flagged": int(outside.flagged.sum()),
         **_errors(part, protocol),
+        "covered": _covered(part, bounds),
         "validation_score": float(part["validation_score"]),
         "candidates": str(part["validation"].item()),
         "evaluations": _mean(part[dataset.attrs["evaluations"]].values, ok),
@@ -172,12 +174,30 @@ def _errors(part: xr.Dataset, protocol: ProtocolFile) -> Row:
     return found
 
 
+def _covered(part: xr.Dataset, bounds: Mapping[str, Bound]) -> str:
+    """JSON: bounded output -> share of the runs whose error is below its estimate, and how sharp.
+
+    The second number is the median of estimate over error; an output without estimates is left out.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for output, bound in bounds.items():
+        estimate = part["error_estimate"].sel(output=output).values
+        error = part[f"{bound.measure}_error"].sel(output=output).values
+        known = np.isfinite(estimate) & np.isfinite(error) & (error > 0.0)
+        if known.any():
+            ratios = estimate[known] / error[known]
+            found[output] = float((ratios >= 1.0).mean()), float(np.median(ratios))
+    return json.dumps(found)
+
+
 def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
     """Ratios of a row to the full order, and its break-even."""
     within = [other for other in full if other["within_bounds"]]
     best = min(within, key=lambda other: other["seconds"], default=None)
     equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS if clock in row}
-    ratios = {c: e.seconds / row[c] if row[c] > 0.0 else math.nan for c, e in equal.items()}
+    # A recording that is played again is no solution of anything.
+    solves = row["component"] != "replay"
+    ratios = {c: e.seconds / row[c] if solves and row[c] else math.nan for c, e in equal.items()}
     saved = equal["seconds"].seconds - row["seconds"]
     return {
         "equal_rows": ", ".join(equal["seconds"].rows),

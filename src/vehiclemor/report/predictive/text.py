@@ -22,6 +22,8 @@ LEGEND = {
     "faster than the full order interpolated at the same score; off.: offline, s",
     "bound": "with a * it is our own; n/c: not comparable, since the rounds scatter by more than "
     f"{100 * LARGEST_SPREAD:g} % (interquartile range over median)",
+    "cov.": "share of the runs, %, whose error is below the model's own estimate, calibrated on "
+    "validation to cover 95 %; est.: median of estimate over error",
     "*": "chosen by validation",
 }
 
@@ -72,7 +74,7 @@ def _target_table(rows: list[Row], notes: Footnotes) -> str:
 
 def _error_table(winner: Row) -> str:
     """Errors of what was chosen, each beside its bound and the bound's reason."""
-    bounds = json.loads(winner["bounds"])
+    bounds, covered = json.loads(winner["bounds"]), json.loads(winner["covered"])
     lines = []
     for column in (c for c in winner if c.startswith("worst_")):
         kind, _, output = column.removeprefix("worst_").partition("_")
@@ -81,9 +83,12 @@ def _error_table(winner: Row) -> str:
         bound, reason = bounds.get(output, (math.nan, "reported"))
         name = label_of(output).short + (" max" if kind == "max" else "")
         values = (winner[column], winner[column.replace("worst_", "most_", 1)])
-        lines.append(Line([f"  {name}", short(bound), *map(short, values), reason]))
-    headings = [f"  errors of {winner['method']}", "bound", "worst", "99 %", "bound's source"]
-    return table_text(headings, lines, (0, 4))
+        share, sharp = covered.get(output, (math.nan, math.nan))
+        cells = [short(bound), *map(short, values), fixed(100.0 * share, 0), short(sharp), reason]
+        lines.append(Line([f"  {name}", *cells]))
+    heading = f"  errors of {winner['method']}"
+    headings = [heading, "bound", "worst", "99 %", "cov.", "est.", "bound's source"]
+    return table_text(headings, lines, (0, 6))
 
 
 def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:

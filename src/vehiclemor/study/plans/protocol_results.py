@@ -70,6 +70,7 @@ def protocol_dataset(
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
     dataset = dataset.assign(variables(per_row, "row"))
+    dataset["error_estimate"] = _estimates(protocol, rows, dataset)
     judged = dataset["scenario_set"].values == judged_set(found)
     places = np.flatnonzero(judged)[: timed.sizes["scenario"]]
     for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
@@ -89,6 +90,20 @@ def protocol_dataset(
             drawn_on=datetime.now(UTC).isoformat(timespec="seconds"),
         )
     )
+
+
+def _estimates(protocol: Protocol, rows: Sequence[Row], dataset: xr.Dataset) -> tuple:
+    """Errors as the models estimate them, in the measure of each bound, made honest."""
+    sizes = [dataset.sizes[name] for name in ("row", "scenario", "output")]
+    found = np.full(sizes, np.nan)
+    outputs = dataset["output"].values.tolist()
+    for output, bound in protocol.definition.bounds.items():
+        raw = dataset[f"estimated_{bound.measure}_error"].sel(output=output).values
+        for index, row in enumerate(rows):
+            factor = row.validation[row.candidate].factors.get(output, np.inf)
+            if np.isfinite(factor):
+                found[index, :, outputs.index(output)] = raw[index] * factor
+    return variables({"error_estimate": found}, "row", "scenario")["error_estimate"]
 
 
 def judged_set(sets: Container[str]) -> str:
@@ -152,6 +167,12 @@ def _validation(row: Row) -> str:
     return json.dumps(content, sort_keys=True)
 
 
-def _finite(result: Validation) -> dict[str, float | None]:
-    """JSON has no infinity: a score that is infinite is null."""
-    return {name: value if np.isfinite(value) else None for name, value in asdict(result).items()}
+def _finite(result: Validation) -> dict[str, Any]:
+    """JSON has no infinity: a number that is infinite is null."""
+
+    def finite(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: finite(part) for name, part in value.items()}
+        return value if np.isfinite(value) else None
+
+    return finite(asdict(result))
