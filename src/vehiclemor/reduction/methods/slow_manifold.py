@@ -10,9 +10,10 @@ which lie on it, and the lag of the fast modes is learnt with them:
 
 Lambda and b are exact at straight running.  N is odd in the lateral quantities (the vehicle is its
 own mirror image): cubic, and in the axles' slip angles also quintic, terms; the speed and what is
-symmetric have even terms.  What whole runs hardly need is eliminated again.  The heading is fitted
-twice: as a rate, then as its integral along reduced runs, since a heading that is off is a lateral
-position that is off.
+symmetric have even terms.  Heave and pitch, as slow as the lateral modes, are coordinates too:
+corners and a drop move them, and they move the wheel loads.  The coefficients are improved on whole
+runs, since a heading that is off is a lateral position that is off; what whole runs hardly need is
+eliminated.
 """
 
 import time
@@ -46,8 +47,10 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 
-# Accuracy of the reduced runs on which the heading is fitted.
+# Accuracy of the reduced runs that are compared with training runs.
 REFIT_TOLERANCE = 1e-6
+# Heading (rad) below which its error counts absolutely.
+HEADING = 0.03
 # The part of the terms that is left by each round of elimination, and for how many of them all
 # training runs are looked at; with more terms it is fewer runs, but so many at least.
 SHRINKING, WANTED, FEW = 0.4, 60, 20
@@ -161,7 +164,7 @@ def _fitted_on_rates(
         lifting,
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
-        np.concatenate([3.0 * ranges, [10.0, 1.0, 10.0, 10.0]]),
+        np.concatenate([3.0 * ranges, [10.0, HEADING, 10.0, 10.0]]),
         Offline(),
         "dopri5",
         REFIT_TOLERANCE,

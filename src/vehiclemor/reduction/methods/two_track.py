@@ -54,13 +54,13 @@ class TwoTrackSettings(OnlineSettings):
         20, ge=0, description="products chosen for pitch and heave, beside those of the equations"
     )
     sweeps: int = Field(
-        25, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
+        8, ge=0, description="Gauss-Newton steps on whole training runs, once and again"
     )
     hull: float = Field(
         1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
     )
     saturation: float = Field(
-        1.5,
+        1.2,
         gt=0.0,
         description="a run with a tire beyond this multiple of the slip at which all of its "
         "contact slides is not trusted",
@@ -118,6 +118,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         goals = targets(reduced, training, runs, stride=1)
         (odd, _), (even, symmetric) = reduced.features.groups
         free = [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
+        reduced = improved(reduced, goals, free, settings.sweeps, power=1.0)
         reduced = improved(reduced, goals, free, settings.sweeps)
     return replace(
         reduced,

@@ -28,6 +28,8 @@ STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
 DIFFERENCE = 1e-6
+# Least sum of squares that a weight is made of.
+NOTHING = 1e-12
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
@@ -90,20 +92,28 @@ def targets(
 
 
 def improved(
-    reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int
+    reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int, power: float = 2.0
 ) -> ReducedVehicle:
-    """The reduced vehicle after so many sweeps, damped Gauss-Newton steps."""
-    paths, error = _compared(reduced, goals)
+    """The reduced vehicle after so many sweeps, damped Gauss-Newton steps.
+
+    Parameters
+    ----------
+    power
+        Of the runs' errors in the sum that is made small.  With 1 the worst runs count no more than
+        the others (iteratively reweighted least squares): of use from a first guess on, where the
+        errors of some are too large to say much.
+    """
+    paths, error = _compared(reduced, goals, power)
     damping = DAMPING
     for _ in range(sweeps):
         if not np.isfinite(error):
             break
-        normal, gradient = _normal_equations(reduced, goals, paths, free)
+        normal, gradient = _normal_equations(reduced, goals, paths, free, power)
         scaled, scale = unit_diagonal(normal)
         while damping < MOST_DAMPING:
             step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
             candidate = _changed(reduced, free, -step)
-            new_paths, new_error = _compared(candidate, goals)
+            new_paths, new_error = _compared(candidate, goals, power)
             if new_error < error:
                 reduced, paths, error = candidate, new_paths, new_error
                 damping *= 0.1
@@ -136,8 +146,10 @@ def _changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVe
     return replace(reduced, coefficients=coefficients)
 
 
-def _compared(reduced: ReducedVehicle, goals: Sequence[Target]) -> tuple[list[np.ndarray], float]:
-    """Reduced runs, and the sum of their squared errors; infinite if one has failed."""
+def _compared(
+    reduced: ReducedVehicle, goals: Sequence[Target], power: float = 2.0
+) -> tuple[list[np.ndarray], float]:
+    """Reduced runs, and the sum of powers of their errors; infinite if one has failed."""
     paths, total = [], 0.0
     scale = _scale(goals)
     for goal in goals:
@@ -145,7 +157,7 @@ def _compared(reduced: ReducedVehicle, goals: Sequence[Target]) -> tuple[list[np
         if path is None:
             return [], np.inf
         paths.append(path)
-        total += float(np.sum(_errors(goal, path, scale) ** 2))
+        total += float(np.sum(_errors(goal, path, scale) ** 2) ** (0.5 * power))
     return paths, total
 
 
@@ -162,7 +174,11 @@ def _errors(goal: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 
 def _normal_equations(
-    reduced: ReducedVehicle, goals: Sequence[Target], paths: Sequence[np.ndarray], free: Free
+    reduced: ReducedVehicle,
+    goals: Sequence[Target],
+    paths: Sequence[np.ndarray],
+    free: Free,
+    power: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     scale = _scale(goals)
     size = sum(len(terms) for terms, _ in free)
@@ -171,8 +187,10 @@ def _normal_equations(
         sensitivity = _sensitivities(reduced, goal, path, free)
         sensitivity *= scale[:, None] * goal.shares[:, None, None]
         rows = sensitivity.reshape(-1, size)
-        normal += rows.T @ rows
-        gradient += rows.T @ _errors(goal, path, scale).ravel()
+        error = _errors(goal, path, scale).ravel()
+        weight = max(error @ error, NOTHING) ** (0.5 * power - 1.0)
+        normal += weight * (rows.T @ rows)
+        gradient += weight * (rows.T @ error)
     return normal, gradient
 
 

@@ -30,5 +30,7 @@ def test_each_term_is_the_one_that_explains_most(seed, first):
 def test_a_sum_of_chosen_terms_comes_last():
     random = np.random.default_rng(3)
     columns = random.normal(size=(40, 3))
-    both = np.column_stack([columns[:, 0], columns[:, 1], columns[:, :2].sum(axis=1), columns[:, 2]])
+    both = np.column_stack(
+        [columns[:, 0], columns[:, 1], columns[:, :2].sum(axis=1), columns[:, 2]]
+    )
     assert forward_selection(both, columns[:, :2], 2, 1) == [0, 1, 3]
