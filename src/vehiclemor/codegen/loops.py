@@ -123,7 +123,7 @@ def _part(loop: str, kind: Kind, part: Any) -> bytes:
 
 def _flat(value: Any) -> list[Any]:
     """Parts of an argument, named tuples taken apart."""
-    if len(kinds) == 1 and not isinstance(value, tuple):
+    if not isinstance(value, tuple):
         return [value]
     return [part for field in value for part in _flat(field)]
 

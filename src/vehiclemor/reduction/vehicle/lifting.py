@@ -78,7 +78,8 @@ class Lifting(ShortRepr):
         """Address and constants of the kernel; without modes for a start that excites none."""
         if (modes, lanes) not in self._made:
             right = self.transient.right[:modes]
-            pairs = np.stack([np.real(right), -np.imag(right)], axis=1).reshape(2 * modes, right.shape[1])
+            pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
+            pairs = pairs.reshape(2 * modes, right.shape[1])
             shared = [self.coefficients, self.reference[None]]
             rows = np.vstack([*shared, pairs] if modes else shared)
             rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
