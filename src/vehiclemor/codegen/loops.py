@@ -115,7 +115,7 @@ def _part(loop: str, kind: Kind, part: Any) -> bytes:
         )
     if flags.writeable and part.size:
         # In a third of the time.
-        address = ctypes.addressof(ctypes.c_char.from_buffer(part))
+        address = ctypes.addressof(ctypes.c_char.from_buffer(part))  # type: ignore[arg-type]
     else:
         address = part.ctypes.data
     return ARRAYS[dimensions].pack(address, *part.shape)
