@@ -174,7 +174,7 @@ class _Expressions:
         return builder.bitcast(builder.shl(biased, _whole(whole, 52)), number.type)
 
 
-def _function(builder: Any, name: str, *kinds: ir.Type) -> Any:
+def _function(builder: Any, name: str, *kinds: Any) -> Any:
     """An LLVM function of floats or vectors, by its name without the suffix of its type."""
     suffix = "f64" if kinds[0] == DOUBLE else f"v{kinds[0].count}f64"
     return _declared(builder, f"{name}.{suffix}", kinds[0], kinds)
@@ -188,11 +188,11 @@ def _declared(builder: Any, name: str, returned: ir.Type, kinds: Sequence[ir.Typ
     return known[name]
 
 
-def _constant(kind: ir.Type, number: float) -> ir.Constant:
+def _constant(kind: Any, number: float) -> ir.Constant:
     return ir.Constant(kind, number if kind == DOUBLE else [number] * kind.count)
 
 
-def _whole(kind: ir.Type, number: int) -> ir.Constant:
+def _whole(kind: Any, number: int) -> ir.Constant:
     return ir.Constant(kind, number if kind == ir.IntType(64) else [number] * kind.count)
 
 

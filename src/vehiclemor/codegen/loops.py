@@ -25,6 +25,9 @@ _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 Kind = tuple[str, str, int]
 DTYPES = {"d": np.dtype(np.float64), "l": np.dtype(np.int64)}
+# Words of numbers, and of arrays by their dimensions.
+LONG, FLOAT = struct.Struct("q"), struct.Struct("d")
+ARRAYS = [struct.Struct(f"{dimensions + 1}q") for dimensions in range(4)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,31 +93,32 @@ class Loop:
 
 def _words(loop: str, kinds: Sequence[Kind], value: Any) -> bytes:
     """Words of an argument: an array is its address and its shape."""
-    words: list[int] = []
-    parts = _flat(value) if isinstance(value, tuple) else (value,)
-    for (name, code, dimensions), part in zip(kinds, parts, strict=True):
-        if not dimensions:
-            words.append(int(part) if code == "l" else _bits(part))
-            continue
-        if not (
-            isinstance(part, np.ndarray)
-            and part.dtype == DTYPES[code]
-            and part.ndim == dimensions
-            and part.flags.c_contiguous
-        ):
-            found = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
-            raise TypeError(
-                f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {found}"
-            )
-        words += (_address(part), *part.shape)
-    return struct.pack(f"{len(words)}q", *words)
+    if len(kinds) == 1 and not isinstance(value, tuple):
+        return _part(loop, kinds[0], value)
+    pairs = zip(kinds, _flat(value), strict=True)
+    return b"".join([_part(loop, kind, part) for kind, part in pairs])
 
 
-def _address(array: np.ndarray) -> int:
-    if array.flags.writeable and array.size:
+def _part(loop: str, kind: Kind, part: Any) -> bytes:
+    name, code, dimensions = kind
+    if not dimensions:
+        return LONG.pack(int(part)) if code == "l" else FLOAT.pack(part)
+    if not (
+        isinstance(part, np.ndarray)
+        and part.ndim == dimensions
+        and part.dtype == DTYPES[code]
+        and (flags := part.flags).c_contiguous
+    ):
+        found = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
+        raise TypeError(
+            f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {found}"
+        )
+    if flags.writeable and part.size:
         # In a third of the time.
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
-    return array.ctypes.data
+        address = ctypes.addressof(ctypes.c_char.from_buffer(part))  # type: ignore[arg-type]
+    else:
+        address = part.ctypes.data
+    return ARRAYS[dimensions].pack(address, *part.shape)
 
 
 def _flat(value: Any) -> list[Any]:
@@ -122,10 +126,6 @@ def _flat(value: Any) -> list[Any]:
     if not isinstance(value, tuple):
         return [value]
     return [part for field in value for part in _flat(field)]
-
-
-def _bits(value: float) -> int:
-    return struct.unpack("q", struct.pack("d", value))[0]
 
 
 def loops(

@@ -78,7 +78,8 @@ class Lifting(ShortRepr):
         """Address and constants of the kernel; without modes for a start that excites none."""
         if (modes, lanes) not in self._made:
             right = self.transient.right[:modes]
-            pairs = np.stack([right.real, -right.imag], axis=1).reshape(2 * modes, right.shape[1])
+            pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
+            pairs = pairs.reshape(2 * modes, right.shape[1])
             shared = [self.coefficients, self.reference[None]]
             rows = np.vstack([*shared, pairs] if modes else shared)
             rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
@@ -99,7 +100,7 @@ class Lifting(ShortRepr):
         rates = self.transient.rates if deviation.any() else self.transient.rates[:0]
         amplitudes = self.transient.left[: len(rates)] @ deviation if len(rates) else rates
         found = np.array([rates, amplitudes], dtype=complex)
-        return np.stack([found.real, found.imag], axis=2)
+        return np.stack([np.real(found), np.imag(found)], axis=2)
 
     def states(
         self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, excited: np.ndarray
