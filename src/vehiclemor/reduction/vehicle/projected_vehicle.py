@@ -53,7 +53,7 @@ def projected_vehicle(
         settings.tolerance,
         encode,
         lift,
-        project,
+        project=project,
     )
 
 
