@@ -1,7 +1,7 @@
 """A fast model with a safe one behind it.
 
-The fast model runs.  Where it tells that it leaves what it knows, the safe one goes on from the
-full state at the last output time that it answers for, or does the whole run.
+The fast model runs.  If it tells that it leaves what it knows, the safe one does the whole run, or
+goes on from the full state at the last output time that the fast one answers for.
 """
 
 import tomllib
@@ -40,10 +40,10 @@ class GuardedSettings(OnlineSettings):
     )
     safe_solver: Solver = "etdrk4"
     safe_tolerance: Tolerance = 2e-3
-    resume: Literal["departure", "start"] = Field(
-        "departure",
-        description="where the safe model takes over: where the fast one leaves, or "
-        "at the start of the run",
+    resume: Literal["start", "departure"] = Field(
+        "start",
+        description="what the safe model does: the whole run, or what comes after the fast one has "
+        "left, which is hardly quicker and inherits what was wrong before it was noticed",
     )
     back: float = Field(0.0, ge=0.0, description="time in s before the departure, for resume")
     solver: Solver = "etdrk4"
