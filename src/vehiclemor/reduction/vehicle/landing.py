@@ -42,7 +42,7 @@ def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
     from scipy.linalg import block_diag, expm
 
     transient, shape, k = reduced.transient, reduced.shape, modes.lateral
-    slow = np.abs(transient.rates.real) * LANDED < DECAYED
+    slow = np.abs(np.real(transient.rates)) * LANDED < DECAYED
     # What is seen of a deviation, and how it moves; the speed, which is last, does not.
     seeing = np.vstack([transient.left[slow], reduced.encoding[k:]])
     rates = block_diag(np.diag(transient.rates[slow]), modes.rates[k:, k:], 0.0)
@@ -54,7 +54,7 @@ def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
             continue
         start = shape.of(run.states[:1])[0] - shape.reference
         seen = (shape.of(run.states[still]) - shape.reference) @ seeing.T
-        moves = expm(rates * run.time[still][:, None, None]).reshape(-1, len(rates))
+        moves = np.vstack([expm(rates * time) for time in run.time[still]])
         starts.append(start)
         changes.append(np.linalg.lstsq(moves, seen.ravel())[0] - seeing @ start)
     if not starts:

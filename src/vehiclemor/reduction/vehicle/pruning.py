@@ -35,7 +35,7 @@ def pruned(
     c = reduced.coefficients.copy()
     rows, columns = np.array([(i, column) for terms, column in table.free for i in terms]).T
     nonlinear = sorted([*table.odd_nonlinear, *table.even_nonlinear])
-    groups = [np.flatnonzero(rows == i) for i in nonlinear]
+    groups = [np.flatnonzero(rows == i).tolist() for i in nonlinear]
     left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
     linear = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
     stay = sorted([*linear, *(nonlinear[i] for i in left)])

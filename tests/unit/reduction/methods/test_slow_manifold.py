@@ -200,7 +200,7 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(
     terms = reduced.lifted_features.terms
     columns = feature_columns(reduced.lifted_features, z, np.zeros((50, 1)), reduced.parameters)
     held = [i for i, term in enumerate(terms) if not {"z", "u"} & set(term)]
-    assert len(held) > 60
+    assert len(held) > 5
     assert np.abs(columns[:, held]).max() <= 1.0 + 1e-9
 
 
