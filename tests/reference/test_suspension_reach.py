@@ -47,6 +47,25 @@ def test_jumps_along_the_limits_stay_on_the_branch(model: AlgebraicModel, solver
                 assert is_on_branch(model, q, u)
 
 
+@pytest.mark.parametrize("samples", [9, 17, 101, 1001])
+@pytest.mark.parametrize("rack", [0.0, 2e-4, 1e-3, 9e-3])
+def test_lanes_beyond_the_reach_take_no_other_branch(
+    model: AlgebraicModel, rack: float, samples: int
+) -> None:
+    times = np.linspace(0.0, 1.0, samples)
+    for limit in model.reach(rack):
+        for beyond in (1.0001, 1.002, 1.05, 1.3):
+            heights = beyond * limit * np.sin(np.pi * times) ** 2
+            with pytest.raises(UnreachableError, match="reachable range"):
+                model.solve_path(
+                    times, np.column_stack([heights, 0.0 * times + rack]), "newton_lanes"
+                )
+        heights = 0.9999 * limit * np.sin(np.pi * times) ** 2
+        inputs = np.column_stack([heights, 0.0 * times + rack])
+        run = model.solve_path(times, inputs, "newton_lanes")
+        assert all(is_on_branch(model, q, u) for q, u in zip(run.coordinates, inputs, strict=True))
+
+
 def test_a_stop_ends_the_reach(model: AlgebraicModel) -> None:
     low, _ = model.reach(0.05)
     assert model.solve([low, 0.05])[0] == pytest.approx(-1.0, abs=1e-4)

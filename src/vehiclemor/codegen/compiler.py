@@ -11,6 +11,7 @@ from functools import cache
 from types import FunctionType, ModuleType
 from typing import Any, get_args
 
+import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import types
 from numba.core.codegen import AOTCodeLibrary, JITCPUCodegen
@@ -20,6 +21,11 @@ from numba.np.arrayobj import populate_array
 
 from vehiclemor.codegen import loop_intrinsics
 from vehiclemor.codegen.loop_types import declared_arguments
+
+# Straight-line kernels are one long block: with its own limits the compiler finds half of what left
+# and right have in common.
+for option in ("-slp-schedule-budget=2000000", "-slp-max-look-ahead-depth=6"):
+    llvm.set_option("vehiclemor", option)
 
 WORD = ir.IntType(64)
 OPTIONS = {
@@ -48,7 +54,7 @@ class _Part(AOTCodeLibrary):
 
 
 class _Codegen(JITCPUCodegen):
-    """Code for this processor, as numba makes it, but not loaded."""
+    """Code for this processor, as numba makes it, but not loaded; statements become vectors too."""
 
     _library_class = _Part
 
@@ -56,7 +62,6 @@ class _Codegen(JITCPUCodegen):
         pass
 
     def _pass_builder(self, **options: Any) -> Any:
-        # Straight-line code has no loops: left and right are packed statement by statement.
         return super()._pass_builder(**{"slp_vectorize": True} | options)
 
     def set_env(self, env_name: str, env: Any) -> None:

@@ -59,10 +59,10 @@ def write(call: ast.Call, builder: Any, address: Address, value: Address) -> Non
             builder.call(builder.inttoptr(first, kind.as_pointer()), pointers, attrs=("nounwind",))
 
 
-def _parts(n: int) -> list[tuple[int, ir.Type]]:
+def _parts(n: int) -> list[tuple[int, Any]]:
     """First places and types of what a vector of n floats is taken in."""
     whole = n // WIDTH * WIDTH
-    vectors = [(place, VECTOR) for place in range(0, whole, WIDTH)]
+    vectors: list[tuple[int, Any]] = [(place, VECTOR) for place in range(0, whole, WIDTH)]
     return vectors + [(place, DOUBLE) for place in range(whole, n)]
 
 
@@ -116,7 +116,7 @@ def _product(
     for attribute in ("nounwind", "noinline"):
         function.attributes.add(attribute)
     to, rows, x = function.args
-    builder = ir.IRBuilder(function.append_basic_block())
+    builder: Any = ir.IRBuilder(function.append_basic_block())
     vectors = n // WIDTH
     # Two sums in turn where few stand beside one another: no addition waits for the one before.
     chains: list[list[Any]] = [[None] * vectors for _ in range(2 if vectors <= 4 else 1)]

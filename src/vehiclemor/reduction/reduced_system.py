@@ -54,10 +54,10 @@ class ReducedSystem(ShortRepr):
     lift
         (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
         default the run's own.
-    judge
-        (run of the system, inputs) -> what the model tells of it; nothing by default.
     project
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
+    judge
+        (run of the system, inputs) -> what the model tells of it; nothing by default.
     """
 
     model: DynamicModel
@@ -69,8 +69,8 @@ class ReducedSystem(ShortRepr):
     tolerance: float
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
-    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
     project: Callable[[np.ndarray], np.ndarray] | None = None
+    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
 
     def run(
         self,
@@ -150,5 +150,5 @@ def transformed_system(
         settings.tolerance,
         encode,
         lift,
-        judge,
+        judge=judge,
     )

@@ -23,6 +23,7 @@ from vehiclemor.simulation.checks import (
     output_times,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.lane_loops import LaneKernels
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
@@ -128,7 +129,7 @@ class AlgebraicModel(Model):
     def _limit(self, rack: float, direction: float) -> float:
         """How far (m) the height gets downwards (-1) or upwards (1) at a rack displacement (m)."""
         target, reached = np.array([direction * self.definition.travel_limit, rack]), np.empty(2)
-        iteration = self._iteration(NEWTON_TOLERANCE, SHORTEST_SEARCH_STEP)
+        iteration = _iteration(NEWTON_TOLERANCE, SHORTEST_SEARCH_STEP)
         loop = self.loop("travel_limit")
         if loop(self._mechanism, target, iteration, reached, self._buffer()):
             raise UnreachableError(
@@ -241,7 +242,7 @@ class AlgebraicModel(Model):
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         loop, how = self._full_order(solver)
-        iteration, buffer = self._iteration(tolerance, SHORTEST_STEP), self._buffer()
+        iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
         run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
         status, seconds = timed(run)
         if not status:
@@ -261,10 +262,10 @@ class AlgebraicModel(Model):
         # One table is written faster than two.
         table = np.empty((samples, n + m))
         solution = newton_loops.Solution(table, new_counts())
-        loop, kernels = self._full_order("newton_lanes")
-        iteration = self._iteration(tolerance, SHORTEST_STEP)
+        loop, how = self._full_order("newton_lanes")
+        iteration = _iteration(tolerance, SHORTEST_STEP)
         buffer = np.empty(LANES * (5 * n + len(self.inputs) + m) + n * (n + 2))
-        run = loop.prepared(self._ready_mechanism, given, kernels, iteration, solution, buffer)
+        run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
         status, seconds = timed(run)
         if status:
             return None
@@ -284,7 +285,7 @@ class AlgebraicModel(Model):
             elif solver == "newton_lanes":
                 modules, names = ("lane_path", "simulation.lane_loops"), ("newton_step", "outputs")
                 addresses = [address_of(self.kernels, name, LANES) for name in names]
-                how = np.array(addresses, dtype=np.int64)
+                how = ready(LaneKernels(np.array(addresses, dtype=np.int64)))
             else:
                 raise unknown("solver", solver, SOLVERS)
             self._kept[solver] = self.loop(*modules), how
@@ -297,9 +298,6 @@ class AlgebraicModel(Model):
     @cached_property
     def _ready_mechanism(self) -> Ready:
         return ready(self._mechanism)
-
-    def _iteration(self, tolerance: float, shortest: float) -> newton_loops.Iteration:
-        return newton_loops.Iteration(tolerance, ITERATION_LIMIT, LARGEST_INCREMENT, shortest)
 
     def trajectory(
         self,
@@ -325,7 +323,7 @@ class AlgebraicModel(Model):
             path,
             np.empty((len(path), 0)),
             self.along("outputs", path, inputs) if outputs is None else outputs,
-            {name: int(count) for name, count in zip(ALGEBRAIC_COUNTS, counts, strict=False)},
+            dict(zip(ALGEBRAIC_COUNTS, counts.tolist(), strict=False)),
             seconds,
             status,
             message,
@@ -358,6 +356,12 @@ class AlgebraicModel(Model):
                 f"(from {heights.min():.4g} to {heights.max():.4g} m are asked for); the reachable "
                 f"range is {low:.4f} to {high:.4f} m (rack at {rack:g} m)"
             )
+
+
+@lru_cache(maxsize=64)
+def _iteration(tolerance: float, shortest: float) -> Ready:
+    limits = ITERATION_LIMIT, LARGEST_INCREMENT, shortest
+    return ready(newton_loops.Iteration(tolerance, *limits))
 
 
 @lru_cache(maxsize=64)

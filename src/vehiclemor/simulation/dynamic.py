@@ -274,7 +274,8 @@ class DynamicModel(Model):
     def _observer(self, lanes: int) -> Ready:
         if lanes not in self._observers:
             kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
-            observer = Observer(kernel, self.constants, *self._limits[1:])
+            states = 2 * len(self.coordinates)
+            observer = Observer(kernel, self.constants, *self._limits[1:], states)
             self._observers[lanes] = ready(observer)
         return self._observers[lanes]
 
@@ -285,18 +286,18 @@ class DynamicModel(Model):
 
         That is the number of all samples where it never is.
         """
-        samples, size = len(run.times), len(self.outputs)
-        outputs = np.empty((samples, size))
+        samples, n = len(run.times), 2 * len(self.coordinates)
         first = np.empty(len(self._limits[1]), dtype=np.int64)
         observer = self._observer(LANES if len(states) >= LANES else 1)
-        whole, scratch, places = states, NO_PLACES, NO_PLACES
+        # Rows of whole vectors.
+        width = -(-(n + len(self.outputs)) // LANES) * LANES
+        result, places = np.empty((samples, width)), NO_PLACES
         if run.points is not None:
             inputs, places = run.points.inputs, run.points.places
-            whole = np.empty((samples, 2 * len(self.coordinates)))
-            scratch = np.empty((len(states), size))
-        arguments = states, inputs, places, observer, scratch, whole, outputs, first
-        path_loops()["delivered"](*arguments)
+        scratch = np.empty((len(states) + 1) * width)
+        path_loops()["delivered"](states, inputs, places, observer, scratch, result, first)
         found = first.tolist()
+        whole, outputs = result[:, :n], result[:, n : n + len(self.outputs)]
         if run.failure:
             # From the failure on there are no numbers, which says nothing of limits.
             reached = int(np.isfinite(whole).all(axis=1).sum())

@@ -6,6 +6,8 @@ at once.  Where one does not converge as it must on the branch, see `newton_loop
 up: the caller solves sample by sample.
 """
 
+from typing import NamedTuple
+
 from vehiclemor.codegen.loop_types import (
     Int,
     IntVector,
@@ -35,12 +37,18 @@ from vehiclemor.simulation.newton_loops import (
     within,
 )
 
-# Kernels by place: Newton steps, outputs.
+# Places of the kernels: Newton steps, outputs.
 STEP, RESULTS = range(2)
 # Steps from the design position to the first samples.  They grow evenly, so that each begins at an
 # extrapolation that is as good as between samples.
 WAY = 16
 INLINED = ("corrected", "extrapolated")
+
+
+class LaneKernels(NamedTuple):
+    """Addresses of kernels in vector lanes, by place, to be made ready once."""
+
+    kernels: IntVector
 
 
 def corrected(q, u, mechanism, kernels, iteration, work):

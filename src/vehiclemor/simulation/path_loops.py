@@ -2,7 +2,15 @@
 
 import math
 
-from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_kernel, call_lanes
+from vehiclemor.codegen.loop_types import (
+    Int,
+    IntVector,
+    Matrix,
+    Vector,
+    call_kernel,
+    call_lanes,
+    matrix,
+)
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.integrators.structures import (
     DERIVATIVE,
@@ -38,57 +46,73 @@ def delivered(
     inputs: Matrix,
     places: Matrix,
     observer: Observer,
-    scratch: Matrix,
-    all_states: Matrix,
-    outputs: Matrix,
+    scratch: Vector,
+    result: Matrix,
     first: IntVector,
 ) -> Int:
-    """States and outputs at the samples of a run from its states (points, 2 n or more).
+    """States and outputs side by side at the samples of a run, from its states at points.
 
-    Where there are no places the points are the samples, and the states stay where they are.
-    The first sample at which each limited output is outside of its range is found too, if any.
+    Where there are no places the points are the samples.  The first sample at which each limited
+    output is outside of its range is found too, if any.
+
+    Parameters
+    ----------
+    states
+        At the points (points, n or more); only the first n are read.
+    places
+        See `structures.Output`.
+    scratch
+        As long as a result for the points.
+    result
+        Rows of n states, of the outputs and of what fills up to a whole number of vectors.
     """
-    if len(places):
-        lane_path(states, inputs, observer.kernel, observer.constants, scratch)
-    elif len(states) < LANES:
-        kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
-    else:
+    n, width, samples = observer.states, result.shape[1], len(result)
+    points = matrix(scratch, 0, len(states), width)
+    for row in range(len(states)):
+        for i in range(n):
+            points[row, i] = states[row, i]
+        # What happens to stand there may take a hundred times as long to add.
+        for i in range(n, width):
+            points[row, i] = 0.0
+    outputs = matrix(scratch, n, len(states), width)
+    if len(states) >= LANES:
         lane_path(states, inputs, observer.kernel, observer.constants, outputs)
+    else:
+        kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
     for k in range(len(first)):
-        first[k] = len(outputs)
-    for sample in range(len(outputs)):
-        if len(places):
-            row, z = int(places[sample, 0]), places[sample, 1]
-            read_point(states, row, z, all_states[sample])
-            read_point(scratch, row, z, outputs[sample])
+        first[k] = samples
+    for sample in range(samples):
+        read_point(points, sample, places, result[sample])
         for k in range(len(first)):
-            value = outputs[sample, observer.limited[k]]
+            value = result[sample, n + observer.limited[k]]
             # What is no number lies outside too.
             inside = observer.ranges[k, 0] <= value <= observer.ranges[k, 1]
-            if not inside and first[k] == len(outputs):
+            if not inside and first[k] == samples:
                 first[k] = sample
     return 0
 
 
-def read_point(points, row, z, into):
-    """What is known at the points of a run, at the part z of a step, or at a row itself."""
+def read_point(points, sample, places, into):
+    """What is known at the points of a run, at a sample."""
+    row, z = sample, -1.0
+    if len(places):
+        row, z = int(places[sample, 0]), places[sample, 1]
     if row < 0:
         for i in range(len(into)):
             into[i] = math.nan
-        return
-    if z < 0.0:
+    elif z < 0.0:
         for i in range(len(into)):
             into[i] = points[row, i]
-        return
-    # Lagrange's polynomials at the points.
-    a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
-    outer = (NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0)
-    inner = (NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0)
-    p, q, r, s = b * c * d / outer, a * c * d / inner, -a * b * d / inner, -a * b * c / outer
-    for i in range(len(into)):
-        into[i] = (p * points[row, i] + q * points[row + 1, i]) + (
-            r * points[row + 2, i] + s * points[row + 3, i]
-        )
+    else:
+        # Lagrange's polynomials at the points.
+        a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
+        outer = (NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0)
+        inner = (NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0)
+        p, q, r, s = b * c * d / outer, a * c * d / inner, -a * b * d / inner, -a * b * c / outer
+        for i in range(len(into)):
+            into[i] = (p * points[row, i] + q * points[row + 1, i]) + (
+                r * points[row + 2, i] + s * points[row + 3, i]
+            )
 
 
 def jacobian_at(

@@ -435,6 +435,5 @@ class System(ShortRepr):
         )
         floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
         loop = catalogue.time_loop(chosen, formulation, steps)
-        whole = solver.times is None and not solver.begin
-        cubic = whole and "cubic" in chosen.modules
+        cubic = solver.times is None and not solver.begin and "cubic" in chosen.modules
         return Plan(loop, arguments, (n, floats, dim + 8), windows, cubic)

@@ -68,3 +68,16 @@ def test_independent_calls_share_one_batch():
 
 
 # Arctangent
+
+
+def test_the_same_quantity_of_all_wheels_stands_side_by_side():
+    a, b, slips, angles, assignments = *sp.symbols("a b"), [], [], []
+    for wheel in range(4):
+        x, slip, angle = (sp.Symbol(f"{name}{wheel}") for name in ("x", "slip", "angle"))
+        # What common subexpressions leave behind: signs and orders of operands differ.
+        assignments += [(slip, a - x if wheel % 2 else a + x), (angle, b / (x * x + 1))]
+        slips, angles = [*slips, slip], [*angles, angle]
+    results = tuple(sp.atan(s) * sp.atan(t) for s, t in zip(slips, angles, strict=True))
+    steps = schedule(Function(tuple(assignments), results, (4,)))
+    (batch,) = [step for step in steps if isinstance(step, Batch)]
+    assert {batch.arguments[:4], batch.arguments[4:]} == {tuple(slips), tuple(angles)}

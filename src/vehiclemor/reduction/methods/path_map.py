@@ -47,8 +47,8 @@ SAME = 1e-15
 class PathMapSettings(Settings):
     """Settings for a kinematic model."""
 
-    degree: int = Field(4, ge=1, description="total degree of the polynomials in a cell")
-    cells: int = Field(8, ge=1, description="equal cells along each input that moves in training")
+    degree: int = Field(3, ge=1, description="total degree of the polynomials in a cell")
+    cells: int = Field(16, ge=1, description="equal cells along each input that moves in training")
     outside: Literal["extrapolate", "stop"] = Field(
         "extrapolate",
         description="extrapolate: a run that leaves the inputs of training goes on, untrusted; "
@@ -64,6 +64,8 @@ class PathMapModel(ShortRepr):
     ----------
     ranges
         Lowest and highest value (inputs, 2) of each input in training, with the margins.
+    moving
+        Numbers of the inputs that move.
     degree
         Total degree of the polynomials.
     cells
@@ -76,6 +78,7 @@ class PathMapModel(ShortRepr):
 
     model: AlgebraicModel
     ranges: np.ndarray
+    moving: tuple[int, ...]
     degree: int
     cells: Cells
     columns: tuple[int, ...]
@@ -85,11 +88,11 @@ class PathMapModel(ShortRepr):
     @property
     def effective_rank(self) -> int:
         """Number of inputs that move."""
-        return len(self.cells.moving)
+        return len(self.moving)
 
     @cached_property
     def _loop(self) -> Loop:
-        return map_loop(len(self.ranges), self.effective_rank, self.degree, self.columns)
+        return map_loop(len(self.ranges), self.moving, self.degree, self.columns)
 
     @cached_property
     def _ready(self) -> Ready:
@@ -101,7 +104,7 @@ class PathMapModel(ShortRepr):
         model.start(start)
         times, inputs, given = model.sampled(maneuver)
         size = samples * len(self.columns)
-        space = np.empty(size + TOLD + self.effective_rank)
+        space = np.empty(size + TOLD + inputs.shape[1])
         _, seconds = timed(self._loop.prepared(given, self._ready, space))
         table = space[:size].reshape(samples, -1)
         indicator, left = space[size : size + TOLD].tolist()
@@ -177,8 +180,8 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     if not len(moving):
         raise InputError("path_map: no input moves in training")
     places = np.arange(settings.cells)[:, None] + 0.5 + 0.5 * _nodes(settings.degree)
-    rates = settings.cells / widths[moving]
-    grid = [low + places.ravel() / rate for low, rate in zip(ranges[moving, 0], rates, strict=True)]
+    shares = places.ravel() / settings.cells
+    grid = [low + shares * (high - low) for low, high in ranges[moving]]
     inputs = np.tile(centres, (len(grid[0]) ** len(grid), 1))
     inputs[:, moving] = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, len(grid))
     try:
@@ -186,19 +189,20 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     except UnreachableError:
         box = _named(model, ranges)
         raise InputError(f"path_map: what training spans is not all in reach: {box}") from None
+    numbers = np.where(widths > RESTING, settings.cells, 1)
     values, columns = _distinct(np.hstack([solved.coordinates, solved.outputs]))
     cells = Cells(
         centres,
-        1.0 / (0.5 * widths + RESTING),
-        moving,
-        np.full(len(moving), settings.cells),
-        loop_array(ranges[moving, 0]),
-        rates,
+        1.0 / np.maximum(0.5 * widths, RESTING),
+        0.5 * numbers,
+        numbers - 1.0,
+        numbers,
         _coefficients(values, len(moving), settings),
     )
     cost = offline_cost(began, model, [solved])
     stops = settings.outside == "stop"
-    return PathMapModel(model, ranges, settings.degree, cells, columns, stops, cost)
+    varied = tuple(moving.tolist())
+    return PathMapModel(model, ranges, varied, settings.degree, cells, columns, stops, cost)
 
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:

@@ -10,9 +10,10 @@ which lie on it, and the lag of the fast modes is learnt with them:
 
 Lambda and b are exact at straight running.  N is odd in the lateral quantities (the vehicle is its
 own mirror image): cubic, and in the axles' slip angles also quintic, terms; the speed and what is
-symmetric have even terms.  What whole runs hardly need is eliminated again.  The heading is fitted
-twice: as a rate, then as its integral along reduced runs, since a heading that is off is a lateral
-position that is off.
+symmetric have even terms.  Heave and pitch, as slow as the lateral modes, are coordinates too:
+corners and a drop move them, and they move the wheel loads.  The coefficients are improved on whole
+runs, since a heading that is off is a lateral position that is off; what whole runs hardly need is
+eliminated.
 """
 
 import time
@@ -30,6 +31,7 @@ from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
+from vehiclemor.reduction.vehicle.lifting_terms import fitted_lifting
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
@@ -44,10 +46,11 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     targets,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.trajectory import Trajectory
 
-# Accuracy of the reduced runs on which the heading is fitted.
+# Accuracy of the reduced runs that are compared with training runs.
 REFIT_TOLERANCE = 1e-6
+# Heading (rad) below which its error counts absolutely.
+HEADING = 0.03
 # The part of the terms that is left by each round of elimination, and for how many of them all
 # training runs are looked at; with more terms it is fewer runs, but so many at least.
 SHRINKING, WANTED, FEW = 0.4, 60, 20
@@ -75,6 +78,9 @@ class SlowManifoldSettings(OnlineSettings):
         description="nonlinear terms that the equations keep, those that whole runs need most; "
         "0: all; only with sweeps",
     )
+    lifting: int = Field(
+        8, ge=0, description="nonlinear terms of the full states, those that explain most; 0: all"
+    )
     hull: float = Field(
         1.1,
         gt=0.0,
@@ -101,7 +107,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     table = feature_table(
         shape, modes, samples, settings.nonlinearity, settings.hull, settings.trusted
     )
-    reduced = _fitted_on_rates(shape, modes, table, samples, settings.ridge)
+    reduced = _fitted_on_rates(shape, modes, table, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
@@ -115,10 +121,14 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
 
 
 def _fitted_on_rates(
-    shape: VehicleShape, modes: SlowModes, table: FeatureTable, samples: ShapeSamples, ridge: float
+    shape: VehicleShape,
+    modes: SlowModes,
+    table: FeatureTable,
+    samples: ShapeSamples,
+    settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
     """Equations fitted on the rates of the training runs, exact at straight running."""
-    u, motion = samples.inputs, samples.motion
+    u, motion, ridge = samples.inputs, samples.motion, settings.ridge
     z, speed = modes.coordinates(samples.deviations, u)
     k, n, inputs = modes.lateral, len(modes.rates), u.shape[1]
     odd, even = table.odd, table.even
@@ -142,20 +152,24 @@ def _fitted_on_rates(
     c[even_nonlinear, n + 2] = ridge_fit(even_columns, ahead - z[:, k:] @ forward, ridge)
     c[odd, n + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
     c[odd, n + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
+    lifting, lifted = fitted_lifting(
+        shape, table, columns, samples.deviations, ridge, settings.lifting
+    )
     return ReducedVehicle(
         shape.model,
         shape,
         table.features,
         table.parameters,
         c,
-        ridge_fit(columns, samples.deviations, ridge),
+        lifting,
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
-        np.concatenate([3.0 * ranges, [10.0, 1.0, 10.0, 10.0]]),
+        np.concatenate([3.0 * ranges, [10.0, HEADING, 10.0, 10.0]]),
         Offline(),
         "dopri5",
         REFIT_TOLERANCE,
         modes.symmetric,
+        lifted,
     )
 
 

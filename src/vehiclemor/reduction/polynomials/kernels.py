@@ -73,17 +73,19 @@ def _nested(array: str, first: int, row: int, rank: int, degree: int) -> str:
     return part(())
 
 
-def map_kernel(variables: int, degree: int, columns: tuple[int, ...]) -> str:
+def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> str:
     """Text of the kernel `polynomials`: each monomial is one of a degree less times a variable.
 
     Parameters
     ----------
+    moving
+        Numbers of the inputs that are variables.
     columns
         Column of the coefficients for each result; several may share one.
     """
-    every = monomials(variables, degree)
+    every = monomials(len(moving), degree)
     places = {term: place for place, term in enumerate(every)}
-    lines = [f"x{j} = _x[{j}]" for j in range(variables)]
+    lines = [f"x{j} = _x[{i}]" for j, i in enumerate(moving)]
     lines.append("m0 = 1.0")
     lines += [f"m{places[term]} = m{places[term[:-1]]} * x{term[-1]}" for term in every[1:]]
     values = ", ".join(f"v{i}" for i in range(max(columns) + 1))
@@ -94,11 +96,11 @@ def map_kernel(variables: int, degree: int, columns: tuple[int, ...]) -> str:
 
 
 @cache
-def map_loop(inputs: int, variables: int, degree: int, columns: tuple[int, ...]) -> Loop:
-    """Compiled loop of polynomials of that total degree in so many of the inputs."""
-    sizes = {"INPUTS": inputs, "MOVING": variables, "QUANTITIES": len(columns)}
+def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
+    """Compiled loop of polynomials of that total degree in those of the inputs that move."""
+    sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
     modules = (*NEWTON, "reduction.polynomials.map_loops")
-    kernels = {"polynomials": map_kernel(variables, degree, columns)}
+    kernels = {"polynomials": map_kernel(moving, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
 from vehiclemor.simulation.newton_loops import CONVERGED
 
-# Sizes that the compiler knows: inputs, those of them that move, quantities.
-INPUTS, MOVING, QUANTITIES = 0, 0, 0
+# Sizes that the compiler knows.
+INPUTS, QUANTITIES = 0, 0
 # Places of what a run tells: the largest indicator, and the first sample at which it is above 1, or
 # the number of samples; how much that is.
 INDICATOR, LEFT, TOLD = range(3)
@@ -21,11 +21,11 @@ class Cells(NamedTuple):
     Attributes
     ----------
     centres, scales
-        The indicator of inputs is the largest |input - centre| * scale (INPUTS,).
-    moving, numbers
-        Which inputs move (MOVING,), and the number of cells along each.
-    lowest, rates
-        Of these: the lowest value, and cells by unit (MOVING,).
+        The box is where all |input - centre| * scale <= 1 (INPUTS,); the largest is the indicator.
+    halves, tops
+        Half of the number of cells along each input, and one less than that number (INPUTS,).
+    numbers
+        The number itself (INPUTS,), 1 for an input that rests.
     coefficients
         Of each monomial for each quantity, padded (cells, monomials, quantities); the cells of the
         last input stand together.
@@ -33,15 +33,14 @@ class Cells(NamedTuple):
 
     centres: Vector
     scales: Vector
-    moving: IntVector
+    halves: Vector
+    tops: Vector
     numbers: IntVector
-    lowest: Vector
-    rates: Vector
     coefficients: Cube
 
 
 def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:
-    """Quantities at a place x (MOVING,) of a cell, from -1 to 1: a kernel inside of the loop."""
+    """Quantities at a place x (INPUTS,) of a cell, from -1 to 1: a kernel inside of the loop."""
 
 
 def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
@@ -53,26 +52,25 @@ def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
         At the samples (samples, INPUTS).
     space
         Quantities of all samples, then what the run tells, by place, see above, then scratch space
-        (MOVING,): one array is sooner handed over than three.
+        (INPUTS,): one array is sooner handed over than three.
     """
-    centres, scales, moving, numbers, lowest, rates, coefficients = cells
+    centres, scales, halves, tops, numbers, coefficients = cells
     samples = inputs.shape[0]
     table, end = matrix(space, 0, samples, QUANTITIES), samples * QUANTITIES
-    told, x = vector(space, end, TOLD), vector(space, end + TOLD, MOVING)
+    told, x = vector(space, end, TOLD), vector(space, end + TOLD, INPUTS)
     largest, left = 0.0, samples
     for sample in range(samples):
-        indicator = 0.0
+        indicator, cell = 0.0, 0
         for i in range(INPUTS):
-            indicator = max(indicator, abs(inputs[sample, i] - centres[i]) * scales[i])
+            place = (inputs[sample, i] - centres[i]) * scales[i]
+            indicator = max(indicator, abs(place))
+            place = (place + 1.0) * halves[i]
+            number = int(min(max(place, 0.0), tops[i]))
+            x[i] = 2.0 * (place - number) - 1.0
+            cell = cell * numbers[i] + number
         largest = max(largest, indicator)
         if indicator > 1.0 and sample < left:
             left = sample
-        cell = 0
-        for k in range(MOVING):
-            place = (inputs[sample, moving[k]] - lowest[k]) * rates[k]
-            number = int(min(max(place, 0.0), numbers[k] - 1.0))
-            x[k] = 2.0 * (place - number) - 1.0
-            cell = cell * numbers[k] + number
         polynomials(x, coefficients[cell], table[sample])
     told[INDICATOR], told[LEFT] = largest, left
     return CONVERGED

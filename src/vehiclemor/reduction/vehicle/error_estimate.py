@@ -96,7 +96,7 @@ class Propagator:
         pushed = np.zeros_like(modal)
         pushed[1:] = step * ((first - second) * modal[:-1] + second * modal[1:])
         found = [lfilter([1.0], [1.0, -g], p) for g, p in zip(growth, pushed.T, strict=True)]
-        return (self.right @ np.array(found)).T.real
+        return np.real(self.right @ np.array(found)).T
 
 
 @lru_cache(maxsize=16)

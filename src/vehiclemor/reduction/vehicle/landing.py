@@ -39,36 +39,24 @@ def after_landing(transient: Transient, shape: VehicleShape, run: Trajectory) ->
 
 def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]) -> ReducedVehicle:
     """The reduced vehicle with the transients and coordinates of runs before they are steered."""
-    from scipy.linalg import expm
+    from scipy.linalg import block_diag, expm
 
     transient, shape, k = reduced.transient, reduced.shape, modes.lateral
     slow = np.abs(transient.rates.real) * LANDED < DECAYED
+    # What is seen of a deviation, and how it moves; the speed, which is last, does not.
+    seeing = np.vstack([transient.left[slow], reduced.encoding[k:]])
+    rates = block_diag(np.diag(transient.rates[slow]), modes.rates[k:, k:], 0.0)
     starts, changes = [], []
     for run in runs:
         steered = run.time[run.inputs.any(axis=1)]
-        seen = (run.time >= LANDED) & (run.time < np.append(steered, LONGEST)[0])
-        if not seen.any():
+        still = (run.time >= LANDED) & (run.time < np.append(steered, LONGEST)[0])
+        if not still.any():
             continue
-        deviations, start = (
-            shape.of(run.states[seen]) - shape.reference,
-            shape.of(run.states[:1])[0],
-        )
-        start = start - shape.reference
-        decays = np.exp(np.outer(run.time[seen], transient.rates[slow]))
-        found = (decays.conj() * (deviations @ transient.left[slow].T)).sum(axis=0)
-        found = found / (np.abs(decays) ** 2).sum(axis=0)
-        moving = [expm(modes.rates[k:, k:] * time) for time in run.time[seen]]
-        own = deviations @ reduced.encoding[k:].T
-        parts = [np.linalg.lstsq(np.vstack(moving), own[:, :-1].ravel())[0], [own[:, -1].mean()]]
+        start = shape.of(run.states[:1])[0] - shape.reference
+        seen = (shape.of(run.states[still]) - shape.reference) @ seeing.T
+        moves = expm(rates * run.time[still][:, None, None]).reshape(-1, len(rates))
         starts.append(start)
-        changes.append(
-            np.concatenate(
-                [
-                    found - transient.left[slow] @ start,
-                    np.concatenate(parts) - reduced.encoding[k:] @ start,
-                ]
-            )
-        )
+        changes.append(np.linalg.lstsq(moves, seen.ravel())[0] - seeing @ start)
     if not starts:
         return reduced
     change = (np.linalg.pinv(np.array(starts), rcond=RANK) @ np.array(changes)).T

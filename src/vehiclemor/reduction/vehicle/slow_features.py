@@ -18,6 +18,8 @@ from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
 MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of roll", "steering")
+# Part of heave and pitch at the start that samples after the landing still show.
+AFTER_LANDING = 0.3
 
 
 @dataclass(frozen=True)
@@ -133,8 +135,10 @@ def feature_table(
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
     edge = f"{hull / trusted!r} * raw"
-    watched = ((edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS)))
-    features = Features(n + 1, inputs, tuple(lines), (*odd, *even), groups, modes.blocks, watched)
+    watched = [(edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS))]
+    watched += [(f"{AFTER_LANDING!r} * {e}", "heave and pitch") for e in own[k:]]
+    terms = (*odd, *even)
+    features = Features(n + 1, inputs, tuple(lines), terms, groups, modes.blocks, tuple(watched))
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
 

@@ -193,7 +193,8 @@ def w_step(frame: Frame, inputs: int) -> str:
     """
     tableau, step = tableaus.ros34pw2(), _Step(frame, ("y", "f"), ("h",))
     n, stages = step.n, ("s0", "s1", "s2", "s3")
-    step.at("new"), step.at("error")
+    for name in ("new", "error"):
+        step.at(name)
     step.lines.append(f"scale = {ros34pw2.GAMMA!r} * h")
 
     def weighted(row: int, count: int) -> list[tuple[object, str]]:

@@ -213,12 +213,15 @@ class Observer(NamedTuple):
         Of the kernel.
     limited, ranges
         Numbers (limits,) of outputs, and their smallest and largest values (limits, 2).
+    states
+        Number of states.
     """
 
     kernel: IntVector
     constants: Vector
     limited: IntVector
     ranges: Matrix
+    states: Int
 
 
 class Problem(NamedTuple):
