@@ -158,7 +158,7 @@ def tire_text(
                 terms, table, first = parities[parity]
                 chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
                 weights = ridge_fit(table[:, chosen], target, RIDGE)
-                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights)
+                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights.tolist())
         parameters = {name: float(model.parameters[name]) for name in FIALA}
         tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
     return text
