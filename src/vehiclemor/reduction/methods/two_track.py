@@ -120,6 +120,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         free = [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
         reduced = improved(reduced, goals, free, settings.sweeps, power=1.0)
         reduced = improved(reduced, goals, free, settings.sweeps)
+        reduced = lifted_anew(reduced, training, samples)
     return replace(
         reduced,
         offline=offline_cost(began, model, runs, len(samples.inputs)),
@@ -157,7 +158,7 @@ def tire_text(
                 terms, table, first = parities[parity]
                 chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
                 weights = ridge_fit(table[:, chosen], target, RIDGE)
-                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights)
+                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights.tolist())
         parameters = {name: float(model.parameters[name]) for name in FIALA}
         tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
     return text
@@ -195,11 +196,6 @@ def fitted_on_rates(
     terms = [*odd, "1.0", *even]
     seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
     lifted = chosen(terms, candidates, seen, settings.lifted_terms)
-    lifting_columns, other_side = columns_of(lifted), of_shape.deviations @ mirror(shape).T
-    sides = [
-        ridge_fit(part, 0.5 * (of_shape.deviations + sign * other_side), RIDGE)
-        for part, sign in zip(np.split(lifting_columns, [len(odd)], axis=1), (-1, 1), strict=True)
-    ]
     columns = columns_of(terms)
     k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
     lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
@@ -213,7 +209,7 @@ def fitted_on_rates(
         text.features(inputs, terms, len(odd)),
         parameters,
         c,
-        np.vstack(sides),
+        both_sides(shape, columns_of(lifted), len(odd), of_shape.deviations),
         encoding,
         np.zeros((tf.STATES, inputs)),
         np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
@@ -223,6 +219,34 @@ def fitted_on_rates(
         modes.symmetric,
         text.features(inputs, lifted),
     )
+
+
+def both_sides(
+    shape: VehicleShape, columns: np.ndarray, odd: int, deviations: np.ndarray
+) -> np.ndarray:
+    """Coefficients (terms, n) of the shape: of its odd part by odd terms, which are the first."""
+    image = deviations @ mirror(shape).T
+    parts = np.split(columns, [odd], axis=1)
+    return np.vstack(
+        [
+            ridge_fit(part, 0.5 * (deviations + sign * image), RIDGE)
+            for part, sign in zip(parts, (-1, 1), strict=True)
+        ]
+    )
+
+
+def lifted_anew(reduced: ReducedVehicle, training: Training, samples: Samples) -> ReducedVehicle:
+    """The lifting fitted to where the reduced runs are, whose speed has become their own."""
+    paths = [reduced.path(run.maneuver, run.start) for run in training]
+    kept = [path for path in paths if path is not None]
+    if len(kept) < len(paths):
+        return reduced
+    assert reduced.lifted_features is not None
+    z = np.ascontiguousarray(np.concatenate(kept)[:, : tf.STATES])
+    columns = feature_columns(reduced.lifted_features, z, samples.inputs, reduced.parameters)
+    odd = len(reduced.features.groups[0][0])
+    lifting = both_sides(reduced.shape, columns, odd, samples.shape.deviations)
+    return replace(reduced, lifting=lifting)
 
 
 METHOD = Method(

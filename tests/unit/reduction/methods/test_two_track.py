@@ -8,10 +8,12 @@ import pytest
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.methods import two_track
+from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 LANE_CHANGE = component("maneuver", "rack_lane_change")
@@ -20,7 +22,9 @@ RUNS = ((1.0, 1.4, 20.0), (0.8, -0.8, 18.5), (1.6, 1.2, 21.5), (0.8, 1.1, 22.0),
 
 @cache
 def vehicle():
-    return build("high_fidelity_vehicle")
+    model = build("high_fidelity_vehicle")
+    assert isinstance(model, DynamicModel)
+    return model
 
 
 def scenario(frequency, amplitude, speed, start="equilibrium"):
@@ -30,7 +34,8 @@ def scenario(frequency, amplitude, speed, start="equilibrium"):
 @cache
 def reduced():
     training = tuple(training_run(vehicle(), scenario(*run)) for run in RUNS)
-    settings = two_track.TwoTrackSettings(terms=8, even_terms=12, wheel_terms=6, sweeps=4)
+    given = {"terms": 8, "even_terms": 12, "wheel_terms": 6, "sweeps": 4}
+    settings = validated(two_track.METHOD, "dae", given)
     return two_track.fit(vehicle(), training, settings)
 
 
