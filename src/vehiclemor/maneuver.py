@@ -1,7 +1,9 @@
 """Maneuvers: input time histories that studies scale in frequency and amplitude; wheel travel."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -79,6 +81,18 @@ class Maneuver(ShortRepr):
 
     def __str__(self) -> str:
         return f"maneuver {self.name!r}"
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        # Every cache of a run asks for it.
+        return hash(tuple(getattr(self, f.name) for f in fields(self)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Another process has other hashes of text.
+        return {name: value for name, value in self.__dict__.items() if name != "_hash"}
 
     @property
     def times(self) -> np.ndarray:

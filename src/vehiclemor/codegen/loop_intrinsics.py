@@ -11,6 +11,8 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 from vehiclemor.codegen.llvm_kernels import DOUBLE, KernelText, Rows, emit
+from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.weighted_sums import FLAGS, spread
 
 WORD = ir.IntType(64)
 
@@ -111,6 +113,35 @@ def call_lanes(
 
     arguments = kernels, place, path, inputs, constants, result, first
     return types.void(*arguments), generate
+
+
+@intrinsic
+def mixed_rows(typing_context: Any, rows: Any, weights: Any, result: Any) -> Any:
+    """See `loop_types.mixed_rows`; in vectors as long as a cache line."""
+    del typing_context
+    _require_plain(rows, result)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.VectorType(DOUBLE, LANES)
+        result = context.make_array(sig.args[2])(context, builder, args[2])
+        (width,) = cgutils.unpack_tuple(builder, result.shape)
+        weights = [spread(builder, w, LANES) for w in cgutils.unpack_tuple(builder, args[1])]
+        steps = WORD(0), width, WORD(LANES)
+        with cgutils.for_range_slice(builder, *steps) as (column, _):
+            place, terms = column, []
+            for weight in weights:
+                pointer = builder.gep(_data(context, builder, sig, args, 0), [place])
+                row = builder.load(builder.bitcast(pointer, kind.as_pointer()), align=8)
+                terms.append(builder.fmul(weight, row, flags=FLAGS))
+                place = builder.add(place, width)
+            while len(terms) > 1:
+                first, second, *terms = terms
+                terms.append(builder.fadd(first, second, flags=FLAGS))
+            pointer = builder.bitcast(builder.gep(result.data, [column]), kind.as_pointer())
+            builder.store(terms[0], pointer, align=8)
+        return context.get_dummy_value()
+
+    return types.void(rows, weights, result), generate
 
 
 def inlined_kernel(text: str) -> Any:

@@ -51,6 +51,36 @@ def ready(bundle: Any) -> Ready:
     return Ready(bundle, _words(type(bundle).__name__, _kinds(type(bundle)), bundle))
 
 
+class Prepared:
+    """A loop with its arguments in words, of which some may be replaced from run to run.
+
+    Attributes
+    ----------
+    words
+        See `compiler.compiled_loops`.
+    """
+
+    __slots__ = ("_entry", "_kept", "_places", "words")
+
+    def __init__(
+        self,
+        entry: Callable[[Any], int],
+        packed: bytes,
+        places: Mapping[str, int],
+        arguments: tuple[Any, ...],
+    ) -> None:
+        self._entry, self._places, self._kept = entry, places, arguments
+        self.words = (ctypes.c_int64 * (len(packed) // 8)).from_buffer_copy(packed)
+
+    def __call__(self) -> int:
+        """Run the loop; the lock of the interpreter is released meanwhile."""
+        return self._entry(self.words)
+
+    def address(self, name: str) -> int:
+        """Number of the word that is the address of an array; its shape follows."""
+        return self._places[name]
+
+
 class Loop:
     """A compiled loop as a function of arrays, numbers and named tuples of these.
 
@@ -68,27 +98,37 @@ class Loop:
         self.name = name
         self._kinds = [_kinds(kind, argument) for argument, kind in declared.items()]
         self._entry, self._code = _ENTRY(code.address(name)), code
+        self._places, place = {}, 0
+        for part, _, dimensions in (kind for kinds in self._kinds for kind in kinds):
+            self._places[part] = place
+            place += dimensions + 1
 
     def __call__(self, *arguments: Any) -> int:
         """Run the loop; the lock of the interpreter is released meanwhile."""
         return self.prepared(*arguments)()
 
-    def prepared(self, *arguments: Any) -> Callable[[], int]:
-        """The loop with its arguments; the caller keeps the arrays alive.
+    def prepared(self, *arguments: Any) -> Prepared:
+        """The loop with its arguments, which it keeps alive.
 
         Raises
         ------
         TypeError
             If an array has another type than the loop was compiled for.
         """
-        name, entry = self.name, self._entry
+        name = self.name
         packed = b"".join(
             [
                 value.words if type(value) is Ready else _words(name, kinds, value)
                 for kinds, value in zip(self._kinds, arguments, strict=True)
             ]
         )
-        return lambda: entry(packed)
+        return Prepared(self._entry, packed, self._places, arguments)
+
+
+def address_of_array(array: np.ndarray) -> int:
+    """Where a C-contiguous array that can be written and holds something begins."""
+    # In a third of the time of `array.ctypes.data`.
+    return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
 
 
 def _words(loop: str, kinds: Sequence[Kind], value: Any) -> bytes:
@@ -113,11 +153,7 @@ def _part(loop: str, kind: Kind, part: Any) -> bytes:
         raise TypeError(
             f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {found}"
         )
-    if flags.writeable and part.size:
-        # In a third of the time.
-        address = ctypes.addressof(ctypes.c_char.from_buffer(part))  # type: ignore[arg-type]
-    else:
-        address = part.ctypes.data
+    address = address_of_array(part) if flags.writeable and part.size else part.ctypes.data
     return ARRAYS[dimensions].pack(address, *part.shape)
 
 

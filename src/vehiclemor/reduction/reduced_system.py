@@ -14,7 +14,8 @@ from vehiclemor.simulation.checks import check_inputs
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.simulation.system import Run, Solver, System
+from vehiclemor.simulation.run_plans import Run, Solver
+from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Encoded starts that are kept.
@@ -30,7 +31,7 @@ def _nothing_told(_: Run, __: np.ndarray) -> None:
 
 
 def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
-    return run.path
+    return run.whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ class ReducedSystem(ShortRepr):
         (full state (2 n,), inputs) -> state (dim,) of the system; the same by default.
     lift
         (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
-        default the run's own.
+        default the run's own.  It keeps nothing of the run.
     project
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     judge
@@ -93,11 +94,12 @@ class ReducedSystem(ShortRepr):
         if not isinstance(start, str):
             return self.encode(self.model.start(start), inputs)
         key = start, inputs.tobytes()
-        if key not in self._starts:
+        found = self._starts.get(key)
+        if found is None:
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            self._starts[key] = self.encode(self.model.start(start), inputs)
-        return self._starts[key]
+            found = self._starts[key] = self.encode(self.model.start(start), inputs)
+        return found
 
     @cached_property
     def _starts(self) -> dict[tuple[str, bytes], np.ndarray]:
@@ -108,8 +110,9 @@ class ReducedSystem(ShortRepr):
         run = self.run(maneuver, start, begin=begin)
         inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
-        found = self.model.recorded(maneuver, run, inputs, states)
-        return found.judged(self.judge(run, inputs))
+        found = self.model.recorded(maneuver, run, inputs, states, self.judge(run, inputs))
+        run.give_back()
+        return found
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Projection of full states (samples, 2 n), if there is a subspace."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
@@ -27,12 +27,33 @@ from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.simulation.system import Run, Solver, System
-from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.run_plans import Run, Solver
+from vehiclemor.simulation.system import System
+from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory, Trust
 
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
-NO_PLACES = np.empty((0, 2))
+
+
+class Delivery(NamedTuple):
+    """The loop that delivers a run, packed once for all runs in the same space.
+
+    Attributes
+    ----------
+    states, inputs
+        Where the run is recorded.
+    first
+        Where the loop writes when each limited output is first out of its limits.
+    rows, result
+        Words of the number of states and of the address of the result.
+    """
+
+    states: np.ndarray
+    inputs: np.ndarray
+    first: np.ndarray
+    call: Prepared
+    rows: int
+    result: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,10 +229,17 @@ class DynamicModel(Model):
         run = self.system.run(maneuver, state, windows, how, 0.0)
         whole = times is None and not begin
         inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
-        return self.recorded(maneuver, run, inputs, run.path)
+        found = self.recorded(maneuver, run, inputs, run.whole)
+        run.give_back()
+        return found
 
     def recorded(
-        self, maneuver: Maneuver, run: Run, inputs: np.ndarray, states: np.ndarray
+        self,
+        maneuver: Maneuver,
+        run: Run,
+        inputs: np.ndarray,
+        states: np.ndarray,
+        trust: Trust | None = None,
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to the model's states.
 
@@ -221,8 +249,10 @@ class DynamicModel(Model):
             At the output times (samples, inputs).
         states
             Where the run is recorded: 2 n columns, and what may follow them.
+        trust
+            What a reduced model tells of the run.
         """
-        return self._told(run, inputs, states, cut_short(maneuver))
+        return self._told(run, inputs, states, cut_short(maneuver), trust)
 
     def trajectory(
         self,
@@ -237,11 +267,18 @@ class DynamicModel(Model):
         run = Run(times, states, np.asarray(counts), seconds, failure)
         return self._told(run, loop_array(inputs), loop_array(states), "")
 
-    def _told(self, run: Run, inputs: np.ndarray, states: np.ndarray, remark: str) -> Trajectory:
+    def _told(
+        self,
+        run: Run,
+        inputs: np.ndarray,
+        states: np.ndarray,
+        remark: str,
+        trust: Trust | None = None,
+    ) -> Trajectory:
         """See `recorded`; a remark is added to what there is to remark."""
         states, outputs, first = self._delivered(run, inputs, states)
         (names, *_), times = self._limits, run.times
-        message, sample = run.failure, len(times)
+        message = run.failure
         if not message:
             of_outputs = first[: len(names)]
             message, sample = left_validity(self.definition, names, of_outputs, times, outputs)
@@ -250,18 +287,19 @@ class DynamicModel(Model):
                 states[sample:], outputs[sample:] = np.nan, np.nan
         lifted = lifted_wheels(self.definition.loads, first[len(names) :], times)
         n = len(self.coordinates)
-        return Trajectory(
-            times,
-            inputs,
-            states[:, :n],
-            states[:, n : 2 * n],
-            outputs,
-            dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
-            run.seconds,
-            "diverged" if message else "ok",
-            message,
-            "; ".join(text for text in (lifted, remark) if text),
+        found = Trajectory.of(
+            time=times,
+            inputs=inputs,
+            coordinates=states[:, :n],
+            speeds=states[:, n:],
+            outputs=outputs,
+            counts=dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            seconds=run.seconds,
+            status="diverged" if message else "ok",
+            message=message,
+            remark=f"{lifted}; {remark}" if lifted and remark else lifted or remark,
         )
+        return found if trust is None else found.judged(trust)
 
     @cached_property
     def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
@@ -286,20 +324,34 @@ class DynamicModel(Model):
 
         That is the number of all samples where it never is.
         """
-        samples, n = len(run.times), 2 * len(self.coordinates)
-        first = np.empty(len(self._limits[1]), dtype=np.int64)
-        observer = self._observer(LANES if len(states) >= LANES else 1)
+        samples, n, m = len(run.times), 2 * len(self.coordinates), len(self.outputs)
+        held = run.kept.get("delivered")
+        if held is None or held.states is not states or held.inputs is not inputs:
+            held = run.kept["delivered"] = self._delivery(run, inputs, states)
         # Rows of whole vectors.
-        width = -(-(n + len(self.outputs)) // LANES) * LANES
-        result, places = np.empty((samples, width)), NO_PLACES
-        if run.points is not None:
-            inputs, places = run.points.inputs, run.points.places
-        scratch = np.empty((len(states) + 1) * width)
-        path_loops()["delivered"](states, inputs, places, observer, scratch, result, first)
-        found = first.tolist()
-        whole, outputs = result[:, :n], result[:, n : n + len(self.outputs)]
+        width = -(-(n + m) // LANES) * LANES
+        result = np.empty((samples, width))
+        words = held.call.words
+        words[held.rows], words[held.result] = run.rows, address_of_array(result)
+        held.call()
+        found = held.first.tolist()
+        whole, outputs = result[:, :n], result[:, n : n + m]
         if run.failure:
             # From the failure on there are no numbers, which says nothing of limits.
             reached = int(np.isfinite(whole).all(axis=1).sum())
             found = [samples if sample == reached else sample for sample in found]
         return whole, outputs, found
+
+    def _delivery(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> Delivery:
+        """The loop of `_delivered`, to be given a result."""
+        n, samples = 2 * len(self.coordinates), len(run.times)
+        width = -(-(n + len(self.outputs)) // LANES) * LANES
+        at = run.recorded_at(inputs)[1]
+        observer = self._observer(LANES if run.rows >= LANES else 1)
+        first = np.empty(len(self._limits[1]), dtype=np.int64)
+        scratch = np.empty((len(states) + 1) * width)
+        loop, result = path_loops()["delivered"], np.empty((0, width))
+        call = loop.prepared(states, at, run.places, observer, scratch, result, first)
+        rows, into = call.address("states") + 1, call.address("result")
+        call.words[into + 1] = samples
+        return Delivery(states, inputs, first, call, rows, into)

@@ -10,15 +10,21 @@ from vehiclemor.codegen.loop_types import (
     call_kernel,
     call_lanes,
     matrix,
+    mixed_rows,
 )
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.integrators.structures import (
     DERIVATIVE,
     NODE_1,
     NODE_2,
+    NODES,
     Equations,
     Observer,
 )
+
+# Of Lagrange's polynomials at the outer and inner points: 1 over their products of differences.
+OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
+INNER = 1.0 / ((NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0))
 
 
 def kernel_path(
@@ -81,8 +87,19 @@ def delivered(
         kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
     for k in range(len(first)):
         first[k] = samples
+    known, within = -1, False
     for sample in range(samples):
-        read_point(points, sample, places, result[sample])
+        row, z = sample, -1.0
+        if len(places):
+            row, z = int(places[sample, 0]), places[sample, 1]
+        read_point(points, row, z, result[sample])
+        if z < 0.0:
+            within = False
+        elif row != known:
+            within = cubics_within(points, row, observer)
+        known = row
+        if within:
+            continue
         for k in range(len(first)):
             value = result[sample, n + observer.limited[k]]
             # What is no number lies outside too.
@@ -92,11 +109,8 @@ def delivered(
     return 0
 
 
-def read_point(points, sample, places, into):
-    """What is known at the points of a run, at a sample."""
-    row, z = sample, -1.0
-    if len(places):
-        row, z = int(places[sample, 0]), places[sample, 1]
+def read_point(points, row, z, into):
+    """What is known at a point of a run, or where the part z of a step has passed."""
     if row < 0:
         for i in range(len(into)):
             into[i] = math.nan
@@ -106,13 +120,27 @@ def read_point(points, sample, places, into):
     else:
         # Lagrange's polynomials at the points.
         a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
-        outer = (NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0)
-        inner = (NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0)
-        p, q, r, s = b * c * d / outer, a * c * d / inner, -a * b * d / inner, -a * b * c / outer
-        for i in range(len(into)):
-            into[i] = (p * points[row, i] + q * points[row + 1, i]) + (
-                r * points[row + 2, i] + s * points[row + 3, i]
-            )
+        p, q, r, s = b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
+        mixed_rows(points[row:], (p, q, r, s), into)
+
+
+def cubics_within(points, row, observer):
+    """Whether no cubic of a step can leave its limits: each is sampled only if it could.
+
+    Between its ends a cubic stays within 1.85 times what its Chebyshev points span.
+    """
+    for k in range(len(observer.limited)):
+        column = observer.states + observer.limited[k]
+        low, high = math.inf, -math.inf
+        for node in range(NODES):
+            value = points[row + node, column]
+            if not math.isfinite(value):
+                return False
+            low, high = min(low, value), max(high, value)
+        margin = 0.5 * (high - low)
+        if low - margin < observer.ranges[k, 0] or high + margin > observer.ranges[k, 1]:
+            return False
+    return True
 
 
 def jacobian_at(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.step_text import Frame
 from vehiclemor.simulation.integrators.structures import (
-    NODES,
     NOT_FINITE,
     SINGULAR,
     STEP_TOO_SMALL,
@@ -32,8 +30,14 @@ from vehiclemor.simulation.integrators.structures import (
 from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.run_plans import (
+    NO_POINTS,
+    Plan,
+    Run,
+    RunArguments,
+    Solver,
+)
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
@@ -45,8 +49,6 @@ REASONS = {
     SINGULAR: "the matrix of a linear system is singular",
     STEP_TOO_SMALL: "the step size has become too small",
 }
-# Of a run that is recorded at the samples: no inputs, points and places.
-NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
 # Kernels that a formulation calls; a fused step comes besides.
 CALLED = {
     "full": ("derivative",),
@@ -54,111 +56,6 @@ CALLED = {
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
 }
-
-
-class Points(NamedTuple):
-    """Points at which a run is recorded, see `structures.Output`.
-
-    Attributes
-    ----------
-    inputs, moments
-        Inputs (points, inputs) at the points, and their times (points,) in s.
-    places
-        How the samples follow from them (samples, 2).
-    """
-
-    inputs: np.ndarray
-    moments: np.ndarray
-    places: np.ndarray
-
-
-@dataclass(frozen=True)
-class Run:
-    """What a compiled run leaves behind.
-
-    Attributes
-    ----------
-    times
-        Output times (samples,) in s.
-    path
-        States (samples, dim) at these times, NaN from a failure on; or at `points`.
-    counts
-        Numbers in the order of `DYNAMIC_COUNTS`.
-    seconds
-        Time spent in the compiled loop.
-    failure
-        Why the run has ended early, empty if it has not.
-    points
-        Where it is recorded, if not at the output times.
-    """
-
-    times: np.ndarray
-    path: np.ndarray
-    counts: np.ndarray
-    seconds: float
-    failure: str
-    points: Points | None = None
-
-
-class Solver(NamedTuple):
-    """How a run is integrated.
-
-    Attributes
-    ----------
-    name
-        One of `catalogue.INTEGRATORS`.
-    tolerance
-        Largest local error of a state relative to its scale plus its own size.
-    times
-        Output times (samples,) in s, the maneuver's by default.
-    longest_step
-        In s; unlimited by default.
-    begin
-        Time in s at which the run begins with its state, in mid-maneuver if it isn't 0.
-    """
-
-    name: str
-    tolerance: float
-    times: np.ndarray | None = None
-    longest_step: float | None = None
-    begin: float = 0.0
-
-
-class RunArguments(NamedTuple):
-    """Arguments of the compiled time loop, see `integrators/loop.integrate`."""
-
-    start: np.ndarray
-    equations: Ready
-    signal: Ready
-    spans: Ready
-    subspaces: Ready
-    method: Ready
-    control: Ready
-    output: Output
-    buffer: np.ndarray
-    integers: np.ndarray
-
-
-class Plan(NamedTuple):
-    """What runs of a system over the same maneuver share.
-
-    Attributes
-    ----------
-    arguments
-        Those that are not shared are empty.
-    sizes
-        Numbers of states, of floats of scratch space and of integers.
-    windows
-        Kept alive: a plan is found by the object.
-    cubic
-        Whether dense output is a cubic in each step, and the run may be recorded at points.
-    """
-
-    loop: Loop
-    arguments: RunArguments
-    sizes: tuple[int, int, int]
-    windows: ProjectionWindows
-    cubic: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,19 +244,17 @@ class System(ShortRepr):
         InputError
             If a value is out of bounds or a name is unknown.
         """
-        loop, arguments = self.prepared(maneuver, state, windows, solver, direct_until)
-        output = arguments.output
-        status, seconds = timed(loop.prepared(*arguments))
-        failure = f"{REASONS[status]} at t = {arguments.buffer[0]:.6g} s" if status else ""
-        path, times, places = output.path, output.samples, output.places
-        if not len(places):
-            return Run(times, path, output.counts, seconds, failure)
-        reached = int(places[:, 0].argmax()) if status else -1
-        row, part = places[reached].tolist()
-        # Kernels take so many at once.
-        end = max(int(row) + (1 if part < 0.0 else NODES), LANES)
-        points = Points(output.inputs[:end], output.moments[:end], places)
-        return Run(times, path[:end], output.counts, seconds, failure, points)
+        plan = self._found(maneuver, windows, solver, direct_until)
+        space = plan.space()
+        start, output = space.arguments.start, space.arguments.output
+        assert len(state) == len(start), f"{len(state)} states, not {len(start)}"
+        start[:] = state
+        output.counts.fill(0)
+        status, seconds = timed(space.call)
+        failure = ""
+        if status:
+            failure = f"{REASONS[status]} at t = {space.arguments.buffer[0]:.6g} s"
+        return Run(output.samples, output.path, output.counts, seconds, failure, (plan, space))
 
     def prepared(
         self,
@@ -370,44 +265,46 @@ class System(ShortRepr):
         direct_until: float = np.inf,
     ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
-        longest = solver.longest_step
-        check_positive("tolerance", solver.tolerance, SMALLEST_TOLERANCE)
+        plan = self._found(maneuver, windows, solver, direct_until)
+        arguments = plan.fresh()
+        arguments.start[:] = state
+        arguments.output.counts.fill(0)
+        return plan.loop, arguments
+
+    def _found(
+        self,
+        maneuver: Maneuver,
+        windows: ProjectionWindows,
+        solver: Solver,
+        direct_until: float,
+    ) -> Plan:
+        """Plan of a run; kept if it is over the whole maneuver."""
+        name, tolerance, times, longest, begin = solver
+        check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
         if longest is not None:
             check_positive("longest_step", longest)
-        key = maneuver, id(windows), solver.name
-        whole = solver.times is None and not solver.begin
-        plan = self._plans.get(key) if whole else None
+        if times is not None or begin:
+            return self._plan(maneuver, windows, solver, direct_until)
+        key = maneuver, id(windows), name, tolerance, longest, direct_until
+        plan = self._plans.get(key)
         if plan is None:
-            plan = self._plan(maneuver, windows, solver)
-            if whole:
-                if len(self._plans) >= MOST_PLANS:
-                    self._plans.clear()
-                self._plans[key] = plan
-        arguments = plan.arguments
-        n, floats, integers = plan.sizes
-        assert len(state) == n, f"{len(state)} states in a space of {n} dimensions"
-        times, counts = arguments.output.samples, np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-        size, points = len(times), NO_POINTS
-        if plan.cubic and direct_until < times[-1] and size >= LANES:
-            given = recorded_inputs(maneuver)[1]
-            inputs, moments = np.empty((size, self.inputs)), np.empty(size)
-            points = given, inputs, moments, np.empty((size, 2))
-        output = Output(times, np.empty((size, n)), counts, *points, direct_until)
-        return plan.loop, arguments._replace(
-            start=loop_array(state),
-            control=catalogue.control_of(
-                solver.name, float(solver.tolerance), float(longest or np.inf)
-            ),
-            output=output,
-            buffer=np.empty(floats),
-            integers=np.empty(integers, dtype=np.int64),
-        )
+            plan = self._plan(maneuver, windows, solver, direct_until)
+            if len(self._plans) >= MOST_PLANS:
+                self._plans.clear()
+            self._plans[key] = plan
+        return plan
 
     @cached_property
     def _plans(self) -> dict[tuple, Plan]:
         return {}
 
-    def _plan(self, maneuver: Maneuver, windows: ProjectionWindows, solver: Solver) -> Plan:
+    def _plan(
+        self,
+        maneuver: Maneuver,
+        windows: ProjectionWindows,
+        solver: Solver,
+        direct_until: float,
+    ) -> Plan:
         """What runs of a maneuver share."""
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
@@ -428,12 +325,16 @@ class System(ShortRepr):
             windows.spans(signal.bundle.edges, end, solver.begin),
             windows.subspaces,
             self.method(name, active),
-            windows.subspaces,
-            Output(times, nothing, nothing, *NO_POINTS, np.inf),
+            catalogue.control_of(
+                solver.name, float(solver.tolerance), float(solver.longest_step or np.inf)
+            ),
+            Output(times, nothing, nothing, *NO_POINTS, direct_until),
             nothing,
             nothing,
         )
         floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
         loop = catalogue.time_loop(chosen, formulation, steps)
         cubic = solver.times is None and not solver.begin and "cubic" in chosen.modules
-        return Plan(loop, arguments, (n, floats, dim + 8), windows, cubic)
+        cubic = cubic and len(times) >= LANES and direct_until < times[-1]
+        given = recorded_inputs(maneuver)[1] if cubic else None
+        return Plan(loop, arguments, (n, floats, dim + 8), given, windows, [])

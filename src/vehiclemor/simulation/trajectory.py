@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -88,6 +89,13 @@ class Trajectory(ShortRepr):
     remark: str = ""
     trust: Trust | None = None
 
+    @classmethod
+    def of(cls, **fields: Any) -> Trajectory:
+        """A trajectory of these fields, in a fifth of the time that the constructor takes."""
+        found = object.__new__(cls)
+        found.__dict__.update(fields)
+        return found
+
     @property
     def finished(self) -> bool:
         """Whether the run has come to its end, trusted or not."""
@@ -96,9 +104,10 @@ class Trajectory(ShortRepr):
     def judged(self, trust: Trust | None) -> Trajectory:
         """The same with what its model tells of it; untrusted if that is that it has left."""
         if trust is None or self.status != "ok" or not trust.reason:
-            return replace(self, trust=trust)
+            return Trajectory.of(**self.__dict__ | {"trust": trust})
         message = f"from t = {trust.until:.4g} s on {trust.reason}"
-        return replace(self, trust=trust, status="untrusted", message=message)
+        told = {"trust": trust, "status": "untrusted", "message": message}
+        return Trajectory.of(**self.__dict__ | told)
 
     @property
     def states(self) -> np.ndarray:

@@ -18,7 +18,8 @@ from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.mirror_image import partners
-from vehiclemor.simulation.system import Run, System
+from vehiclemor.simulation.run_plans import Run
+from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Trust
 
 # Magnitudes below which errors count absolutely, by name of the state; 10 otherwise.

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
+from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.trajectory import Trust
 
 # Part of a transient below which it needs no samples of its own.
@@ -43,6 +45,23 @@ class Transient:
 
 
 NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+
+
+class LiftingSpace(NamedTuple):
+    """Arrays of one lifting at a time, and the loops that write them.
+
+    Attributes
+    ----------
+    calls
+        Loops with these arrays, and the words in which the number of rows stands.
+    """
+
+    excited: np.ndarray
+    times: np.ndarray
+    states: np.ndarray
+    largest: np.ndarray
+    first: np.ndarray
+    calls: tuple[tuple[Prepared, tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,23 +133,62 @@ class Lifting(ShortRepr):
         excited
             By the start, as `excited` gives it.
         """
+        return self._lifted(self._space((times, path, inputs), excited, len(times)), len(times))
+
+    def of_run(
+        self, run: Run, inputs: np.ndarray, excited: np.ndarray
+    ) -> tuple[np.ndarray, Trust | None]:
+        """The same of a run and its inputs at the samples; of its rows only `run.rows` count."""
+        held = run.kept.get("lifted")
+        if held is None or held.excited is not excited:
+            times, inputs = run.recorded_at(inputs)
+            held = self._space((times, run.whole, inputs), excited, run.rows)
+            run.kept["lifted"] = held
+        return self._lifted(held, run.rows)
+
+    def _space(
+        self, recorded: tuple[np.ndarray, np.ndarray, np.ndarray], excited: np.ndarray, rows: int
+    ) -> LiftingSpace:
+        """Arrays of the loops and these, packed once."""
+        (times, path, inputs), calls = recorded, []
         modes, watched = excited.shape[1], self.features.watched
         if modes:
             given = np.empty((len(times), inputs.shape[1] + 2 * modes))
-            _loops()["with_decay"](times, inputs, *excited, np.empty((modes, 2)), given)
+            decay = _loops()["with_decay"]
+            calls.append(
+                (
+                    decay.prepared(times, inputs, *excited, np.empty((modes, 2)), given),
+                    ("times", "inputs", "result"),
+                )
+            )
             inputs = given
-        kernel = self._kernel(modes, LANES if len(times) >= LANES else 1)
+        kernel = self._kernel(modes, LANES if rows >= LANES else 1)
         states = np.empty((len(times), self.layout.size + len(watched)))
         largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
-        _loops()["lifted"](path, inputs, *kernel, states, largest, first)
-        return states, self._trust(times, largest.tolist(), first.tolist())
+        lifted = _loops()["lifted"].prepared(path, inputs, *kernel, states, largest, first)
+        calls.append((lifted, ("path", "inputs", "states")))
+        counted = tuple(
+            (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
+        )
+        return LiftingSpace(excited, times, states, largest, first, counted)
 
-    def _trust(self, times: np.ndarray, largest: list[float], first: list[int]) -> Trust | None:
+    def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
+        for call, places in space.calls:
+            for place in places:
+                call.words[place] = rows
+            call()
+        return space.states, self._trust(
+            space.times, rows, space.largest.tolist(), space.first.tolist()
+        )
+
+    def _trust(
+        self, times: np.ndarray, rows: int, largest: list[float], first: list[int]
+    ) -> Trust | None:
         """How far a run has gone; none if nothing tells."""
         if not largest:
             return None
         sample = min(first)
-        if sample == len(times):
+        if sample == rows:
             return Trust(max(largest))
         name = self.features.watched[first.index(sample)][1]
         reason = f"{name} leaves what the training runs have covered"

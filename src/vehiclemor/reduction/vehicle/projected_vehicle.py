@@ -12,7 +12,8 @@ from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.vehicle.shape import VehicleShape, turned
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.system import Run, System
+from vehiclemor.simulation.run_plans import Run
+from vehiclemor.simulation.system import System
 
 
 def projected_vehicle(

@@ -16,7 +16,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system import Points, System
+from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Step of the reduced coordinates in differences.
@@ -127,28 +127,30 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        excited, inputs = self._excited(start), recorded_inputs(maneuver)[1]
-        run = self.equations.run(maneuver, start, direct_until=decayed(excited))
-        points = run.points or Points(inputs, run.times, run.times[:0])
-        states, trust = self.lift.states(points.moments, run.path, points.inputs, excited)
-        if run.points is None or run.points.places[0, 1] < 0.0:
+        (excited, until), inputs = self._excited(start), recorded_inputs(maneuver)[1]
+        run = self.equations.run(maneuver, start, direct_until=until)
+        states, trust = self.lift.of_run(run, inputs, excited)
+        if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             full = self.model.start(start)
             states[0, : len(full)] = full
-        return self.model.recorded(maneuver, run, inputs, states).judged(trust)
+        found = self.model.recorded(maneuver, run, inputs, states, trust)
+        run.give_back()
+        return found
 
-    def _excited(self, start: Start) -> np.ndarray:
-        """What of the transient a start excites; kept where it is a named one."""
+    def _excited(self, start: Start) -> tuple[np.ndarray, float]:
+        """What of the transient a start excites, and until when; kept where it is a named one."""
         if isinstance(start, str) and start in self._starts:
             return self._starts[start]
         state = self.model.start(start)
-        found = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+        excited = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+        found = excited, decayed(excited)
         if isinstance(start, str):
             self._starts[start] = found
         return found
 
     @cached_property
-    def _starts(self) -> dict[str, np.ndarray]:
+    def _starts(self) -> dict[str, tuple[np.ndarray, float]]:
         return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002

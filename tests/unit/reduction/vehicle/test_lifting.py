@@ -44,7 +44,7 @@ def test_the_compiled_lifting_is_the_formula(reduced, start):
     model, maneuver = reduced.model, CARS[reduced.model.name].perturbed(1.2, 0.8)
     run, states = reduced.simulate(maneuver, start), lifted(reduced, maneuver, start)
     outputs = model.outputs_at(states, run.inputs)
-    excited = reduced._excited(start)
+    excited, _ = reduced._excited(start)
     # At the samples themselves there is only rounding.
     path = reduced.path(maneuver, start)
     direct, _ = reduced.lift.states(maneuver.times, path, run.inputs, excited)
