@@ -1,9 +1,7 @@
 """Maneuvers: input time histories that studies scale in frequency and amplitude; wheel travel."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,16 +81,8 @@ class Maneuver(ShortRepr):
         return f"maneuver {self.name!r}"
 
     def __hash__(self) -> int:
-        return self._hash
-
-    @cached_property
-    def _hash(self) -> int:
-        # Every cache of a run asks for it.
-        return hash(tuple(getattr(self, f.name) for f in fields(self)))
-
-    def __getstate__(self) -> dict[str, Any]:
-        # Another process has other hashes of text.
-        return {name: value for name, value in self.__dict__.items() if name != "_hash"}
+        # Every cache of a run asks for it; what differs is mostly here.
+        return hash((self.name, self.signal, self.frequency_factor, self.amplitude_factor))
 
     @property
     def times(self) -> np.ndarray:

@@ -28,4 +28,4 @@ def solved_path(
     status, seconds = timed(prepare(solution))
     sample = int(solution.counts[SAMPLE])
     failure = (status, sample) if status else None
-    return model.trajectory(times, inputs, path, solution.counts, seconds, failure), sample
+    return model.trajectory(times, inputs, path, solution.counts.tolist(), seconds, failure), sample

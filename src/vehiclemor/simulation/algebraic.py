@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -24,6 +25,7 @@ from vehiclemor.simulation.checks import (
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.lane_loops import LaneKernels
+from vehiclemor.simulation.lane_runs import LaneRuns
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
@@ -68,11 +70,17 @@ class AlgebraicModel(Model):
         InputError
             If it is another name, or coordinates: these follow from the inputs.
         """
+        self.check_start(name)
+        return super().start(name)
+
+    def check_start(self, name: Start | None) -> None:
+        """Raise `InputError` as `start` does, which also copies it."""
         if not isinstance(name, str | None):
             raise InputError(
                 f"{self.name} starts from {DESIGN_START!r} alone: its inputs say where it is"
             )
-        return super().start(name)
+        if name is not None and name not in self.initial:
+            super().start(name)
 
     def residual(self, q: Any, u: Any) -> np.ndarray:
         """Residual Phi(q; u), shape (n,)."""
@@ -185,7 +193,7 @@ class AlgebraicModel(Model):
         ConvergenceError
             If an iteration fails; time and reachable range are named.
         """
-        self.start(start)
+        self.check_start(start)
         if times is None:
             sampled = self.sampled(maneuver)
         else:
@@ -246,31 +254,29 @@ class AlgebraicModel(Model):
         run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
         status, seconds = timed(run)
         if not status:
-            return self.trajectory(times, inputs, path, solution.counts, seconds)
+            return self.trajectory(times, inputs, path, solution.counts.tolist(), seconds)
         sample = int(solution.counts[newton_loops.SAMPLE])
         self._check_reach(times, inputs, sample)
         failure = int(status), sample
-        failed = self.trajectory(times, inputs, path, solution.counts, seconds, failure)
+        failed = self.trajectory(times, inputs, path, solution.counts.tolist(), seconds, failure)
         raise ConvergenceError(f"{self.name}: {failed.message} ({solver})", failed)
 
     def _side_by_side(self, sampled: Sampled, tolerance: float) -> Trajectory | None:
         """Solution with the samples in vector lanes; none if it has failed."""
         times, inputs, given = sampled
-        n, m, samples = len(self.coordinates), len(self.outputs), len(times)
-        if samples < LANES:
+        if len(times) < LANES:
             return None
-        # One table is written faster than two.
-        table = np.empty((samples, n + m))
-        solution = newton_loops.Solution(table, new_counts())
-        loop, how = self._full_order("newton_lanes")
-        iteration = _iteration(tolerance, SHORTEST_STEP)
-        buffer = np.empty(LANES * (5 * n + len(self.inputs) + m) + n * (n + 2))
-        run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
-        status, seconds = timed(run)
-        if status:
+        found = self._lanes.solved(given, _iteration(tolerance, SHORTEST_STEP))
+        if found is None:
             return None
-        path, outputs = table[:, :n], table[:, n:]
-        return self.trajectory(times, inputs, path, solution.counts, seconds, None, outputs)
+        (table, counts, seconds), n = found, len(self.coordinates)
+        return self.trajectory(times, inputs, table[:, :n], counts, seconds, None, table[:, n:])
+
+    @cached_property
+    def _lanes(self) -> LaneRuns:
+        loop, kernels = self._full_order("newton_lanes")
+        sizes = len(self.coordinates), len(self.inputs), len(self.outputs)
+        return LaneRuns(loop, self._ready_mechanism, kernels, sizes)
 
     def _full_order(self, solver: str) -> tuple[Loop, Any]:
         """Loop of a solver, and what it needs beside the mechanism; kept for further runs."""
@@ -304,7 +310,7 @@ class AlgebraicModel(Model):
         times: np.ndarray,
         inputs: np.ndarray,
         path: np.ndarray,
-        counts: np.ndarray,
+        counts: Sequence[int],
         seconds: float,
         failure: tuple[int, int] | None = None,
         outputs: np.ndarray | None = None,
@@ -317,16 +323,16 @@ class AlgebraicModel(Model):
         if failure is not None:
             status = "diverged"
             message = f"{REASONS[failure[0]]} at t = {times[failure[1]]:.6g} s"
-        return Trajectory(
-            times,
-            inputs,
-            path,
-            np.empty((len(path), 0)),
-            self.along("outputs", path, inputs) if outputs is None else outputs,
-            dict(zip(ALGEBRAIC_COUNTS, counts.tolist(), strict=False)),
-            seconds,
-            status,
-            message,
+        return Trajectory.of(
+            time=times,
+            inputs=inputs,
+            coordinates=path,
+            speeds=path[:, :0],
+            outputs=self.along("outputs", path, inputs) if outputs is None else outputs,
+            counts=dict(zip(ALGEBRAIC_COUNTS, counts, strict=False)),
+            seconds=seconds,
+            status=status,
+            message=message,
         )
 
     def loop(self, name: str, *further: str) -> Loop:

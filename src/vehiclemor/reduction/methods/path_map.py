@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
-from vehiclemor.codegen.loops import Loop, Ready, ready
+from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
@@ -30,6 +30,7 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
+from vehiclemor.simulation.spare_spaces import SpareSpaces
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Above this degree, powers lose digits to rounding.
@@ -95,17 +96,30 @@ class PathMapModel(ShortRepr):
         return map_loop(len(self.ranges), self.moving, self.degree, self.columns)
 
     @cached_property
-    def _ready(self) -> Ready:
-        return ready(self.cells)
+    def _counts(self) -> dict[str, int]:
+        return dict.fromkeys(self.model.counts, 0)
+
+    @cached_property
+    def _spare(self) -> SpareSpaces[Prepared]:
+        return SpareSpaces()
+
+    def _packed(self, given: Ready, size: int) -> Prepared:
+        """The loop for some inputs, to be given space of so many numbers."""
+        call = self._loop.prepared(given, self.cells, np.empty(0))
+        call.words[call.address("space") + 1] = size
+        return call
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Polynomials at the maneuver's output times."""
         model, samples = self.model, maneuver.samples
-        model.start(start)
+        model.check_start(start)
         times, inputs, given = model.sampled(maneuver)
         size = samples * len(self.columns)
         space = np.empty(size + TOLD + inputs.shape[1])
-        _, seconds = timed(self._loop.prepared(given, self._ready, space))
+        call = self._spare.taken(given, lambda: self._packed(given, len(space)))
+        call.words[call.address("space")] = address_of_array(space)
+        _, seconds = timed(call)
+        self._spare.give_back(given, call)
         table = space[:size].reshape(samples, -1)
         indicator, left = space[size : size + TOLD].tolist()
         status, message, until, reason = "ok", "", np.inf, ""
@@ -117,16 +131,16 @@ class PathMapModel(ShortRepr):
                 status, message = "diverged", f"at t = {until:.6g} s {reason}"
                 table[left:] = np.nan
         n = len(model.coordinates)
-        return Trajectory(
-            times,
-            inputs,
-            table[:, :n],
-            np.empty((samples, 0)),
-            table[:, n:],
-            dict.fromkeys(model.counts, 0),
-            seconds,
-            status,
-            message,
+        return Trajectory.of(
+            time=times,
+            inputs=inputs,
+            coordinates=table[:, :n],
+            speeds=table[:, :0],
+            outputs=table[:, n:],
+            counts=self._counts.copy(),
+            seconds=seconds,
+            status=status,
+            message=message,
             trust=Trust(indicator, until, reason),
         )
 
