@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
+from vehiclemor.codegen.loops import Prepared, Ready, cache_lines, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
@@ -330,9 +330,9 @@ class DynamicModel(Model):
             held = run.kept["delivered"] = self._delivery(run, inputs, states)
         # Rows of whole vectors.
         width = -(-(n + m) // LANES) * LANES
-        result = np.empty((samples, width))
+        result, address = cache_lines(samples, width)
         words = held.call.words
-        words[held.rows], words[held.result] = run.rows, address_of_array(result)
+        words[held.rows], words[held.result] = run.rows, address
         held.call()
         found = held.first.tolist()
         whole, outputs = result[:, :n], result[:, n : n + m]
@@ -349,7 +349,7 @@ class DynamicModel(Model):
         at = run.recorded_at(inputs)[1]
         observer = self._observer(LANES if run.rows >= LANES else 1)
         first = np.empty(len(self._limits[1]), dtype=np.int64)
-        scratch = np.empty((len(states) + 1) * width)
+        scratch = cache_lines(len(states) + 1, width)[0].reshape(-1)
         loop, result = path_loops()["delivered"], np.empty((0, width))
         call = loop.prepared(states, at, run.places, observer, scratch, result, first)
         rows, into = call.address("states") + 1, call.address("result")

@@ -26,6 +26,8 @@ from vehiclemor.simulation.integrators.structures import (
 OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
 INNER = 1.0 / ((NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0))
 
+INLINED = ("read_point", "cubics_within")
+
 
 def kernel_path(
     path: Matrix, inputs: Matrix, kernel: IntVector, constants: Vector, result: Matrix
