@@ -1,0 +1,133 @@
+"""Runs share plans and spaces: no result is another's, in one thread or in several."""
+
+import ctypes
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+
+from vehiclemor.codegen.loops import cache_lines
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Observer
+from vehiclemor.simulation.paths import path_loops
+from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.run_plans import Solver
+from vehiclemor.simulation.spare_spaces import MOST_KINDS, SpareSpaces
+from vehiclemor.simulation.trajectory import Trajectory
+
+CASES = {
+    "independent_suspension_vehicle": ("ros34pw2", ("equilibrium", "dropped")),
+    "double_wishbone": ("newton_lanes", ("equilibrium",)),
+}
+
+
+def runs(name: str) -> list:
+    """Calls that give one run each, of different maneuvers and starts."""
+    model, (solver, starts) = build(name), CASES[name]
+    nominal = component("maneuver", model.definition.maneuver)
+    return [
+        partial(
+            model.simulate,
+            nominal.perturbed(1.0, amplitude),
+            start,
+            solver=solver,
+            tolerance=1e-3,
+        )
+        for amplitude in (1.0, 0.7)
+        for start in starts
+    ]
+
+
+def numbers(run: Trajectory) -> np.ndarray:
+    return np.hstack([run.states, run.outputs])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_later_run_leaves_an_earlier_one_alone(name):
+    calls = runs(name)
+    first = [call() for call in calls]
+    kept = [numbers(run).copy() for run in first]
+    again = [call() for call in reversed(calls)][::-1]
+    for run, repeated, known in zip(first, again, kept, strict=True):
+        np.testing.assert_array_equal(numbers(run), known)
+        np.testing.assert_array_equal(numbers(repeated), known)
+        assert repeated.counts == run.counts
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_threads_do_not_share_what_they_write(name):
+    calls = runs(name)
+    known = [numbers(call()) for call in calls]
+    with ThreadPoolExecutor(4) as pool:
+        tasks = [pool.submit(calls[k % len(calls)]) for k in range(80)]
+        for k, task in enumerate(tasks):
+            np.testing.assert_array_equal(numbers(task.result()), known[k % len(calls)])
+
+
+def test_a_run_keeps_its_path_until_it_gives_it_back():
+    model = build("independent_suspension_vehicle")
+    maneuver, space = component("maneuver", "lane_change"), whole_space(28)
+    own = Solver("ros34pw2", 1e-3)
+
+    def run(start: str):
+        return model.system.run(maneuver, model.start(start), space, own, 0.0)
+
+    first = run("equilibrium")
+    known = first.path.copy()
+    second = run("dropped")
+    np.testing.assert_array_equal(first.path, known)
+    assert not np.shares_memory(first.whole, second.whole)
+    second.give_back()
+    second.give_back()
+    third, fourth = run("dropped"), run("dropped")
+    assert np.shares_memory(third.whole, second.whole)
+    assert not np.shares_memory(third.whole, fourth.whole)
+
+
+def test_spare_spaces_are_found_by_kind_and_are_few():
+    spare: SpareSpaces[list] = SpareSpaces()
+    mine = spare.taken("a", list)
+    spare.give_back("a", mine)
+    assert spare.taken("b", list) is not mine
+    assert spare.taken("a", list) is mine
+    assert spare.taken("a", list) is not mine
+    for kind in range(2 * MOST_KINDS):
+        spare.give_back(kind, [])
+    assert len(spare._kept) <= MOST_KINDS
+
+
+def test_limits_are_watched_between_the_points_of_a_step(rng):
+    pointers = [ctypes.POINTER(ctypes.c_double)] * 4
+
+    def outputs(x, _u, _constants, result):
+        result[0], result[1] = x[0], -x[0]
+
+    kernel = ctypes.CFUNCTYPE(None, *pointers)(outputs)
+    address = np.array([ctypes.cast(kernel, ctypes.c_void_p).value], dtype=np.int64)
+    nodes, parts = np.array([NODE_1, NODE_2, 1 - NODE_2, 1 - NODE_1]), np.linspace(0.0, 1.0, 41)
+    places = np.column_stack([np.repeat([0.0, 1.0, 5.0], [1, 41, 1]), [-1.0, *parts, -1.0]])
+    found = set()
+    for draw in range(200):
+        states = rng.normal(size=(6, 1))
+        if draw % 4 == 0:
+            states[rng.integers(1, 5)] = (np.nan, np.inf)[draw % 8 == 0]
+        cubic = np.linalg.solve(np.vander(nodes), states[1:5, 0])
+        expected = np.concatenate([states[0], np.polyval(cubic, parts), states[5]])
+        low, high = np.sort(rng.normal(scale=1.5, size=2))
+        ranges = np.array([[low, high], [-np.inf, 1.5]])
+        observer = Observer(address, np.zeros(1), np.array([0, 1]), ranges, 1)
+        first, result = np.empty(2, dtype=np.int64), cache_lines(43, 8)[0]
+        scratch = np.empty(7 * 8)
+        path_loops()["delivered"](
+            states, np.zeros((6, 1)), places, observer, scratch, result, first
+        )
+        if np.isfinite(states).all():
+            np.testing.assert_allclose(result[:, 0], expected, atol=1e-12)
+        for k, (a, b) in enumerate(ranges):
+            values = result[:, 1 + k]
+            outside = np.flatnonzero(~((a <= values) & (values <= b)))
+            assert first[k] == (outside[0] if len(outside) else 43)
+            found.add((k, bool(len(outside)), bool(first[k] in (0, 43))))
+    assert {(1, False, True), (1, True, False), (0, True, False)} <= found
