@@ -10,6 +10,7 @@ import pytest
 from vehiclemor.codegen.loops import cache_lines
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Observer
 from vehiclemor.simulation.paths import path_loops
 from vehiclemor.simulation.projection_windows import whole_space
@@ -68,6 +69,7 @@ def test_threads_do_not_share_what_they_write(name):
 
 def test_a_run_keeps_its_path_until_it_gives_it_back():
     model = build("independent_suspension_vehicle")
+    assert isinstance(model, DynamicModel)
     maneuver, space = component("maneuver", "lane_change"), whole_space(28)
     own = Solver("ros34pw2", 1e-3)
 
@@ -115,8 +117,8 @@ def test_limits_are_watched_between_the_points_of_a_step(rng):
             states[rng.integers(1, 5)] = (np.nan, np.inf)[draw % 8 == 0]
         cubic = np.linalg.solve(np.vander(nodes), states[1:5, 0])
         expected = np.concatenate([states[0], np.polyval(cubic, parts), states[5]])
-        low, high = np.sort(rng.normal(scale=1.5, size=2))
-        ranges = np.array([[low, high], [-np.inf, 1.5]])
+        low, high = np.sort(rng.normal(scale=4.0, size=2))
+        ranges = np.array([[low, high], [-np.inf, 2.5]])
         observer = Observer(address, np.zeros(1), np.array([0, 1]), ranges, 1)
         first, result = np.empty(2, dtype=np.int64), cache_lines(43, 8)[0]
         scratch = np.empty(7 * 8)
