@@ -122,15 +122,16 @@ def test(
 def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[Row]:
     """The rows, one of them marked as chosen among the contenders, by validation alone.
 
-    Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls take the
-    least time, by our clock, on the first scenarios of the validation set; if there is none, the
-    one of the smallest score.
+    Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls
+    take the least time, by our clock, on the first scenarios of the validation set; if there is
+    none, the one of the smallest score.
     """
     racing = [i for i, row in enumerate(rows) if row.contestant.role == CONTENDER]
     results = {i: rows[i].validation[rows[i].candidate] for i in racing}
     if not racing:
         return list(rows)
-    fitting = [i for i in racing if results[i].stable == 1.0 and results[i].score <= MARGIN_OF_CHOSEN]
+    within = [i for i in racing if results[i].score <= MARGIN_OF_CHOSEN]
+    fitting = [i for i in within if results[i].stable == 1.0]
     best = min(racing, key=lambda i: (-results[i].stable, results[i].score))
     if len(fitting) > 1:
         sample = protocol.sets["validation"][:TIMED]
