@@ -18,7 +18,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.plans.choice import MARGIN, Row, choose, validation_of
+from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, Row, choose, validation_of
 from vehiclemor.study.plans.ledger import record
 from vehiclemor.study.plans.protocol import CONTENDER, DRAWN, FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_file import ProtocolFile
@@ -122,15 +122,16 @@ def test(
 def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[Row]:
     """The rows, one of them marked as chosen among the contenders, by validation alone.
 
-    Of those that leave room to the bounds (`choice.MARGIN`) the one whose whole calls take the
-    least time, by our clock, on the first scenarios of the validation set; if there is none, the
-    one of the smallest score.
+    Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls
+    take the least time, by our clock, on the first scenarios of the validation set; if there is
+    none, the one of the smallest score.
     """
     racing = [i for i, row in enumerate(rows) if row.contestant.role == CONTENDER]
     results = {i: rows[i].validation[rows[i].candidate] for i in racing}
     if not racing:
         return list(rows)
-    fitting = [i for i in racing if results[i].stable == 1.0 and results[i].score <= MARGIN]
+    within = [i for i in racing if results[i].score <= MARGIN_OF_CHOSEN]
+    fitting = [i for i in within if results[i].stable == 1.0]
     best = min(racing, key=lambda i: (-results[i].stable, results[i].score))
     if len(fitting) > 1:
         sample = protocol.sets["validation"][:TIMED]
