@@ -79,8 +79,8 @@ def delivered(
     for row in range(len(states)):
         for i in range(n):
             points[row, i] = states[row, i]
-        # What happens to stand there may take a hundred times as long to add.
-        for i in range(n, width):
+        # What happens to stand behind the outputs may take a hundred times as long to add.
+        for i in range(max(n, width - LANES + 1), width):
             points[row, i] = 0.0
     outputs = matrix(scratch, n, len(states), width)
     if len(states) >= LANES:

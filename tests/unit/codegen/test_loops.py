@@ -13,7 +13,7 @@ from vehiclemor.codegen.compiler import compiled_loops
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loop_intrinsics import inlined_kernel
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
-from vehiclemor.codegen.loops import Loop, ready
+from vehiclemor.codegen.loops import Loop, address_of_array, cache_lines, ready
 from vehiclemor.codegen.machine_code import MachineCode
 
 
@@ -91,6 +91,24 @@ def test_prepared_arguments_serve_many_runs(loop, bundle):
     bundle.rows[:] *= 2.0
     run()
     np.testing.assert_allclose(result, 2.0 * first, rtol=1e-14)
+
+
+def test_words_of_prepared_arguments_can_be_replaced(loop, bundle):
+    results = np.empty(3), np.empty(3)
+    run = loop.prepared(bundle, 1.0, 0, results[0])
+    run()
+    run.words[run.address("result")] = address_of_array(results[1])
+    run()
+    np.testing.assert_array_equal(*results)
+    assert run.words[run.address("bundle.rows") + 1] == len(bundle.rows)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (7, 3), (1251, 64)])
+def test_matrices_begin_with_a_cache_line(shape):
+    for _ in range(5):
+        matrix, address = cache_lines(*shape)
+        assert (matrix.shape, matrix.ctypes.data, address % 64) == (shape, address, 0)
+        assert matrix.flags.carray
 
 
 def test_a_later_module_takes_the_place_of_an_earlier_one(bundle):
