@@ -243,13 +243,12 @@ def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray)
     """Which wheels have been off the ground, and when first; empty if none."""
     if min(first, default=len(times)) == len(times):
         return ""
-    off = {
-        name.removeprefix("Fz_"): times[sample]
+    off = [
+        f"{name.removeprefix('Fz_')} (first at {times.item(sample):.4g} s)"
         for name, sample in zip(loads, first, strict=True)
         if sample < len(times)
-    }
-    wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
-    return f"off the ground for a time: {wheels}"
+    ]
+    return f"off the ground for a time: {', '.join(off)}"
 
 
 def loop_array(values: Any) -> np.ndarray:
