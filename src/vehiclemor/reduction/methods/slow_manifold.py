@@ -61,7 +61,7 @@ class SlowManifoldSettings(OnlineSettings):
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
     nonlinearity: Literal["cubic", "quintic", "sliding", "rich"] = Field(
-        "quintic",
+        "sliding",
         description="of the lateral terms: cubic; quintic in slip angles too; sliding: and |slip| "
         "slip terms; rich: and cubic terms that change with the speed",
     )
