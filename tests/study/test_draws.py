@@ -20,7 +20,7 @@ from vehiclemor.study.plans.ledger import Drawn, ledger, pooled, record
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_file import Bound, Box, Draw
 from vehiclemor.study.plans.seal import seal, sealed_sets
-from vehiclemor.study.plans.sensitive import reasons
+from vehiclemor.study.plans.sensitive import _lifted, reasons
 
 BOX = Box(maneuver="sine_travel", frequency=[0.7, 1.8], amplitude=[0.5, 1.1], start=["equilibrium"])
 
@@ -154,15 +154,14 @@ def test_the_fastest_ladder_counts_that_reaches_the_error():
 
 
 def results(errors, statuses, until):
-    shape, remarks = ("scenario", "output"), [""] * len(errors)
-    remarks[2] = "off the ground for a time: FL"
+    shape = ("scenario", "output")
     return xr.Dataset(
         {
             "rms_error": (shape, np.array(errors)[:, None]),
             "largest_output": (shape, np.array([[1.0]] * len(errors))),
             "status": ("scenario", np.array(statuses, dtype=object)),
             "message": ("scenario", np.array(["why"] * len(errors), dtype=object)),
-            "remark": ("scenario", np.array(remarks, dtype=object)),
+            "smallest_output": (shape, np.array([[1.0]] * len(errors))),
             "trusted_until": ("scenario", np.array(until)),
         },
         {"output": ["toe"]},
@@ -185,9 +184,11 @@ def test_runs_of_a_sensitive_full_order_are_found(protocol):
     )
     second = results([0.1, 3.0, 0.1], ["ok"] * 3, [np.inf] * 3)
     found = reasons(replace(protocol, definition=definition), second)
-    assert found[0] == ""
+    assert found[0] == found[2] == ""
     assert "differ by 3 times a bound" in found[1]
-    assert found[2].startswith("off the ground")
+    assert _lifted(second.isel(scenario=0), ["toe"]) == ""
+    second["smallest_output"][2] = 0.0
+    assert _lifted(second.isel(scenario=2), ["toe"]) == "without load: toe"
     tipped = definition.model_copy(update={"sensitive": {"toe": 0.5}})
     assert "reaches 1" in reasons(replace(protocol, definition=tipped), second)[0]
 

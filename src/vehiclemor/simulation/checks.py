@@ -11,8 +11,6 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 
-OFF_GROUND = "off the ground for a time"
-
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
     """A finite array (size,) of floats, as compiled functions want it; a number is one entry.
@@ -251,7 +249,7 @@ def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray)
         if sample < len(times)
     }
     wheels = ", ".join(f"{wheel} (first at {when:.4g} s)" for wheel, when in off.items())
-    return f"{OFF_GROUND}: {wheels}"
+    return f"off the ground for a time: {wheels}"
 
 
 def loop_array(values: Any) -> np.ndarray:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Length (s) from the start within which the largest value of every output is stored.
 FIRST_SECONDS = 10.0
+# Time (s) after which the smallest value of every output is stored: a dropped car has landed.
+LANDED = 1.0
 
 
 @dataclass(frozen=True)
@@ -126,9 +128,9 @@ def errors_dataset(
     ends = [o if isinstance(o, Failure) else o.trajectory for o in outcomes]
     compared = [None if isinstance(o, Failure) else o for o in outcomes]
     finished = [o if o and o.trajectory.finished else None for o in compared]
-    missing = (np.full(len(model.outputs), np.nan),) * 3
+    missing = (np.full(len(model.outputs), np.nan),) * 4
     errors = zip(*[_errors(o) if o else missing for o in finished], strict=True)
-    names = ("rms_error", "max_error", "largest_output")
+    names = ("rms_error", "max_error", "largest_output", "smallest_output")
     found: dict[str, object] = dict(zip(names, map(np.array, errors), strict=True))
     nothing = ErrorEstimate(*missing[:2])
     estimates = [o.estimate if o and o.estimate else nothing for o in finished]
@@ -155,12 +157,13 @@ def errors_dataset(
     return with_units(xr.Dataset(described, coordinates, _attributes(experiment)))
 
 
-def _errors(outcome: Outcome) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """RMS and largest errors (outputs,), and the largest values in the first seconds."""
+def _errors(outcome: Outcome) -> tuple[np.ndarray, ...]:
+    """RMS and largest errors (outputs,), largest magnitudes of the first seconds, least values."""
     outputs = outcome.trajectory.outputs
     error = outputs - outcome.reference.outputs
-    first = outcome.trajectory.time <= FIRST_SECONDS
-    return rms(error), max_abs(error), max_abs(outputs[first])
+    times = outcome.trajectory.time
+    least = outputs[times >= min(LANDED, times[-1])].min(axis=0)
+    return rms(error), max_abs(error), max_abs(outputs[times <= FIRST_SECONDS]), least
 
 
 def _attributes(experiment: Experiment) -> dict[str, object]:

@@ -6,11 +6,11 @@ or has a wheel in the air, no error against one of them tells anything of a redu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.simulation.checks import OFF_GROUND
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.plans.choice import scores
@@ -34,8 +34,16 @@ def reasons(protocol: Protocol, second: xr.Dataset) -> list[str]:
     found = []
     for index, score in enumerate(scores(second, definition.bounds)):
         part = second.isel(scenario=index)
-        found.append(_reason(part, float(score), definition.sensitive))
+        lifted = _lifted(part, protocol.model.definition.loads)
+        found.append(_reason(part, float(score), definition.sensitive) or lifted)
     return found
+
+
+def _lifted(part: xr.Dataset, loads: Sequence[str]) -> str:
+    """Which wheels leave the ground; a dropped car has landed before."""
+    least = part["smallest_output"]
+    wheels = [name for name in loads if float(least.sel(output=name)) <= 0.0]
+    return f"without load: {', '.join(wheels)}" if wheels else ""
 
 
 def _reason(part: xr.Dataset, score: float, largest: dict[str, float]) -> str:
@@ -47,5 +55,4 @@ def _reason(part: xr.Dataset, score: float, largest: dict[str, float]) -> str:
         value = float(part["largest_output"].sel(output=output))
         if value > limit:
             return f"{output} of the full order reaches {value:.3g}, beyond {limit:g}"
-    remark = str(part["remark"].item())
-    return remark if remark.startswith(OFF_GROUND) else ""
+    return ""
