@@ -59,6 +59,12 @@ class TwoTrackSettings(OnlineSettings):
     hull: float = Field(
         1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
     )
+    reversal: float = Field(
+        0.5,
+        gt=0.0,
+        description="largest part of the training's product of steering and its rate that is "
+        "trusted",
+    )
     saturation: float = Field(
         1.2,
         gt=0.0,
@@ -136,7 +142,8 @@ def tire_text(
     z, u = samples.z, samples.inputs
     model, inputs = shape.model, u.shape[1]
     reach = settings.hull * largest(tf.argument_values(shape.speed, z, u))
-    text = tf.arguments(shape.speed, reach)
+    reversal = settings.reversal * float(largest(u[:, :1] * u[:, 1:2])[0])
+    text = tf.arguments(shape.speed, reach, reversal)
     linear = tf.linear_terms(inputs)
     odd = [*linear, *tf.CUBIC, *tf.FASTER]
     even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]

@@ -73,7 +73,7 @@ def argument_values(speed: float, z: np.ndarray, u: np.ndarray) -> np.ndarray:
     return np.column_stack([moved, u[:, 0], z[:, SPEED], u[:, 1:]])
 
 
-def arguments(speed: float, reach: np.ndarray) -> Text:
+def arguments(speed: float, reach: np.ndarray, reversal: float) -> Text:
     """Lines of the arguments in [-1, 1], `raw` where they are not held.
 
     Parameters
@@ -82,6 +82,9 @@ def arguments(speed: float, reach: np.ndarray) -> Text:
         Of straight running in m/s.
     reach
         Of each of `argument_values`: how far it may go.
+    reversal
+        How far the product of the steering and its rate may go: where much steering is taken back
+        fast, loads lag behind.
     """
     text = Text()
     text.let("part", f"1.0 / ({text.parameter(speed)} + z{SPEED})")
@@ -93,6 +96,7 @@ def arguments(speed: float, reach: np.ndarray) -> Text:
         text.watched.append((f"raw{i}", names[i]))
         if i < len(held_names):
             text.let(held_names[i], held(f"raw{i}"))
+    text.watched.append((f"{text.parameter(1.0 / reversal)} * u0 * u1", "reversal of the steering"))
     return text
 
 

@@ -13,13 +13,15 @@ from vehiclemor.report.printing import Footnotes, Line, fixed, short, table_text
 from vehiclemor.report.verdicts import LARGEST_SPREAD, NOT_COMPARABLE, counted
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
+# Share of missed runs above which a contender is only named.
+HOPELESS = 0.1
 LEGEND = {
     "miss": "runs outside of a bound; sil.: of these with the status ok; flag: runs of which the "
-    "model says that it has left what it knows; <: rate of misses excluded at 95 % "
-    "(Clopper-Pearson)",
+    "model says that it has left what it knows",
     "score": "largest error as a multiple of its bound; valid.: in validation, which alone chooses",
-    "us": "CPU time of a whole call, all outputs delivered; loop: of its compiled loop; x: times "
-    "faster than the full order interpolated at the same score; off.: offline, s",
+    "us": "CPU time of a whole call, all outputs delivered; loop: of its compiled loop; x, xl: "
+    "times faster than the full order interpolated at the same score, in calls and loops; off.: "
+    "offline, s",
     "bound": "with a * it is our own; n/c: not comparable, since the rounds scatter by more than "
     f"{100 * LARGEST_SPREAD:g} % (interquartile range over median)",
     "cov.": "share of the runs, %, whose error is below the model's own estimate, calibrated on "
@@ -51,7 +53,8 @@ def _model_text(model: str, rows: list[Row]) -> str:
     winner = next((row for row in methods if row["winner"]), None)
     lines = [f"{model}: {methods[0]['runs']:.0f} runs"]
     lines += [_target_table(_of_kind(rows, "target"), notes)]
-    lines += [_error_table(winner) if winner else "", _method_table(methods, winner, notes)]
+    lines += [_error_table(winner, notes) if winner else ""]
+    lines += [_method_table(methods, winner, notes)]
     lines += [_draw_text(draws, winner), notes.text()]
     return "\n".join(text for text in lines if text)
 
@@ -72,7 +75,7 @@ def _target_table(rows: list[Row], notes: Footnotes) -> str:
     return table_text(["target for what was chosen", "bound", "measured", "verdict"], lines, (0, 3))
 
 
-def _error_table(winner: Row) -> str:
+def _error_table(winner: Row, notes: Footnotes) -> str:
     """Errors of what was chosen, each beside its bound and the bound's reason."""
     bounds, covered = json.loads(winner["bounds"]), json.loads(winner["covered"])
     lines = []
@@ -80,27 +83,35 @@ def _error_table(winner: Row) -> str:
         kind, _, output = column.removeprefix("worst_").partition("_")
         if math.isnan(winner[column]):
             continue
-        bound, reason = bounds.get(output, (math.nan, "reported"))
-        name = label_of(output).short + (" max" if kind == "max" else "")
-        values = (winner[column], winner[column.replace("worst_", "most_", 1)])
+        bound, reason = bounds.get(output, (math.nan, ""))
         share, sharp = covered.get(output, (math.nan, math.nan))
-        cells = [short(bound), *map(short, values), fixed(100.0 * share, 0), short(sharp), reason]
-        lines.append(Line([f"  {name}", *cells]))
+        values = (winner[column], winner[column.replace("worst_", "most_", 1)])
+        name = f"  {label_of(output).short}{' max' if kind == 'max' else ''} {notes.marks(reason)}"
+        lines.append(
+            Line([name, *map(short, (bound, *values)), fixed(100.0 * share, 0), short(sharp)])
+        )
     heading = f"  errors of {winner['method']}"
-    headings = [heading, "bound", "worst", "99 %", "cov.", "est.", "bound's source"]
-    return table_text(headings, lines, (0, 6))
+    return table_text([heading, "bound", "worst", "99 %", "cov.", "est."], lines)
 
 
 def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:
-    """Reduced models, and the full-order rows that what was chosen is measured against."""
+    """Reduced models, and the full-order rows that what was chosen is measured against.
+
+    Those that miss most runs are named below.
+    """
     against = set(winner["equal_rows"].split(", ")) | {winner["within"]} if winner else set()
-    heads = ["", "miss", "sil.", "flag", "< %", "valid.", "score", "us", "loop", "x", "x loop"]
-    lines = [
-        Line(_costs(row, notes))
-        for row in rows
-        if row["role"] != FULL_ORDER or row["method"] in against
-    ]
-    return table_text([*heads, "off."], lines)
+    reduced = [row for row in rows if row["role"] != FULL_ORDER]
+    shown = [row for row in reduced if row["winner"] or row["misses"] <= HOPELESS * row["runs"]]
+    lost = [row for row in reduced if row not in shown]
+    heads = ["", "miss", "sil.", "flag", "valid.", "score", "us", "loop", "x", "xl", "off."]
+    full = [row for row in rows if row["role"] == FULL_ORDER and row["method"] in against]
+    table = table_text(heads, [Line(_costs(row, notes)) for row in (*full, *shown)])
+    if not lost:
+        return table
+    words = ", ".join(
+        f"{row['method']} {row['misses']:.0f} ({short(row['score'])})" for row in lost
+    )
+    return f"{table}\n{wrapped(f'Miss more (worst score): {words}.', 2, 4)}"
 
 
 def _costs(row: Row, notes: Footnotes) -> list[str]:
@@ -108,11 +119,7 @@ def _costs(row: Row, notes: Footnotes) -> list[str]:
     told = notes.marks(share + row["failure"] if row["failure"] else "")
     cells = [f"{'*' if row['winner'] else ' '} {row['method']} {told}".rstrip()]
     cells += [f"{row[name]:.0f}" for name in ("misses", "silent", "flagged")]
-    cells += [
-        fixed(100.0 * row["rate_bound"], 1),
-        short(row["validation_score"]),
-        short(row["score"]),
-    ]
+    cells += [short(row["validation_score"]), short(row["score"])]
     cells += [fixed(1e6 * row.get(clock, math.nan), 0) for clock in ("seconds", "loop_seconds")]
     cells += [fixed(row["ratio_equal"], 1), fixed(row["ratio_equal_loop"], 1)]
     return [*cells, short(row["offline_seconds"]) if row["offline_seconds"] else "-"]
