@@ -1,6 +1,5 @@
 """Symmetries, energy, constraints and runs of the high-fidelity vehicle."""
 
-import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -9,11 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.integrate import solve_ivp
-from sksundae.cvode import CVODE
 
 from tests.oracles import high_fidelity_vehicle as oracle
-from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS, lane_change
+from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS
 from tests.oracles.projected_simulation import (
     projected_state,
     simulate_projected,
@@ -33,8 +30,6 @@ STARTS = ("equilibrium", "dropped")
 LANE_CHANGE = component("maneuver", "rack_lane_change")
 STRAIGHT = component("maneuver", "rack_straight_ahead")
 REST = np.zeros(3)
-# The pulse of the rack is not smooth at its ends.
-EDGES = (0.0, 1.0, 3.5, 4.0)
 TIMES = np.array([0.05, 0.3, 0.9, 1.7, 2.6, 3.4, 4.0])
 
 
@@ -307,53 +302,6 @@ def test_stabilisation_does_not_change_the_run(vehicle, start):
     assert np.abs(found.coordinates - expected.coordinates)[:, :22].max() < 1e-7
     drift = series(expected, vehicle, "position_drift", "velocity_drift")
     assert drift.max() < 1e-12
-
-
-@pytest.fixture(scope="module", params=STARTS)
-def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
-    """Start and states at `TIMES` by LSODA of SciPy, broken at the pulse's ends."""
-    x = start = vehicle.start(request.param)
-    path = []
-    for a, b in itertools.pairwise(EDGES):
-        times = [*(t for t in TIMES if a < t < b), b]
-
-        def rates(t, x):
-            return vehicle.derivative(x, lane_change(t))
-
-        solution = solve_ivp(rates, (a, b), x, "LSODA", times, rtol=1e-10, atol=1e-11)
-        x = solution.y[:, -1]
-        path += [state for t, state in zip(times, solution.y.T, strict=True) if np.any(t == TIMES)]
-    return start, np.array(path)
-
-
-@pytest.mark.parametrize(
-    ("solver", "tolerance"),
-    [
-        ("dopri5", 1e-10),
-        ("rodas4", 1e-8),
-        ("ros34pw2", 5e-9),
-        ("etdrk4", 1e-7),
-        ("exponential_adams", 1e-9),
-    ],
-)
-def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
-    start, expected = reference
-    found = integrate(vehicle, LANE_CHANGE, start, TIMES, solver, tolerance).states
-    assert np.abs(found - expected).max() < 1e-6
-
-
-def test_sundials_agrees_with_lsoda(vehicle, reference):
-    start, expected = reference
-    x = start
-    for a, b in itertools.pairwise(EDGES):
-
-        def rates(t, x, slope):
-            slope[:] = vehicle.derivative(x, lane_change(t))
-
-        # Straight running is at rest: steps would become too long to notice a wheel that lands.
-        options = {"rtol": 1e-10, "atol": 1e-11, "max_num_steps": 100000, "max_step": 0.01}
-        x = CVODE(rates, **options).solve(np.array([a, b]), x).y[-1]
-    np.testing.assert_allclose(x, expected[-1], rtol=0, atol=1e-7)
 
 
 @pytest.mark.parametrize("solver", INTEGRATORS)

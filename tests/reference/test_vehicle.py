@@ -1,13 +1,9 @@
 """The 14-DOF vehicle against independent mechanics, conservation laws and other integrators."""
 
-import itertools
-
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.optimize import linear_sum_assignment
-from sksundae.cvode import CVODE
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.maneuver import Maneuver
@@ -359,52 +355,6 @@ def test_the_lane_change_ends_where_its_amplitude_was_calibrated(vehicle):
 
 # Until the pulse of the lane change is over, and a little more.
 TIMES = np.array([0.9, 1.7, 2.6, 3.4, 4.0])
-
-
-@pytest.fixture(scope="module", params=["equilibrium", "dropped"])
-def reference(request, vehicle) -> tuple[np.ndarray, np.ndarray]:
-    """Start and states at `TIMES` by LSODA of SciPy, broken at the maneuver's break points."""
-    x = start = vehicle.start(request.param)
-    path, edges = [], [0.0, 1.0, 3.5, 4.0]
-    for a, b in itertools.pairwise(edges):
-        times = [*(t for t in TIMES if a < t < b), b]
-
-        def rates(t, x):
-            return vehicle.derivative(x, oracle.lane_change(t))
-
-        solution = solve_ivp(rates, (a, b), x, "LSODA", times, rtol=1e-10, atol=1e-11)
-        x = solution.y[:, -1]
-        path += [state for t, state in zip(times, solution.y.T, strict=True) if np.any(t == TIMES)]
-    return start, np.array(path)
-
-
-@pytest.mark.parametrize(
-    ("solver", "tolerance"),
-    [
-        ("dopri5", 1e-10),
-        ("rodas4", 1e-8),
-        ("ros34pw2", 1e-9),
-        ("etdrk4", 1e-7),
-        ("exponential_adams", 1e-9),
-    ],
-)
-def test_compiled_solvers_agree_with_lsoda(vehicle, reference, solver, tolerance):
-    start, expected = reference
-    found = integrate(vehicle, LANE_CHANGE, start, solver, tolerance, TIMES).states
-    assert np.abs(found - expected).max() < 1e-6
-
-
-def test_sundials_agrees_with_lsoda(vehicle, reference):
-    start, expected = reference
-    x, edges = start, [0.0, 1.0, 3.5, 4.0]
-    for a, b in itertools.pairwise(edges):
-
-        def rates(t, x, slope):
-            slope[:] = vehicle.derivative(x, oracle.lane_change(t))
-
-        solver = CVODE(rates, rtol=1e-9, atol=1e-10, max_num_steps=100000)
-        x = solver.solve(np.array([a, b]), x).y[-1]
-    np.testing.assert_allclose(x, expected[-1], rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("solver", INTEGRATORS)

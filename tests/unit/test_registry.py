@@ -26,7 +26,7 @@ def test_built_ins_are_registered() -> None:
             "double_wishbon",
             "unknown model 'double_wishbon'; did you mean double_wishbone?",
         ),
-        ("method", "fulorder", "unknown method 'fulorder'; did you mean full_order?"),
+        ("method", "full-order", "unknown method 'full-order'; did you mean full_order?"),
         ("method", "PID", "unknown method 'PID'; known: balanced_pod, "),
         ("maneuver", "sine", "unknown maneuver 'sine'; "),
         ("model", "", "unknown model ''; known: "),

@@ -47,10 +47,3 @@ def atan(x):
     q = 1.945506571482613964425e2 + z * q
     value = offset + (y + (y * (z * p / q) + rest))
     return -value if x < 0.0 else value
-
-
-def atan_batch(work, first):
-    """Arctangents of work[first:first + 8] into the next 8 places."""
-    for lane in range(8):
-        i = first + lane
-        work[i + 8] = atan(work[i])

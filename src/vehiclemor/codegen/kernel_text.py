@@ -71,23 +71,9 @@ def reference_source(program: Program) -> str:
 def kernel_source(program: Program) -> str:
     """Source for the compiler: elementary functions in batches, sine and cosine together.
 
-    It calls `sincos_one`, `sincos_batch`, `atan` and `atan_batch`, which the linker provides.
+    What it calls, `sincos_one`, `atan` and batches of them, becomes instructions in `llvm_kernels`.
     """
     return _source(program, batched=True)
-
-
-def work_size(program: Program) -> int:
-    """Number of floats of scratch space that the functions of the program need."""
-    functions = [program.constants, *program.functions.values()]
-    return max(3 * LANES, *(_scratch(_batches(function)) for function in functions))
-
-
-def _batches(function: Function) -> list[Batch]:
-    return [step for step in schedule(function) if isinstance(step, Batch)]
-
-
-def _scratch(batches: list[Batch]) -> int:
-    return sum(_block(b) * _blocks(b) for b in batches if len(b.arguments) >= SMALLEST_BATCH)
 
 
 def _block(batch: Batch) -> int:
@@ -133,7 +119,8 @@ def _function_source(
     for step in schedule(function) if batched else function.assignments:
         if isinstance(step, Batch):
             lines += _evaluation(step, first)
-            first += _scratch([step])
+            if len(step.arguments) >= SMALLEST_BATCH:
+                first += _block(step) * _blocks(step)
         else:
             lines.append(f"    {step[0]} = {printer.doprint(step[1])}")
     for index, expression in enumerate(function.results):

@@ -112,7 +112,8 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_module
-        from vehiclemor.codegen.llvm_kernels import KernelText, kernel_module
+        from vehiclemor.codegen.kernel_statements import KernelText
+        from vehiclemor.codegen.llvm_kernels import kernel_module
 
         return compiled_module(kernel_module([KernelText(source.text)], lanes))
 
@@ -124,7 +125,7 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
 
 def kernel_sources(text: str) -> dict[str, KernelSource]:
     """Sources of the kernels in a text, by name."""
-    from vehiclemor.codegen.llvm_kernels import KernelText
+    from vehiclemor.codegen.kernel_statements import KernelText
 
     found = {}
     for part in re.split(r"\n+(?=def )", text.strip()):

@@ -10,9 +10,10 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from vehiclemor.codegen.llvm_kernels import DOUBLE, KernelText, Rows, emit
+from vehiclemor.codegen.kernel_statements import KernelText
+from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.codegen.weighted_sums import FLAGS, spread
+from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS, spread
 
 WORD = ir.IntType(64)
 

@@ -49,15 +49,3 @@ def sincos(angle):
     sine = c if odd else s
     cosine = s if odd else c
     return (-sine if minus_sine else sine), (-cosine if minus_cosine else cosine)
-
-
-def sincos_batch(work, first):
-    """Sines of work[first:first + 8] into the next 8 places, cosines into the 8 after them."""
-    for lane in range(8):
-        i = first + lane
-        work[i + 8], work[i + 16] = sincos(work[i])
-
-
-def sincos_one(angle):
-    """Sine and cosine of a single angle, for kernels: compiled once, not at every place."""
-    return sincos(angle)

@@ -15,7 +15,6 @@ from vehiclemor.codegen.kernel_text import (
     kernel_source,
     operation_counts,
     reference_source,
-    work_size,
 )
 from vehiclemor.multibody.double_wishbone.definition import DEFINITION
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -209,13 +208,3 @@ def test_tangent_kernels_are_the_products_of_the_jacobian(
 def test_angle_without_a_name_is_refused() -> None:
     with pytest.raises(ValueError, match="name the argument on the tape first"):
         kernel_source(program_of(sp.sin(x + y)))
-
-
-@pytest.mark.parametrize(("angles", "size"), [(0, 24), (1, 24), (8, 24), (9, 48), (17, 72)])
-def test_scratch_space_holds_every_batch_of_angles(angles: int, size: int) -> None:
-    symbols = sp.symbols(f"a0:{max(angles, 1)}", real=True)
-    total = sp.Add(*[sp.sin(s) for s in symbols[:angles]]) + symbols[0] + p
-    program = assemble(Tape(), {"q": list(symbols)}, [p], {"f": ([total], (1,))})
-    assert work_size(program) == size
-    used = [int(part.split("]")[0]) for part in kernel_source(program).split("work[")[1:]]
-    assert max(used, default=0) < size

@@ -12,9 +12,10 @@ from numba import njit
 
 from tests.unit.programs import run
 from vehiclemor.codegen import arctangent, exponential, sincos
+from vehiclemor.codegen.kernel_statements import KernelText
 from vehiclemor.codegen.kernel_text import kernel_source, reference_source
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.llvm_kernels import KernelText, Rows, emit
+from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape

@@ -9,11 +9,11 @@ which lie on it, and the lag of the fast modes is learnt with them:
     z' = Lambda z + b u + N(z, speed, u)
 
 Lambda and b are exact at straight running.  N is odd in the lateral quantities (the vehicle is its
-own mirror image): cubic, and in the axles' slip angles also quintic, terms; the speed and what is
-symmetric have even terms.  Heave and pitch, as slow as the lateral modes, are coordinates too:
-corners and a drop move them, and they move the wheel loads.  The coefficients are improved on whole
-runs, since a heading that is off is a lateral position that is off; what whole runs hardly need is
-eliminated.
+own mirror image): cubic, and in the axles' slip angles also quintic and |slip| slip, terms; the
+speed and what is symmetric have even terms.  Heave and pitch, as slow as the lateral modes, are
+coordinates too: corners and a drop move them, and they move the wheel loads.  The coefficients are
+improved on whole runs, since a heading that is off is a lateral position that is off; what whole
+runs hardly need is eliminated.
 """
 
 import time
@@ -60,10 +60,10 @@ class SlowManifoldSettings(OnlineSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    nonlinearity: Literal["cubic", "quintic", "sliding", "rich"] = Field(
-        "quintic",
-        description="of the lateral terms: cubic; quintic in slip angles too; sliding: and |slip| "
-        "slip terms; rich: and cubic terms that change with the speed",
+    nonlinearity: Literal["sliding", "rich"] = Field(
+        "sliding",
+        description="of the lateral terms: sliding: cubic, and in slip angles quintic and |slip| "
+        "slip; rich: and cubic terms that change with the speed",
     )
     ridge: float = Field(1e-10, ge=0.0, description="weight of the coefficients' size in the fit")
     symmetric: int = Field(

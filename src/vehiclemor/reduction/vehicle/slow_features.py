@@ -115,12 +115,10 @@ def feature_table(
     scaled = straight[: k + 1]
     odd = [*straight, *(f"m * {t}" for t in scaled), *(f"m * m * {t}" for t in scaled)]
     odd += monomials(v, 3)
-    if nonlinearity != "cubic":
-        odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
-    if nonlinearity in {"sliding", "rich"}:
-        slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
-        odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
-        odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
+    odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
+    slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
+    odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
+    odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
     if nonlinearity == "rich":
         odd += [f"m * {term}" for term in monomials(v, 3)]
     odd += [f"{e} * {variable}" for e in own[k:] for variable in v]

@@ -54,8 +54,10 @@ def _protocol(name: str) -> dict[str, object]:
     """What a protocol trains, chooses by and tests; scenarios are counted."""
     protocol = read_toml(named_file("protocol", "protocols", name), ProtocolFile)
     counted = {s: sum(g.scenarios for g in getattr(protocol, s)) for s in SETS}
+    draws = {"drawn": protocol.drawn, "drawn outside": protocol.drawn_outside}
+    counted |= {name: draw.runs for name, draw in draws.items() if draw}
     return {
         "model": protocol.model,
-        "runs": [f"{count} {purpose}" for purpose, count in counted.items()],
+        "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
         "contestants": [entry.label for entry in protocol.contestants],
     }

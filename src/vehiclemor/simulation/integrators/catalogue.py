@@ -188,7 +188,7 @@ INTEGRATORS = {
         ("step_grid", "cubic", "ros34pw2"),
         tableaus.ros34pw2(),
         inverses,
-        ("step_grid", "cubic", "fused_ros34pw2"),
+        ("step_grid", "cubic", "ros34pw2", "fused_ros34pw2"),
         fused_squares=2,
         stepped=Stepped(
             w_step, transposed_inverses, ("step_grid", "cubic", "ros34pw2", "stepped_ros34pw2")
@@ -215,7 +215,7 @@ INTEGRATORS = {
         stepped=Stepped(
             exponential_step,
             partial(exponential_functions.exponential_tables, grid=STEP_GRID),
-            ("step_grid", "cubic", "etdrk4", "stepped_etdrk4"),
+            ("step_grid", "etdrk4", "fused_etdrk4", "cubic", "stepped_etdrk4"),
         ),
     ),
     "exponential_adams": Integrator(

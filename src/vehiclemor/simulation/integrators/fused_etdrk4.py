@@ -10,11 +10,11 @@ from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.etdrk4 import quadrature_weights
-from vehiclemor.simulation.integrators.step_grid import index_below, nearest_index
+from vehiclemor.simulation.integrators.step_grid import nearest_index
 from vehiclemor.simulation.integrators.structures import FUSED_STEP, RHS_CALLS, Work
 
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step", "keep_past", "prepare_curve")
+INLINED = ("accept", "step", "keep_past", "prepare_curve")
 
 
 def work_space(buffer, first, integers, dim, inputs):
@@ -60,12 +60,6 @@ def keep_past(work):
     dim = len(work.y)
     for i in range(2 * dim):
         work.given[2 * dim + i] = work.given[i]
-
-
-def longest_step(h, method, control, work):
-    """The longest step of the grid that is not above h."""
-    work.places[0] = index_below(method.grid, work.places[0], h)
-    return min(h, method.grid[work.places[0]])
 
 
 def step(problem, t, h, method, work, counts):

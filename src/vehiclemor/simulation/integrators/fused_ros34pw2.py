@@ -19,7 +19,7 @@ from vehiclemor.simulation.integrators.structures import (
 
 ALPHA = 8
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step")
+INLINED = ("accept", "step")
 
 
 def work_space(buffer, first, integers, dim, inputs):
@@ -54,11 +54,6 @@ def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span; no inverse is loaded."""
     rhs(problem, t, work.y, work.f)
     work.places[0], work.places[1] = len(method.grid) // 2, -1
-
-
-def longest_step(h, method, control, work):
-    """Any step size will do: the operator of a step a little longer serves."""
-    return h
 
 
 def load_inverse(inverse, dim, given):

@@ -140,7 +140,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
     a status, the time, the step size for what follows and the number of the next sample.
     """
     y, f, (t, end) = work.y, work.f, times
-    samples, path, counts = output.samples, output.path, output.counts
+    counts = output.counts
     begin(problem, t, method, work)
     counts[RHS_CALLS] += 1
     if h <= 0.0:
@@ -182,22 +182,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
             continue
         counts[STEPS] += 1
         accept(problem, t, h, method, work, counts)
-        reached = t + h + 1e-12 * (1.0 + abs(t))
-        if sample < len(samples) and samples[sample] <= reached:
-            prepare_curve(h, work)
-            first = sample
-            while sample < len(samples) and samples[sample] <= reached:
-                sample += 1
-            own = first
-            if len(output.places) and sample - first > NODES + 1 and t >= output.direct_until:
-                # At the end of a span inputs may jump.
-                at_end = samples[sample - 1] >= end - 1e-9 * (1.0 + abs(end))
-                own = sample - 1 if at_end else sample
-                record_step(problem, (t, h), first, own, work, output)
-            for k in range(own, sample):
-                interpolate((samples[k] - t) / h, h, work)
-                lift(problem, work.middle, path[next_point(output, k)])
-                record_sample(output, k)
+        sample = record_samples(problem, (t, h, end), work, output, sample)
         # Proportional and integral control: Hairer, Wanner, Solving ODEs II (1996), section IV.2.
         error = max(error, 1e-10)
         factor = control.safety * error**-control.exponent * before**control.memory_exponent
@@ -225,6 +210,29 @@ def next_point(output, sample):
         return sample
     row, part = int(output.places[sample - 1, 0]), output.places[sample - 1, 1]
     return row + (1 if part < 0.0 else NODES)
+
+
+def record_samples(problem, step, work, output, sample):
+    """Samples within a step (time and length in s, end of its span); returns what comes next."""
+    t, h, end = step
+    samples, first = output.samples, sample
+    reached = t + h + 1e-12 * (1.0 + abs(t))
+    while sample < len(samples) and samples[sample] <= reached:
+        sample += 1
+    if sample == first:
+        return sample
+    prepare_curve(h, work)
+    own = first
+    if len(output.places) and sample - first > NODES + 1 and t >= output.direct_until:
+        # At the end of a span inputs may jump.
+        at_end = samples[sample - 1] >= end - 1e-9 * (1.0 + abs(end))
+        own = sample - 1 if at_end else sample
+        record_step(problem, (t, h), first, own, work, output)
+    for k in range(own, sample):
+        interpolate((samples[k] - t) / h, h, work)
+        lift(problem, work.middle, output.path[next_point(output, k)])
+        record_sample(output, k)
+    return sample
 
 
 def record_sample(output, sample):

@@ -1,17 +1,18 @@
 """The exponential method for a full model: a whole step is one kernel.
 
-See `step_text.exponential_step`.
+See `step_text.exponential_step`; what is not here is as in `fused_etdrk4`.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.etdrk4 import quadrature_weights
-from vehiclemor.simulation.integrators.step_grid import index_below, nearest_index
+from vehiclemor.simulation.integrators.fused_etdrk4 import keep_past
+from vehiclemor.simulation.integrators.step_grid import nearest_index
 from vehiclemor.simulation.integrators.structures import FUSED_STEP, RHS_CALLS, Work
 
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step", "keep_past")
+INLINED = ("step",)
 
 
 def work_space(buffer, first, integers, dim, inputs):
@@ -49,19 +50,6 @@ def begin(problem, t, method, work):
     keep_past(work)
 
 
-def keep_past(work):
-    """Copy state and right-hand side to where the kernel looks for those of the step before."""
-    dim = len(work.y)
-    for i in range(2 * dim):
-        work.given[2 * dim + i] = work.given[i]
-
-
-def longest_step(h, method, control, work):
-    """The longest step of the grid that is not above h."""
-    work.places[0] = index_below(method.grid, work.places[0], h)
-    return min(h, method.grid[work.places[0]])
-
-
 def step(problem, t, h, method, work, counts):
     """Try a step; it is always possible."""
     given, values, u = work.given, work.values, problem.u
@@ -81,9 +69,3 @@ def step(problem, t, h, method, work, counts):
     call_kernel(equations.kernels, FUSED_STEP, given, tables, equations.constants, work.result)
     counts[RHS_CALLS] += 4
     return True
-
-
-def accept(problem, t, h, method, work, counts):
-    """Keep the beginning of the step for the next one's estimate of the error."""
-    keep_past(work)
-    work.memory[0] = h

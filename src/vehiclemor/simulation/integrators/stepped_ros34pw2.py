@@ -1,7 +1,9 @@
-"""The W-method for a full model: a whole step is one kernel, see `step_text.w_step`."""
+"""The W-method for a full model: a whole step is one kernel, see `step_text.w_step`.
+
+What is not here is as in `ros34pw2`.
+"""
 
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
-from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.step_grid import index_above
 from vehiclemor.simulation.integrators.structures import (
@@ -13,7 +15,7 @@ from vehiclemor.simulation.integrators.structures import (
 
 ALPHA = 8
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step")
+INLINED = ("step",)
 
 
 def work_space(buffer, first, integers, dim, inputs):
@@ -42,17 +44,6 @@ def work_space(buffer, first, integers, dim, inputs):
     )
 
 
-def begin(problem, t, method, work):
-    """Right-hand side at the beginning of a span."""
-    rhs(problem, t, work.y, work.f)
-    work.places[0] = len(method.grid) // 2
-
-
-def longest_step(h, method, control, work):
-    """Any step size will do: the operator of a step a little longer serves."""
-    return h
-
-
 def step(problem, t, h, method, work, counts):
     """Try a step; it is always possible."""
     given, values, u = work.given, work.values, problem.u
@@ -67,9 +58,3 @@ def step(problem, t, h, method, work, counts):
     counts[RHS_CALLS] += 3
     counts[LINEAR_SOLVES] += 4
     return True
-
-
-def accept(problem, t, h, method, work, counts):
-    """Right-hand side at the end of the step."""
-    rhs(problem, t + h, work.new, work.f_new)
-    counts[RHS_CALLS] += 1

@@ -272,7 +272,7 @@ def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
 
 
 def test_sweeps_bring_reduced_runs_nearer_to_the_training_runs(vehicle: Any) -> None:
-    rough = replace(fitted(vehicle, sweeps=0), solver="dopri5", tolerance=1e-7)
+    rough = replace(fitted(vehicle, sweeps=0, ridge=1e-6), solver="dopri5", tolerance=1e-7)
     runs = [TrainingRun(vehicle, lane_change.perturbed(1.0, a), "equilibrium") for a in (0.8, 1.2)]
     goals = targets(rough, runs, [run.at(run.maneuver.times) for run in runs])
     k = rough.features.states
