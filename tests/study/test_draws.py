@@ -1,6 +1,5 @@
 """Sealed draws: what they depend on, what they hold, what is kept of them."""
 
-import json
 import math
 from dataclasses import replace
 
@@ -14,11 +13,13 @@ from scipy.stats import binom
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.report.predictive.equal_error import at_error
 from vehiclemor.report.predictive.rates import upper_bound
+from vehiclemor.resources import data_names
 from vehiclemor.study.plans.boxes import drawn
 from vehiclemor.study.plans.choice import Row, outcomes
-from vehiclemor.study.plans.ledger import Drawn, ledger, pooled, record
+from vehiclemor.study.plans.ledger import Drawn, Ledger, Shown, pooled
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_file import Bound, Box, Draw
+from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.seal import seal, sealed_sets
 from vehiclemor.study.plans.sensitive import _lifted, reasons
 
@@ -82,35 +83,82 @@ def test_whatever_is_tested_changes_the_seal(protocol, rows):
     validated = replace(protocol, sets=protocol.sets | {"validation": ()})
     seals = {first, seal(protocol, other), seal(protocol, learned)}
     assert len(seals | {seal(judged, rows), seal(validated, rows)}) == 5
-    # Who wins is not tested: times differ from machine to machine.
-    assert seal(protocol, [replace(row, winner=True) for row in rows]) == first
+    assert seal(protocol, [replace(row, winner=True) for row in rows]) != first
+    assert seal(replace(protocol, path=protocol.path.with_name("other.toml")), rows) != first
+    # A list for other ends can't strike runs from a draw.
+    drawn_runs = sealed_sets(protocol, first)["drawn"]
+    listed = replace(protocol, sets=protocol.sets | {"outside": drawn_runs})
+    assert seal(listed, rows) == first
+    assert sealed_sets(listed, first)["drawn"] == drawn_runs
 
 
-def test_drawn_sets_are_apart_from_all_others(protocol, rows):
+def test_drawn_sets_are_apart_from_what_was_learned(protocol, rows):
     sets = sealed_sets(protocol, seal(protocol, rows))
     assert {name: len(runs) for name, runs in sets.items()} == {"drawn": 5, "drawn_outside": 2}
-    keys = [run.run_key for runs in (*protocol.sets.values(), *sets.values()) for run in runs]
+    learned = [protocol.sets[name] for name in ("training", "validation")]
+    keys = [run.run_key for runs in (*learned, *sets.values()) for run in runs]
     assert len(set(keys)) == len(keys)
 
 
-def entry(digest, misses=0, runs=299, label="fast"):
-    row = {"misses": misses, "silent": misses, "flagged": 0}
-    return Drawn(f"2026-01-0{digest}", "v", "car", digest, runs, 0, {label: row})
+def test_nothing_is_drawn_before_it_stands_in_the_ledger(tmp_path, protocol_text, monkeypatch):
+    path = tmp_path / "small.toml"
+    path.write_text(protocol_text)
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.test", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_protocol(load_protocol(str(path)), tmp_path)
+    (draw,) = Ledger("small", tmp_path, own=False).entries()
+    assert (draw.runs, draw.rows) == (0, {})
+
+
+def entry(digest, misses=0, runs=299, rules="r"):
+    row = Shown("m", {}, True, misses, misses, 0, {"yaw": 1e-5})
+    return Drawn(f"2026-01-0{digest}", "v", "car", digest, rules, runs, 0, {"fast": row})
 
 
 def test_the_ledger_keeps_every_draw(tmp_path):
-    for draw in (entry("2", misses=7), entry("1"), entry("2"), entry("3", runs=100)):
-        record(draw, "car", tmp_path, own=False)
-    found = ledger("car", tmp_path, own=False)
+    ledger = Ledger("car", tmp_path, own=False)
+    for draw in (entry("2", misses=7), entry("1"), entry("2", misses=7), entry("3", runs=100)):
+        ledger.open(draw)
+        ledger.record(draw)
+    found = ledger.entries()
     # Neither order nor a second try of the same draw changes what stands there.
     assert [draw.digest for draw in found] == ["1", "2", "3"]
-    assert pooled(found, "fast") == (7, 7, 698)
-    assert pooled(found, "slow") == (0, 0, 0)
+    assert pooled(found, "fast", "r") == (7, 7, 698)
+    assert pooled(found, "slow", "r") == (0, 0, 0)
+    assert len((tmp_path / "draws" / "car.jsonl").read_text().splitlines()) == 3
+
+
+def test_a_draw_that_was_opened_stays_until_it_is_evaluated(tmp_path):
+    ledger = Ledger("car", tmp_path, own=False)
+    ledger.open(entry("1"))
+    assert [(draw.digest, draw.runs, draw.rows) for draw in ledger.entries()] == [("1", 0, {})]
+    ledger.record(entry("1", misses=2))
+    assert [draw.rows["fast"].misses for draw in ledger.entries()] == [2]
+    ledger.open(entry("1"))
+    # Another result of the same draw does not replace the first.
+    ledger.record(entry("1", misses=0))
+    assert [draw.rows["fast"].misses for draw in ledger.entries()] == [2, 0]
+
+
+def test_draws_under_other_rules_are_not_pooled(tmp_path):
+    ledger = Ledger("car", tmp_path, own=False)
+    for draw in (entry("1", misses=3), entry("2", runs=5000, rules="easy")):
+        ledger.record(draw)
+    assert pooled(ledger.entries(), "fast", "r") == (3, 3, 299)
+
+
+@pytest.mark.parametrize("line", ["{}", "half", '{"date": 1}'])
+def test_a_damaged_ledger_is_named(tmp_path, line):
+    ledger = Ledger("car", tmp_path, own=False)
+    ledger.record(entry("1"))
     path = tmp_path / "draws" / "car.jsonl"
-    assert len(path.read_text().splitlines()) == 3
-    path.write_text("{}")
+    path.write_text(path.read_text() + line)
     with pytest.raises(FileError, match="not a ledger of draws"):
-        ledger("car", tmp_path, own=False)
+        ledger.entries()
 
 
 @given(st.integers(0, 40), st.integers(1, 400))
@@ -206,11 +254,8 @@ def test_boxes_are_checked_when_a_protocol_is_read(tmp_path, protocol_text):
             load_protocol(str(path))
 
 
-def test_the_ledger_of_the_package_can_be_read():
-    from vehiclemor.resources import data_folder
-
-    for path in (data_folder() / "draws").glob("*.jsonl"):
-        for line in path.read_text().splitlines():
-            draw = Drawn(**json.loads(line))
-            assert len(draw.digest) == 64
-            assert draw.runs > 0
+@pytest.mark.parametrize("name", data_names("protocols"))
+def test_the_ledger_of_the_package_can_be_read(name, tmp_path):
+    for draw in Ledger(name, tmp_path, own=True).entries():
+        assert len(draw.digest) == len(draw.rules) == 64
+        assert draw.model == name

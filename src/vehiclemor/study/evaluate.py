@@ -193,7 +193,7 @@ def _tested(
             return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
-        trajectory = _sound(model, reduced, scenario, start)
+        trajectory = _remarked(model, experiment, _sound(model, reduced, scenario, start))
         nearest = reduced.best_approximation(reference.states)
         if nearest is None:
             return Outcome(trajectory, reference)
@@ -214,6 +214,15 @@ def _warned(
     if run.trust or component("method", experiment.method).own_limits:
         return run
     return run.judged(input_range(model, experiment.training).trust(model, scenario))
+
+
+def _remarked(model: Model, experiment: Experiment, run: Trajectory) -> Trajectory:
+    """A run with a remark where a protocol would not trust it; its status is the method's own."""
+    warned = _warned(model, experiment, experiment.test[0], run)
+    if warned.status == run.status:
+        return run
+    told = f"not to be trusted {warned.message}"
+    return replace(run, remark="; ".join(part for part in (run.remark, told) if part))
 
 
 def _estimate(model: Model, run: Trajectory) -> ErrorEstimate | None:

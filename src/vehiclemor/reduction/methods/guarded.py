@@ -92,9 +92,10 @@ class GuardedModel(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The fast run; from where it can't be trusted on, the safe one."""
         run = self.ahead.simulate(maneuver, start)
-        if run.status == "ok":
+        if run.status == "ok" and run.trust:
             return run
-        trust = run.trust or Trust(np.inf)
+        # A model that does not judge itself is trusted nowhere.
+        trust = run.trust or Trust(np.inf, 0.0, "the fast model does not judge itself")
         # A run that has failed without a warning is trusted nowhere.
         known = trust.until if np.isfinite(trust.until) else -np.inf
         kept = int(np.searchsorted(run.time, known - self.back)) - 1

@@ -15,7 +15,7 @@ from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
-from vehiclemor.study.plans.ledger import Drawn, ledger, pooled
+from vehiclemor.study.plans.ledger import Drawn, Ledger, pooled
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_file import Bound, ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part
@@ -45,11 +45,11 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
         protocol = protocol_of(dataset)
         models.append(protocol.model)
         name = str(dataset.attrs["study"]).removeprefix(f"{STUDY}-")
-        draws = ledger(name, folder, bool(dataset.attrs["own"]))
+        draws = Ledger(name, folder, bool(dataset.attrs["own"])).entries()
         methods = method_rows(dataset, protocol, draws)
         rows += methods
         rows += target_rows(dataset, protocol, methods)
-        rows += [_draw_row(entry) for entry in draws]
+        rows += [_draw_row(entry, dataset) for entry in draws]
     if study == STUDY:
         rows += paper_terms_rows(models, folder)
     return pd.DataFrame(rows)
@@ -84,7 +84,7 @@ def method_rows(
     ]
     for row in rows:
         row.update(_against(row, full, ladders))
-        misses, silent, runs = pooled(draws or (), row["method"])
+        misses, silent, runs = pooled(draws or (), row["method"], dataset.attrs.get("rules", ""))
         row |= {"pooled_misses": misses, "pooled_silent": silent, "pooled_runs": runs}
         row["pooled_bound"] = upper_bound(misses, runs) if runs else math.nan
     return rows
@@ -214,18 +214,19 @@ def chosen(rows: list[Row]) -> Row | None:
     return next((row for row in rows if row["winner"]), None)
 
 
-def _draw_row(entry: Drawn) -> Row:
+def _draw_row(entry: Drawn, dataset: xr.Dataset) -> Row:
     """A draw of the ledger: of the contender that was chosen then."""
-    label, row = next(
-        ((name, row) for name, row in entry.rows.items() if row.get("winner")), ("", {})
-    )
+    label, row = next(((n, r) for n, r in entry.rows.items() if r.winner), ("", None))
+    counts = ("misses", "silent", "flagged")
     return {
         "kind": "draw",
         "model": entry.model,
         "method": label,
         "date": entry.date,
         "digest": entry.digest,
+        "shown": entry.digest == dataset.attrs["digest"],
+        "same_rules": entry.rules == dataset.attrs["rules"],
         "runs": entry.runs,
         "apart": entry.apart,
-        **{name: row.get(name) for name in ("misses", "silent", "flagged")},
+        **{name: getattr(row, name) if row else math.nan for name in counts},
     }

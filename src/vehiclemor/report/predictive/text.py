@@ -126,16 +126,20 @@ def _costs(row: Row, notes: Footnotes) -> list[str]:
 
 
 def _draw_text(draws: list[Row], winner: Row | None) -> str:
-    """The draws so far, and what they say together."""
-    if not draws or winner is None:
+    """The draw that is shown, and what all under the same rules say together."""
+    shown = [row for row in draws if row["shown"] and row["runs"]]
+    if not shown or winner is None:
         return ""
-    last = draws[-1]
+    last = shown[-1]
+    same = [row for row in draws if row["same_rules"]]
+    silent = sum(not row["runs"] for row in same)
     runs, apart = (f"{last[name]:.0f}" for name in ("runs", "apart"))
-    missed, silent, of = (f"{winner[f'pooled_{n}']:.0f}" for n in ("misses", "silent", "runs"))
+    missed, unsaid, of = (f"{winner[f'pooled_{n}']:.0f}" for n in ("misses", "silent", "runs"))
     text = (
         f"{runs} runs drawn on {str(last['date'])[:10]} (seal {str(last['digest'])[:10]}), {apart} "
-        f"more apart, on which the full order is sensitive. All {len(draws)} draws of the ledger "
-        f"together: {missed} misses, {silent} of them silent, of {of} runs of {winner['method']}: "
-        f"a rate below {short(100.0 * winner['pooled_bound'])} %."
+        f"more apart, on which the full order is sensitive. {len(same)} draws under these rules "
+        f"stand in the ledger, {silent} of them not finished; in all together {winner['method']} "
+        f"has {missed} misses, {unsaid} of them silent, of {of} runs: a rate below "
+        f"{short(100.0 * winner['pooled_bound'])} %."
     )
     return wrapped(text, 2, 2)

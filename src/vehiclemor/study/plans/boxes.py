@@ -83,5 +83,6 @@ def _check_corners(model: Model, box: Box) -> None:
             raise unknown(f"start of {model.name}", start, model.starts)
     for frequency in box.frequency:
         for speed in box.speed or [None]:
-            corner = maneuver.perturbed(frequency, box.amplitude[1])
-            check(model, Scenario(corner, (box.start or model.starts)[0], speed))
+            for amplitude in box.amplitude:
+                corner = maneuver.perturbed(frequency, amplitude)
+                check(model, Scenario(corner, (box.start or model.starts)[0], speed))

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # Scores nearer to each other than this share are a tie, which the cheaper candidate wins.
 TIE = 0.05
+# The same of times, which scatter.
+TIE_OF_TIMES = 0.2
 # Part of the bounds that a candidate may use up in validation, and the contender that is chosen:
 # the test has more runs, and its worst is worse.
 MARGIN, MARGIN_OF_CHOSEN = 0.5, 0.8

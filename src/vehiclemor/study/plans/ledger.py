@@ -6,47 +6,70 @@ committed; what an installed package draws stands in the results folder alone.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from vehiclemor.codegen.process_lock import locked
 from vehiclemor.errors import FileError
 from vehiclemor.files import write_text
 from vehiclemor.resources import checkout_data, data_folder
 
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
 FOLDER = "draws"
 
 
 @dataclass(frozen=True)
+class Shown:
+    """What a draw has shown of one reduced model: its misses, and its worst errors by output."""
+
+    method: str
+    settings: dict[str, int | float | str]
+    winner: bool
+    misses: int
+    silent: int
+    flagged: int
+    worst: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Drawn:
-    """What a sealed draw has shown.
+    """A sealed draw.
 
     Attributes
     ----------
     date, version
-        When, and with which versions.
-    digest
-        Seal of the draw.
+        When it was opened, and with which versions.
+    digest, rules
+        Seal of the draw; hash of its bounds, boxes and rule of sensitive runs.
     runs, apart
-        Runs that are judged, and those on which the full order is sensitive.
+        Runs that are judged, and those on which the full order is sensitive; none of a draw that
+        was opened and never evaluated.
     rows
-        Label of a row -> method, settings, misses, silent ones, runs flagged, worst errors.
+        Label -> what it has shown.
     """
 
     date: str
     version: str
     model: str
     digest: str
+    rules: str
     runs: int
     apart: int
-    rows: dict[str, dict[str, Any]]
+    rows: dict[str, Shown]
+
+    @property
+    def result(self) -> tuple:
+        """What two evaluations of one draw must agree in."""
+        counts = {name: (r.misses, r.silent, r.flagged) for name, r in self.rows.items()}
+        return self.digest, self.runs, self.apart, counts
 
 
-def ledger(name: str, folder: Path, own: bool) -> list[Drawn]:
-    """All draws of a protocol, oldest first.
+class Ledger:
+    """The files of a protocol's ledger.
 
     Parameters
     ----------
@@ -57,29 +80,46 @@ def ledger(name: str, folder: Path, own: bool) -> list[Drawn]:
     own
         Whether the protocol is one of the package's.
     """
-    found: dict[str, Drawn] = {}
-    for path in _files(name, folder, data_folder() if own else None):
-        found |= {entry.digest: entry for entry in _entries(path) if entry.digest not in found}
-    return sorted(found.values(), key=lambda entry: entry.date)
+
+    def __init__(self, name: str, folder: Path, own: bool) -> None:
+        self._written = _files(name, folder, checkout_data() if own else None)
+        self._read = _files(name, folder, data_folder() if own else None)
+
+    def entries(self) -> list[Drawn]:
+        """All draws, oldest first."""
+        found: list[Drawn] = []
+        for path in self._read:
+            known = [entry.result for entry in found]
+            found += [entry for entry in _entries(path) if entry.result not in known]
+        return sorted(found, key=lambda entry: entry.date)
+
+    def open(self, entry: Drawn) -> None:
+        """Say that a draw is about to be evaluated, before anything of it is."""
+        self._add(replace(entry, runs=0, apart=0, rows={}))
+
+    def record(self, entry: Drawn) -> None:
+        """Add what a draw has shown; another result of the same draw stands beside the first."""
+        self._add(entry)
+
+    def _add(self, entry: Drawn) -> None:
+        for path in self._written:
+            with locked(path):
+                known = _entries(path)
+                same = [other for other in known if other.digest == entry.digest]
+                if entry.result in [other.result for other in same] or (same and not entry.rows):
+                    continue
+                # What was opened is completed.
+                kept = [other for other in known if other not in same or other.rows]
+                lines = [_adapter().dump_json(e).decode() for e in (*kept, entry)]
+                write_text(path, "\n".join(lines) + "\n")
 
 
-def record(entry: Drawn, name: str, folder: Path, own: bool) -> None:
-    """Add a draw to the ledgers; one that stands there already is the same draw."""
-    for path in _files(name, folder, checkout_data() if own else None):
-        with locked(path):
-            known = _entries(path)
-            if entry.digest in {other.digest for other in known}:
-                continue
-            lines = [json.dumps(asdict(e), sort_keys=True) for e in (*known, entry)]
-            write_text(path, "\n".join(lines) + "\n")
-
-
-def pooled(entries: Iterable[Drawn], row: str) -> tuple[int, int, int]:
-    """Misses, silent misses and runs of a row in all draws together."""
-    rows = [(entry.rows[row], entry.runs) for entry in entries if row in entry.rows]
+def pooled(entries: Iterable[Drawn], row: str, rules: str) -> tuple[int, int, int]:
+    """Misses, silent misses and runs of a row in all draws under the same rules."""
+    rows = [(e.rows[row], e.runs) for e in entries if row in e.rows and e.rules == rules]
     return (
-        sum(found["misses"] for found, _ in rows),
-        sum(found["silent"] for found, _ in rows),
+        sum(found.misses for found, _ in rows),
+        sum(found.silent for found, _ in rows),
         sum(runs for _, runs in rows),
     )
 
@@ -88,10 +128,18 @@ def _files(name: str, folder: Path, data: Path | None) -> Sequence[Path]:
     return [place / FOLDER / f"{name}.jsonl" for place in (folder, data) if place is not None]
 
 
+def _adapter() -> TypeAdapter[Drawn]:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Drawn)
+
+
 def _entries(path: Path) -> list[Drawn]:
     if not path.is_file():
         return []
     try:
-        return [Drawn(**json.loads(line)) for line in path.read_text().splitlines() if line]
-    except (ValueError, TypeError, OSError) as error:
-        raise FileError(f"{path}: not a ledger of draws ({error})") from None
+        lines = path.read_text().splitlines()
+        return [_adapter().validate_json(line, strict=True) for line in lines if line]
+    except (ValueError, OSError) as error:
+        told = str(error).splitlines()[0]
+        raise FileError(f"{path}: not a ledger of draws ({told})") from None

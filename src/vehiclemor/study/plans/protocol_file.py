@@ -53,11 +53,14 @@ class Group(FileSchema):
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
+Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
 class Box(FileSchema):
     """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
 
     maneuver: str = Field(description="registered name")
-    share: float = Field(1.0, gt=0.0, description="of the runs, against the other boxes' shares")
+    share: Limit = Field(1.0, description="of the runs, against the other boxes' shares")
     frequency: Range = Field([1.0, 1.0], description="factors, from and to")
     amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
     both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
@@ -140,7 +143,7 @@ class ProtocolFile(FileSchema):
     drawn_outside: Draw | None = Field(
         None, description="the same beyond the boxes: whether models warn"
     )
-    sensitive: dict[str, float] = Field(
+    sensitive: dict[str, Limit] = Field(
         default_factory=dict,
         description="output -> largest value of the full order's run in the first 10 s; beyond it "
         "(spin, rollover) a drawn run is reported apart",

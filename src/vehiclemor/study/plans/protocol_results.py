@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Container, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vehiclemor.study.plans.choice import Row, Validation, outcomes
-from vehiclemor.study.plans.ledger import Drawn
+from vehiclemor.study.plans.ledger import Drawn, Shown
 from vehiclemor.study.plans.protocol import FULL_ORDER, Protocol
-from vehiclemor.study.provenance import attributes
+from vehiclemor.study.plans.seal import rules
+from vehiclemor.study.provenance import attributes, versions
 from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
@@ -86,6 +87,7 @@ def protocol_dataset(
             evaluations=protocol.model.evaluations,
             configuration=protocol.definition.model_dump_json(),
             digest=digest,
+            rules=rules(protocol),
             own=int(protocol.own),
             drawn_on=datetime.now(UTC).isoformat(timespec="seconds"),
         )
@@ -118,38 +120,44 @@ def judged_part(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.isel(scenario=chosen)
 
 
+def opened(protocol: Protocol, digest: str) -> Drawn:
+    """A draw of which nothing has been seen yet."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return Drawn(now, versions(), protocol.model.name, digest, rules(protocol), 0, 0, {})
+
+
 def entry_of(dataset: xr.Dataset, protocol: Protocol) -> Drawn:
     """What the ledger keeps of a draw: every reduced model's misses, warnings and worst errors."""
-    part, bounds = judged_part(dataset), protocol.definition.bounds
-    rows: dict[str, dict[str, Any]] = {}
-    for label in part["row"].values:
-        row = part.sel(row=label)
-        if str(row["role"].item()) == FULL_ORDER:
-            continue
-        outcome = outcomes(row, bounds)
-        worst = {
-            output: float(row[f"{bound.measure}_error"].sel(output=output).max())
-            for output, bound in bounds.items()
-        }
-        rows[str(label)] = {
-            "method": str(row["method"].item()),
-            "settings": json.loads(str(row["settings"].item())),
-            "winner": bool(row["winner"]),
-            "misses": int(outcome.missed.sum()),
-            "silent": int(outcome.silent.sum()),
-            "flagged": int(outcome.flagged.sum()),
-            "worst": {k: float(f"{v:.4g}") for k, v in worst.items() if np.isfinite(v)},
-        }
+    part = judged_part(dataset)
     apart = dataset["apart"].values[dataset["scenario_set"].values == "drawn"]
-    runs, attrs = part.sizes["scenario"], dataset.attrs
-    return Drawn(
-        str(attrs["drawn_on"]),
-        str(attrs["versions"]),
-        protocol.model.name,
-        str(attrs["digest"]),
-        runs,
-        int((apart != "").sum()),
-        rows,
+    return replace(
+        opened(protocol, str(dataset.attrs["digest"])),
+        date=str(dataset.attrs["drawn_on"]),
+        version=str(dataset.attrs["versions"]),
+        runs=part.sizes["scenario"],
+        apart=int((apart != "").sum()),
+        rows={
+            str(label): _shown(part.sel(row=label), protocol)
+            for label in part["row"].values
+            if str(part["role"].sel(row=label).item()) != FULL_ORDER
+        },
+    )
+
+
+def _shown(row: xr.Dataset, protocol: Protocol) -> Shown:
+    outcome = outcomes(row, protocol.definition.bounds)
+    worst = {
+        output: float(row[f"{bound.measure}_error"].sel(output=output).max())
+        for output, bound in protocol.definition.bounds.items()
+    }
+    return Shown(
+        str(row["method"].item()),
+        json.loads(str(row["settings"].item())),
+        bool(row["winner"]),
+        int(outcome.missed.sum()),
+        int(outcome.silent.sum()),
+        int(outcome.flagged.sum()),
+        {output: float(f"{v:.4g}") for output, v in worst.items() if np.isfinite(v)},
     )
 
 

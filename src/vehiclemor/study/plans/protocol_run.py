@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.errors import FileError
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, Row, choose, validation_of
-from vehiclemor.study.plans.ledger import record
+from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
+from vehiclemor.study.plans.ledger import Ledger
 from vehiclemor.study.plans.protocol import CONTENDER, DRAWN, FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.plans.protocol_results import entry_of, protocol_dataset
+from vehiclemor.study.plans.protocol_results import entry_of, opened, protocol_dataset
 from vehiclemor.study.plans.seal import seal, sealed_sets
 from vehiclemor.study.plans.sensitive import reasons, second_run
 from vehiclemor.study.plans.study_file import file_as_stored
@@ -59,11 +60,19 @@ def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
     digest = seal(protocol, rows)
     sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
     sets |= sealed_sets(protocol, digest)
+    ledger = Ledger(protocol.path.stem, folder, protocol.own)
+    if "drawn" in sets:
+        # Nothing of a draw is seen before it stands in the ledger.
+        ledger.open(opened(protocol, digest))
     found = test(protocol.model, rows, sets, workers)
     apart = _sensitive(protocol, sets, workers)
+    if "drawn" in sets and all(apart["drawn"]):
+        raise FileError(
+            f"{protocol.path}: no drawn run can be judged, the first because {apart['drawn'][0]}"
+        )
     timed = timed_rows(protocol, rows, found, sets, folder)
     studies, keys = folder / "studies", sorted(workers.asked)
-    parts = [layout_digest(), protocol.definition.model_dump_json(), *keys]
+    parts = [layout_digest(), protocol.definition.model_dump_json(), digest, *keys]
     dataset = stored(
         studies / f"{protocol.study}.nc",
         "cells",
@@ -73,7 +82,7 @@ def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
         file_as_stored(protocol.path, folder),
     )
     if "drawn" in sets:
-        record(entry_of(dataset, protocol), protocol.path.stem, folder, protocol.own)
+        ledger.record(entry_of(dataset, protocol))
     return dataset
 
 
@@ -123,8 +132,9 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[R
     """The rows, one of them marked as chosen among the contenders, by validation alone.
 
     Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls
-    take the least time, by our clock, on the first scenarios of the validation set; if there is
-    none, the one of the smallest score.
+    take the least time, by our clock, on the first scenarios of the validation set, of times that
+    are nearly the same (`choice.TIE_OF_TIMES`) the more accurate; if there is none, the one of the
+    smallest score.
     """
     racing = [i for i, row in enumerate(rows) if row.contestant.role == CONTENDER]
     results = {i: rows[i].validation[rows[i].candidate] for i in racing}
@@ -139,7 +149,8 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[R
         every = np.ones((len(experiments), len(sample)), dtype=bool)
         timed = _timed(folder, f"timing-validation-{protocol.study}", experiments, every)
         seconds = timed["seconds"].mean("scenario").values
-        best = fitting[int(np.argmin(seconds))]
+        near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
+        best = min((fitting[k] for k in near), key=lambda i: results[i].score)
     elif fitting:
         best = fitting[0]
     return [replace(row, winner=index == best) for index, row in enumerate(rows)]
