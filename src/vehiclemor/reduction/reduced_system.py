@@ -90,10 +90,9 @@ class ReducedSystem(ShortRepr):
         return self.system.run(maneuver, state, self.spaces, how, direct_until)
 
     def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
-        """State of a start; kept where it is a named one."""
-        if not isinstance(start, str):
-            return self.encode(self.model.start(start), inputs)
-        key = start, inputs.tobytes()
+        """State of a start; kept by its name or its numbers."""
+        name = start if isinstance(start, str) else self.model.start(start).tobytes()
+        key = name, inputs.tobytes()
         found = self._starts.get(key)
         if found is None:
             if len(self._starts) >= MOST_STARTS:
@@ -102,7 +101,7 @@ class ReducedSystem(ShortRepr):
         return found
 
     @cached_property
-    def _starts(self) -> dict[tuple[str, bytes], np.ndarray]:
+    def _starts(self) -> dict[tuple[str | bytes, bytes], np.ndarray]:
         return {}
 
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:

@@ -22,6 +22,8 @@ from vehiclemor.simulation.trajectory import Trust
 
 # Part of a transient below which it needs no samples of its own.
 NEGLIGIBLE = 1e-4
+# Modes are known by differences: a smaller part of a deviation than this excites none.
+ROUNDING = 1e-7
 
 
 @dataclass(frozen=True)
@@ -114,10 +116,15 @@ class Lifting(ShortRepr):
         Parameters
         ----------
         deviation
-            Of the start's shape from straight running (n,); m is zero if there is none.
+            Of the start's shape from straight running (n,); m is zero if it excites none, as
+            straight running at another speed.
         """
-        rates = self.transient.rates if deviation.any() else self.transient.rates[:0]
-        amplitudes = self.transient.left[: len(rates)] @ deviation if len(rates) else rates
+        rates = amplitudes = self.transient.rates
+        if len(rates):
+            left = self.transient.left
+            amplitudes = left @ deviation
+            if (abs(amplitudes) <= ROUNDING * (abs(left) @ abs(deviation))).all():
+                rates = amplitudes = rates[:0]
         found = np.array([rates, amplitudes], dtype=complex)
         return np.stack([np.real(found), np.imag(found)], axis=2)
 
@@ -140,10 +147,11 @@ class Lifting(ShortRepr):
     ) -> tuple[np.ndarray, Trust | None]:
         """The same of a run and its inputs at the samples; of its rows only `run.rows` count."""
         held = run.kept.get("lifted")
-        if held is None or held.excited is not excited:
+        if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self._space((times, run.whole, inputs), excited, run.rows)
+            held = self._space((times, run.whole, inputs), excited.copy(), run.rows)
             run.kept["lifted"] = held
+        held.excited[:] = excited
         return self._lifted(held, run.rows)
 
     def _space(

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
@@ -21,6 +22,14 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
+
+
+class KnownStart(NamedTuple):
+    """A full state, what of the transient it excites, and until when (s)."""
+
+    state: np.ndarray
+    excited: np.ndarray
+    until: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,30 +136,30 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        (excited, until), inputs = self._excited(start), recorded_inputs(maneuver)[1]
-        run = self.equations.run(maneuver, start, direct_until=until)
-        states, trust = self.lift.of_run(run, inputs, excited)
+        known, inputs = self._known(start), recorded_inputs(maneuver)[1]
+        run = self.equations.run(maneuver, start, direct_until=known.until)
+        states, trust = self.lift.of_run(run, inputs, known.excited)
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
-            full = self.model.start(start)
-            states[0, : len(full)] = full
+            states[0, : len(known.state)] = known.state
         found = self.model.recorded(maneuver, run, inputs, states, trust)
         run.give_back()
         return found
 
-    def _excited(self, start: Start) -> tuple[np.ndarray, float]:
-        """What of the transient a start excites, and until when; kept where it is a named one."""
-        if isinstance(start, str) and start in self._starts:
-            return self._starts[start]
-        state = self.model.start(start)
-        excited = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
-        found = excited, decayed(excited)
-        if isinstance(start, str):
-            self._starts[start] = found
+    def _known(self, start: Start) -> KnownStart:
+        """A start with what it excites; kept by its name or its numbers."""
+        key = start if isinstance(start, str) else self.model.start(start).tobytes()
+        found = self._starts.get(key)
+        if found is None:
+            state = self.model.start(start)
+            excited = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+            if len(self._starts) >= MOST_STARTS:
+                self._starts.clear()
+            found = self._starts[key] = KnownStart(state, excited, decayed(excited))
         return found
 
     @cached_property
-    def _starts(self) -> dict[str, tuple[np.ndarray, float]]:
+    def _starts(self) -> dict[str | bytes, KnownStart]:
         return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vehiclemor.errors import InputError
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
@@ -44,7 +45,7 @@ def test_the_compiled_lifting_is_the_formula(reduced, start):
     model, maneuver = reduced.model, CARS[reduced.model.name].perturbed(1.2, 0.8)
     run, states = reduced.simulate(maneuver, start), lifted(reduced, maneuver, start)
     outputs = model.outputs_at(states, run.inputs)
-    excited, _ = reduced._excited(start)
+    excited = reduced._known(start).excited
     # At the samples themselves there is only rounding.
     path = reduced.path(maneuver, start)
     direct, _ = reduced.lift.states(maneuver.times, path, run.inputs, excited)
@@ -95,3 +96,57 @@ def test_a_run_tells_how_far_it_has_gone(reduced):
     }
     assert any(run.trust.reason.startswith(text) for text in named)
     assert run.message.startswith(f"from t = {run.trust.until:.4g} s on ")
+
+
+def at_speed(reduced: ReducedVehicle, start: str, speed: float) -> np.ndarray:
+    """State (2 n,) of a start at another speed."""
+    return build(reduced.model.name, overrides={"initial_speed": speed}).start(start)
+
+
+@pytest.mark.parametrize("speed", [18.0, 20.3, 22.0])
+def test_straight_running_at_another_speed_excites_nothing(reduced, speed):
+    known = reduced._known(at_speed(reduced, "equilibrium", speed))
+    assert known.excited.shape[1] == 0
+    assert known.until == 0.0
+    assert reduced._known(at_speed(reduced, "dropped", speed)).until > 0.0
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+def test_a_start_gives_one_run_by_its_name_and_by_its_numbers(reduced, start):
+    maneuver, state = CARS[reduced.model.name], reduced.model.start(start)
+    named = reduced.simulate(maneuver, start)
+    for given in (state, state.tolist(), state):
+        run = reduced.simulate(maneuver, given)
+        np.testing.assert_array_equal(run.states, named.states)
+        np.testing.assert_array_equal(run.outputs, named.outputs)
+
+
+def test_what_was_run_before_leaves_no_trace(reduced):
+    maneuver = CARS[reduced.model.name]
+    starts = [at_speed(reduced, s, v) for v in (18.0, 22.0) for s in ("dropped", "equilibrium")]
+    apart = [replace(reduced).simulate(maneuver, start).states for start in starts]
+    together = [reduced.simulate(maneuver, start).states for start in starts]
+    np.testing.assert_array_equal(together, apart)
+    # An array that is changed is another start.
+    state = starts[0].copy()
+    reduced.simulate(maneuver, state)
+    state[:] = starts[2]
+    np.testing.assert_array_equal(reduced.simulate(maneuver, state).states, apart[2])
+    with pytest.raises(InputError, match="shape"):
+        reduced.simulate(maneuver, state[None])
+
+
+def test_what_a_start_does_not_excite_is_not_missed(reduced):
+    """All modes with amplitudes of rounding, as if they were there, give the same states."""
+    maneuver, state = CARS[reduced.model.name], at_speed(reduced, "equilibrium", 18.0)
+    path, inputs = reduced.path(maneuver, state), maneuver.at(maneuver.times)
+    decay, deviation = (
+        reduced.transient,
+        reduced.shape.of(state[None])[0] - reduced.shape.reference,
+    )
+    found = np.array([decay.rates, decay.left @ deviation], dtype=complex)
+    every = np.stack([found.real, found.imag], axis=2)
+    assert every.shape[1] > 0
+    with_all, _ = reduced.lift.states(maneuver.times, path, inputs, every)
+    without, _ = reduced.lift.states(maneuver.times, path, inputs, reduced._known(state).excited)
+    np.testing.assert_allclose(without, with_all, rtol=1e-9, atol=1e-8)
