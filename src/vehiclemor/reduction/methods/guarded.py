@@ -95,7 +95,8 @@ class GuardedModel(ShortRepr):
         if run.status == "ok" and run.trust:
             return run
         # A model that does not judge itself is trusted nowhere.
-        trust = run.trust or Trust(np.inf, 0.0, "the fast model does not judge itself")
+        silent = run.message or "the fast model does not judge itself"
+        trust = run.trust or Trust(np.inf, 0.0, silent)
         # A run that has failed without a warning is trusted nowhere.
         known = trust.until if np.isfinite(trust.until) else -np.inf
         kept = int(np.searchsorted(run.time, known - self.back)) - 1
