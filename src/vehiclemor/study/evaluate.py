@@ -115,7 +115,7 @@ def reference_run(model: Model, scenario: Scenario) -> Trajectory:
 
 
 # More than the scenarios of any protocol, each of which is simulated with every candidate.
-kept_reference = lru_cache(maxsize=128)(reference_run)
+kept_reference = lru_cache(maxsize=1024)(reference_run)
 
 
 def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
