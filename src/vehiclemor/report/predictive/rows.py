@@ -14,6 +14,7 @@ from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
 from vehiclemor.simulation.trajectory import FINISHED
+from vehiclemor.study.plans.calibration import covered
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.ledger import Drawn, Ledger, pooled
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -185,8 +186,8 @@ def _covered(part: xr.Dataset, bounds: Mapping[str, Bound]) -> str:
         error = part[f"{bound.measure}_error"].sel(output=output).values
         known = np.isfinite(estimate) & np.isfinite(error) & (error > 0.0)
         if known.any():
-            ratios = estimate[known] / error[known]
-            found[output] = float((ratios >= 1.0).mean()), float(np.median(ratios))
+            estimate, error = estimate[known], error[known]
+            found[output] = float(covered(estimate, error)), float(np.median(estimate / error))
     return json.dumps(found)
 
 
@@ -207,11 +208,6 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
         "ratio_within": ratio(best, row),
         "break_even": row["offline_seconds"] / saved if saved > 0.0 else math.inf,
     }
-
-
-def chosen(rows: list[Row]) -> Row | None:
-    """The contender that validation has chosen."""
-    return next((row for row in rows if row["winner"]), None)
 
 
 def _draw_row(entry: Drawn, dataset: xr.Dataset) -> Row:

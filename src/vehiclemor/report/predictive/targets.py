@@ -27,9 +27,14 @@ def ratio(other: Row | None, row: Row) -> float:
     return other["seconds"] / row["seconds"] if other and row["seconds"] > 0.0 else math.nan
 
 
+def chosen(rows: list[Row]) -> Row | None:
+    """The contender that validation has chosen."""
+    return next((row for row in rows if row["winner"]), None)
+
+
 def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row]) -> list[Row]:
     """What the chosen one must reach: misses, warnings, ratios, the straight line."""
-    winner = next((row for row in methods if row["winner"]), None)
+    winner = chosen(methods)
     if winner is None:
         return []
     runs = f"of {winner['runs']} runs"

@@ -8,7 +8,7 @@ import pandas as pd
 from vehiclemor.report.criteria.finding import OWN
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.paper_terms import paper_terms_text
-from vehiclemor.report.predictive.targets import Row
+from vehiclemor.report.predictive.targets import Row, chosen
 from vehiclemor.report.printing import Footnotes, Line, fixed, short, table_text, terms, wrapped
 from vehiclemor.report.verdicts import LARGEST_SPREAD, NOT_COMPARABLE, counted
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -50,7 +50,7 @@ def predictive_text(rows: pd.DataFrame) -> str:
 
 def _model_text(model: str, rows: list[Row]) -> str:
     methods, draws, notes = _of_kind(rows, "method"), _of_kind(rows, "draw"), Footnotes()
-    winner = next((row for row in methods if row["winner"]), None)
+    winner = chosen(methods)
     lines = [f"{model}: {methods[0]['runs']:.0f} runs"]
     lines += [_target_table(_of_kind(rows, "target"), notes)]
     lines += [_error_table(winner, notes) if winner else ""]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -128,6 +129,7 @@ def _files(name: str, folder: Path, data: Path | None) -> Sequence[Path]:
     return [place / FOLDER / f"{name}.jsonl" for place in (folder, data) if place is not None]
 
 
+@cache
 def _adapter() -> TypeAdapter[Drawn]:
     from pydantic import TypeAdapter
 
