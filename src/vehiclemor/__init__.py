@@ -4,6 +4,7 @@ The names below are all that a user needs; each is imported when it is first use
 `import vehiclemor` costs next to nothing.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,6 +22,15 @@ if TYPE_CHECKING:
     from vehiclemor.errors import VehiclemorError as VehiclemorError
 
 __version__ = "0.1.0"
+# Name -> module that defines it.
+_DEFINED_IN = {
+    **dict.fromkeys(
+        ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
+        "vehiclemor.api",
+    ),
+    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    "VehiclemorError": "vehiclemor.errors",
+}
 __all__ = [
     "VehiclemorError",
     "compare",
@@ -38,15 +48,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name == "VehiclemorError":
-        from vehiclemor.errors import VehiclemorError
-
-        return VehiclemorError
-    if name in __all__:
-        from vehiclemor import api
-
-        return getattr(api, name)
-    raise AttributeError(f"module 'vehiclemor' has no attribute {name!r}")
+    if name not in _DEFINED_IN:
+        raise AttributeError(f"module 'vehiclemor' has no attribute {name!r}")
+    return getattr(import_module(_DEFINED_IN[name]), name)
 
 
 def __dir__() -> list[str]:

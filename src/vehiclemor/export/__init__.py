@@ -1,0 +1,1 @@
+"""Models as text and packages for other tools, printed from the one program."""

@@ -1,0 +1,1 @@
+"""Models in use: reduced or full, stepped, saved and run in batches."""
