@@ -15,6 +15,7 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
 from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach, overstayed
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.run_plans import Run
@@ -63,6 +64,7 @@ class LiftingSpace(NamedTuple):
     states: np.ndarray
     largest: np.ndarray
     first: np.ndarray
+    told: np.ndarray
     calls: tuple[tuple[Prepared, tuple[int, ...]], ...]
 
 
@@ -82,6 +84,8 @@ class Lifting(ShortRepr):
         Where the shape stands in the states.
     transient
         What is added to the shapes.
+    reach
+        What the training runs have shown.
     """
 
     features: Features
@@ -90,6 +94,7 @@ class Lifting(ShortRepr):
     reference: np.ndarray
     layout: Layout
     transient: Transient
+    reach: TrainingReach = NOTHING_KNOWN
 
     @cached_property
     def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
@@ -175,32 +180,43 @@ class Lifting(ShortRepr):
         largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
         lifted = _loops()["lifted"].prepared(path, inputs, *kernel, states, largest, first)
         calls.append((lifted, ("path", "inputs", "states")))
+        lasted, told = self.reach.lasted, np.array([0.0, np.inf])
+        if len(lasted):
+            given = (times, states, self.layout.size, lasted, np.empty_like(lasted), told)
+            calls.append((_loops()["durations"].prepared(*given), ("times", "states")))
         counted = tuple(
             (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
         )
-        return LiftingSpace(excited, times, states, largest, first, counted)
+        return LiftingSpace(excited, times, states, largest, first, told, counted)
 
     def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
         for call, places in space.calls:
             for place in places:
                 call.words[place] = rows
             call()
-        return space.states, self._trust(
-            space.times, rows, space.largest.tolist(), space.first.tolist()
-        )
+        return space.states, self._trust(space, rows)
 
-    def _trust(
-        self, times: np.ndarray, rows: int, largest: list[float], first: list[int]
-    ) -> Trust | None:
+    def _trust(self, space: LiftingSpace, rows: int) -> Trust | None:
         """How far a run has gone; none if nothing tells."""
+        largest, first = space.largest.tolist(), space.first.tolist()
         if not largest:
             return None
-        sample = min(first)
-        if sample == rows:
-            return Trust(max(largest))
-        name = self.features.watched[first.index(sample)][1]
-        reason = f"{name} leaves what the training runs have covered"
-        return Trust(max(largest), float(times[sample]), reason)
+        longest, moving = space.told.tolist()
+        alive = self.reach.alive(space.excited, moving) if moving < np.inf else 0.0
+        told, sample, times = [], min(first), space.times[:rows]
+        if sample < rows:
+            name = self.features.watched[first.index(sample)][1]
+            told.append(
+                (float(times[sample]), f"{name} leaves what the training runs have covered")
+            )
+        if longest > 1.0:
+            sizes = np.abs(space.states[:rows, self.layout.size :])
+            since, column = overstayed(times, sizes, self.reach.lasted)
+            name = self.features.watched[column][1]
+            told.append((since, f"{name} lasts longer, or is longer ago, than in any training run"))
+        if alive > 1.0:
+            told.append((moving, "it moves sideways before what its start excites has decayed"))
+        return Trust(max(*largest, longest, alive), *min(told, default=()))
 
 
 def decayed(excited: np.ndarray) -> float:
@@ -210,4 +226,6 @@ def decayed(excited: np.ndarray) -> float:
 
 
 def _loops() -> Mapping[str, Loop]:
-    return loops((*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted"))
+    return loops(
+        (*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted", "durations")
+    )

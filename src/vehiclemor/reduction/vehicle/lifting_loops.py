@@ -8,6 +8,8 @@ from vehiclemor.simulation.path_loops import kernel_path, lane_path
 
 # What has decayed to this part of what it was is nothing.
 NOTHING = 1e-14
+# Parts of a range in which time is counted, and below which nothing moves.
+LEVELS, MOVING = 8, 0.02
 
 
 def with_decay(
@@ -74,4 +76,35 @@ def lifted(
                 if size > 1.0 and not largest[k] > 1.0:
                     first[k] = sample
                 largest[k] = size
+    return 0
+
+
+def durations(
+    times: Vector, states: Matrix, column: Int, lasted: Matrix, spent: Matrix, told: Vector
+) -> Int:
+    """How long columns, from one on, are beyond each level, and that time's integral up to the end.
+
+    Both have a row for each column, the integrals the later ones.  Told is the largest part spent
+    of what is known to have lasted, and the first time at which a column moves.
+    """
+    columns, end = len(spent) // 2, times[len(times) - 1]
+    told[0], told[1] = 0.0, math.inf
+    for row in range(2 * columns):
+        for level in range(LEVELS):
+            spent[row, level] = 0.0
+    for sample in range(len(times)):
+        span = times[sample] - times[sample - 1] if sample else 0.0
+        later = span * (end - times[sample] + span)
+        for k in range(columns):
+            size = abs(states[sample, column + k])
+            if size > MOVING:
+                told[1] = min(told[1], times[sample])
+                level = int(LEVELS * size) if size < 1.0 else LEVELS - 1
+                spent[k, level] += span
+                spent[columns + k, level] += later
+    for row in range(2 * columns):
+        total = 0.0
+        for level in range(LEVELS - 1, -1, -1):
+            total += spent[row, level]
+            told[0] = max(told[0], total / lasted[row, level])
     return 0

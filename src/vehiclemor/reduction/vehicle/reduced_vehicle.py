@@ -13,23 +13,26 @@ from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import System
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
+NOTHING_EXCITED = np.empty((2, 0, 2))
 
 
 class KnownStart(NamedTuple):
-    """A full state, what of the transient it excites, and until when (s)."""
+    """A full state, what of the transient it excites, until when (s), how much else it leaves."""
 
     state: np.ndarray
     excited: np.ndarray
     until: float
+    unlike: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,8 @@ class ReducedVehicle(ShortRepr):
         What is added to the lifted shapes.
     lifted_features
         Features of the lifting, with the same parameters, if not those of the equations.
+    reach
+        What the training runs have shown of durations and starts.
     """
 
     model: DynamicModel
@@ -70,6 +75,7 @@ class ReducedVehicle(ShortRepr):
     tolerance: float
     transient: Transient = NO_TRANSIENT
     lifted_features: Features | None = None
+    reach: TrainingReach = NOTHING_KNOWN
 
     @property
     def effective_rank(self) -> int:
@@ -113,10 +119,14 @@ class ReducedVehicle(ShortRepr):
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
-        deviation = self.shape.of(state[None])[0] - self.shape.reference
-        z = self.encoding @ deviation - self.feedthrough @ inputs
+        return self.encoded_path(state[None], inputs[None])[0]
+
+    def encoded_path(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Reduced states (samples, states + 3) of full ones at inputs (samples, inputs)."""
+        deviations = self.shape.of(states) - self.shape.reference
         x, y, heading = self.model.planar
-        return np.concatenate([z, state[[heading, x, y]]])
+        z = deviations @ self.encoding.T - inputs @ self.feedthrough.T
+        return np.hstack([z, states[:, [heading, x, y]]])
 
     @cached_property
     def lift(self) -> Lifting:
@@ -124,7 +134,13 @@ class ReducedVehicle(ShortRepr):
         shape, features = self.shape, self.lifted_features or self.features
         coefficients, reference = self.lifting, shape.reference
         return Lifting(
-            features, self.parameters, coefficients, reference, shape.layout, self.transient
+            features,
+            self.parameters,
+            coefficients,
+            reference,
+            shape.layout,
+            self.transient,
+            self.reach,
         )
 
     def path(
@@ -136,9 +152,13 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        known, inputs = self._known(start), recorded_inputs(maneuver)[1]
+        inputs = recorded_inputs(maneuver)[1]
+        known = self._known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
         states, trust = self.lift.of_run(run, inputs, known.excited)
+        if known.unlike > 1.0:
+            reason = "its start leaves more than the slow motion, unlike any training run"
+            trust = Trust(max(known.unlike, trust.indicator if trust else 0.0), 0.0, reason)
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
@@ -146,20 +166,34 @@ class ReducedVehicle(ShortRepr):
         run.give_back()
         return found
 
-    def _known(self, start: Start) -> KnownStart:
-        """A start with what it excites; kept by its name or its numbers."""
-        key = start if isinstance(start, str) else self.model.start(start).tobytes()
+    def excited(self, state: np.ndarray) -> np.ndarray:
+        """What of the transient a full state excites, see `Lifting.excited`."""
+        return self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+
+    def remainder(
+        self, states: np.ndarray, inputs: np.ndarray, excited: np.ndarray = NOTHING_EXCITED
+    ) -> np.ndarray:
+        """What of the shapes (samples, n) of full states their own reduced states don't give."""
+        path = self.encoded_path(states, inputs)
+        lifted, _ = self.lift.states(np.zeros(len(path)), path, inputs, excited)
+        return self.shape.of(states) - self.shape.of(lifted[:, : states.shape[1]])
+
+    def _known(self, start: Start, inputs: np.ndarray) -> KnownStart:
+        """A start with what it excites, at inputs; kept by its name or its numbers."""
+        name = start if isinstance(start, str) else self.model.start(start).tobytes()
+        key = name, inputs.tobytes()
         found = self._starts.get(key)
         if found is None:
             state = self.model.start(start)
-            excited = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+            excited = self.excited(state)
+            unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            found = self._starts[key] = KnownStart(state, excited, decayed(excited))
+            found = self._starts[key] = KnownStart(state, excited, decayed(excited), unlike)
         return found
 
     @cached_property
-    def _starts(self) -> dict[str | bytes, KnownStart]:
+    def _starts(self) -> dict[tuple[str | bytes, bytes], KnownStart]:
         return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002

@@ -1,0 +1,81 @@
+"""What training runs have shown: how long they stay where, and what their starts leave behind.
+
+Ranges tell where a run is.  But errors of the heading grow with the time that a run stays there,
+those of the place with the way that it drives on with them; and what a start excites, beside the
+slow motion, is known for the starts of the training alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING
+
+# A run may last so many times as long as any training run, and this (s) where none has been.
+LONGER, SHORTEST = 1.05, 0.1
+# A start may leave so many times what samples of training runs leave.
+UNLIKE = 3.0
+BEYOND = np.array([MOVING, *np.arange(1, LEVELS) / LEVELS])
+
+
+@dataclass(frozen=True)
+class TrainingReach:
+    """What is known of durations and starts.
+
+    Attributes
+    ----------
+    lasted
+        Seconds (2 columns, levels) that a run may be beyond each level of a range; below them
+        their integrals in s^2.
+    decaying
+        Amplitudes (modes,) of the transient in runs that are steered.
+    left
+        What lifting leaves of the states of the shape (n,).
+    starts, begun
+        Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
+    """
+
+    lasted: np.ndarray
+    decaying: np.ndarray
+    left: np.ndarray
+    starts: np.ndarray
+    begun: np.ndarray
+
+    def alive(self, excited: np.ndarray, time: float) -> float:
+        """Largest amplitude of a start's transient at a time, in parts of the known ones."""
+        (rates, amplitudes), known = excited, self.decaying
+        if not len(rates) or not len(known):
+            return 0.0
+        sizes = np.hypot(*amplitudes.T) * np.exp(rates[:, 0] * time)
+        return float((sizes / known).max())
+
+    def unlike(self, remainder: np.ndarray) -> float:
+        """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
+        if not len(self.left):
+            return 0.0
+        scaled = remainder / self.left
+        known = np.clip(self.starts @ scaled, -LONGER * self.begun, LONGER * self.begun)
+        return float(np.abs(scaled - known @ self.starts).max()) / UNLIKE
+
+
+NOTHING_KNOWN = TrainingReach(
+    np.zeros((0, LEVELS)), *np.zeros((2, 0)), np.zeros((0, 0)), np.zeros(0)
+)
+
+
+def durations(times: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Seconds (samples, 2 columns, levels) beyond each level so far, and their integrals."""
+    spans = np.diff(times, prepend=times[:1])[:, None, None]
+    spent = np.cumsum(spans * (sizes[:, :, None] > BEYOND), axis=0)
+    return np.concatenate([spent, np.cumsum(spans * spent, axis=0)], axis=1)
+
+
+def overstayed(times: np.ndarray, sizes: np.ndarray, lasted: np.ndarray) -> tuple[float, int]:
+    """When a run has first lasted too long, and in which column."""
+    columns = len(lasted) // 2
+    beyond = (durations(times, sizes[:, :columns]) > lasted).any(axis=2)
+    # Rounding may see the edge elsewhere than the compiled loop.
+    sample = int(beyond.any(axis=1).argmax()) if beyond.any() else len(times) - 1
+    return float(times[sample]), int(beyond[sample].argmax()) % columns
