@@ -25,6 +25,8 @@ from vehiclemor.simulation.trajectory import Trust
 NEGLIGIBLE = 1e-4
 # Modes are known by differences: a smaller part of a deviation than this excites none.
 ROUNDING = 1e-7
+# A time (s) that is hardly after the start.
+SOON = 1e-3
 
 
 @dataclass(frozen=True)
@@ -148,16 +150,19 @@ class Lifting(ShortRepr):
         return self._lifted(self._space((times, path, inputs), excited, len(times)), len(times))
 
     def of_run(
-        self, run: Run, inputs: np.ndarray, excited: np.ndarray
+        self, run: Run, inputs: np.ndarray, excited: np.ndarray, settled: float = 0.0
     ) -> tuple[np.ndarray, Trust | None]:
-        """The same of a run and its inputs at the samples; of its rows only `run.rows` count."""
+        """The same of a run and its inputs at the samples; of its rows only `run.rows` count.
+
+        What its start excites is known from the time `settled` (s) on.
+        """
         held = run.kept.get("lifted")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
             held = self._space((times, run.whole, inputs), excited.copy(), run.rows)
             run.kept["lifted"] = held
         held.excited[:] = excited
-        return self._lifted(held, run.rows)
+        return self._lifted(held, run.rows, settled)
 
     def _space(
         self, recorded: tuple[np.ndarray, np.ndarray, np.ndarray], excited: np.ndarray, rows: int
@@ -189,20 +194,21 @@ class Lifting(ShortRepr):
         )
         return LiftingSpace(excited, times, states, largest, first, told, counted)
 
-    def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
+    def _lifted(
+        self, space: LiftingSpace, rows: int, settled: float = 0.0
+    ) -> tuple[np.ndarray, Trust | None]:
         for call, places in space.calls:
             for place in places:
                 call.words[place] = rows
             call()
-        return space.states, self._trust(space, rows)
+        return space.states, self._trust(space, rows, settled)
 
-    def _trust(self, space: LiftingSpace, rows: int) -> Trust | None:
+    def _trust(self, space: LiftingSpace, rows: int, settled: float) -> Trust | None:
         """How far a run has gone; none if nothing tells."""
         largest, first = space.largest.tolist(), space.first.tolist()
         if not largest:
             return None
         longest, moving = space.told.tolist()
-        alive = self.reach.alive(space.excited, moving) if moving < np.inf else 0.0
         told, sample, times = [], min(first), space.times[:rows]
         if sample < rows:
             name = self.features.watched[first.index(sample)][1]
@@ -214,9 +220,18 @@ class Lifting(ShortRepr):
             since, column = overstayed(times, sizes, self.reach.lasted)
             name = self.features.watched[column][1]
             told.append((since, f"{name} lasts longer, or is longer ago, than in any training run"))
-        if alive > 1.0:
+        early = settled / max(moving, SOON)
+        sideways = self._sideways(space) if moving == times[0] else 0.0
+        if sideways > 1.0:
+            told.append((moving, "it starts sideways, as no training run does"))
+        if early > 1.0:
             told.append((moving, "it moves sideways before what its start excites has decayed"))
-        return Trust(max(*largest, longest, alive), *min(told, default=()))
+        return Trust(max(*largest, longest, early, sideways), *min(told, default=()))
+
+    def _sideways(self, space: LiftingSpace) -> float:
+        """How far a run starts in the ranges of lateral motion, in parts of known starts."""
+        first = space.states[0, self.layout.size :][: self.features.lateral]
+        return float(np.abs(first).max(initial=0.0)) / self.reach.sideways
 
 
 def decayed(excited: np.ndarray) -> float:

@@ -10,6 +10,7 @@ from vehiclemor.reduction.vehicle.lifting import ROUNDING
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
 from vehiclemor.reduction.vehicle.training_reach import (
+    BESIDE,
     LONGER,
     NOTHING_KNOWN,
     SHORTEST,
@@ -26,7 +27,7 @@ def training_reach(
     """What the training runs have shown, as the reduced vehicle sees them."""
     shape, features, transient = reduced.shape, reduced.features, reduced.transient
     lateral = features.lateral
-    lasted, decaying, left, starts = [], [], [], []
+    lasted, sideways, decaying, left, starts = [], [MOVING], [], [], []
     for given, run in zip(training, runs, strict=True):
         path = reduced.path(given.maneuver, given.start)
         if path is None:
@@ -34,6 +35,7 @@ def training_reach(
         sizes = reduced.lift.states(run.time, path, run.inputs, NOTHING_EXCITED)[0]
         sizes = np.abs(sizes[:, shape.layout.size :])[:, :lateral]
         lasted.append(durations(run.time, sizes)[-1])
+        sideways.append(float(sizes[0].max(initial=0.0)))
         later = after_landing(transient, shape, run)
         moving = (sizes[-len(later.time) :] > MOVING).any(axis=1)
         deviations = shape.of(later.states) - shape.reference
@@ -47,7 +49,8 @@ def training_reach(
     directions = directions[sizes > UNLIKE]
     return TrainingReach(
         LONGER * np.maximum(np.max(lasted, axis=0), SHORTEST),
-        np.maximum(steered, ROUNDING * steered.max(initial=1.0)),
+        max(sideways),
+        BESIDE * np.maximum(steered, ROUNDING * steered.max(initial=1.0)),
         leaves,
         directions,
         np.abs(np.array(starts) / leaves @ directions.T).max(axis=0),

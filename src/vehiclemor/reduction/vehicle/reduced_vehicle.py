@@ -27,11 +27,21 @@ NOTHING_EXCITED = np.empty((2, 0, 2))
 
 
 class KnownStart(NamedTuple):
-    """A full state, what of the transient it excites, until when (s), how much else it leaves."""
+    """A full state and what is known of it as a start.
+
+    Attributes
+    ----------
+    excited, until, settled
+        What of the transient it excites, when (s) this is nothing, and when it is as in training
+        runs.
+    unlike
+        How much else it leaves, 1 at the edge of what training runs leave.
+    """
 
     state: np.ndarray
     excited: np.ndarray
     until: float
+    settled: float
     unlike: float
 
 
@@ -155,7 +165,7 @@ class ReducedVehicle(ShortRepr):
         inputs = recorded_inputs(maneuver)[1]
         known = self._known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
-        states, trust = self.lift.of_run(run, inputs, known.excited)
+        states, trust = self.lift.of_run(run, inputs, known.excited, known.settled)
         if known.unlike > 1.0:
             reason = "its start leaves more than the slow motion, unlike any training run"
             trust = Trust(max(known.unlike, trust.indicator if trust else 0.0), 0.0, reason)
@@ -189,7 +199,8 @@ class ReducedVehicle(ShortRepr):
             unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            found = self._starts[key] = KnownStart(state, excited, decayed(excited), unlike)
+            until, settled = decayed(excited), self.reach.settled(excited)
+            found = self._starts[key] = KnownStart(state, excited, until, settled, unlike)
         return found
 
     @cached_property

@@ -17,6 +17,10 @@ from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING
 LONGER, SHORTEST = 1.05, 0.1
 # A start may leave so many times what samples of training runs leave.
 UNLIKE = 3.0
+# Part of the steered motion's own amplitudes that a start's transient may have beside it.
+BESIDE = 0.3
+# Decay (1/s) that is none.
+SLOWEST = 1e-6
 BEYOND = np.array([MOVING, *np.arange(1, LEVELS) / LEVELS])
 
 
@@ -29,8 +33,10 @@ class TrainingReach:
     lasted
         Seconds (2 columns, levels) that a run may be beyond each level of a range; below them
         their integrals in s^2.
+    sideways
+        How far the starts use the ranges of these columns.
     decaying
-        Amplitudes (modes,) of the transient in runs that are steered.
+        Amplitudes (modes,) that a start's transient may have in a run that is steered.
     left
         What lifting leaves of the states of the shape (n,).
     starts, begun
@@ -38,18 +44,20 @@ class TrainingReach:
     """
 
     lasted: np.ndarray
+    sideways: float
     decaying: np.ndarray
     left: np.ndarray
     starts: np.ndarray
     begun: np.ndarray
 
-    def alive(self, excited: np.ndarray, time: float) -> float:
-        """Largest amplitude of a start's transient at a time, in parts of the known ones."""
-        (rates, amplitudes), known = excited, self.decaying
-        if not len(rates) or not len(known):
+    def settled(self, excited: np.ndarray) -> float:
+        """Time in s from which on a start's transient, as `Lifting.excited` gives it, is known."""
+        rates, amplitudes = excited
+        if not len(rates) or not len(self.decaying):
             return 0.0
-        sizes = np.hypot(*amplitudes.T) * np.exp(rates[:, 0] * time)
-        return float((sizes / known).max())
+        larger = np.maximum(np.hypot(*amplitudes.T) / self.decaying, 1.0)
+        # What does not decay never settles.
+        return float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
 
     def unlike(self, remainder: np.ndarray) -> float:
         """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
@@ -61,7 +69,7 @@ class TrainingReach:
 
 
 NOTHING_KNOWN = TrainingReach(
-    np.zeros((0, LEVELS)), *np.zeros((2, 0)), np.zeros((0, 0)), np.zeros(0)
+    np.zeros((0, LEVELS)), MOVING, *np.zeros((2, 0)), np.zeros((0, 0)), np.zeros(0)
 )
 
 

@@ -5,26 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.reducing import CARS
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.methods import slow_manifold
-from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import KnownStart, ReducedVehicle
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN
 from vehiclemor.simulation.build import build
-from vehiclemor.steering_maneuvers import lane_change, rack_lane_change
-
-CARS = {"independent_suspension_vehicle": lane_change, "high_fidelity_vehicle": rack_lane_change}
-
-
-@pytest.fixture(scope="module", params=CARS)
-def reduced(request: pytest.FixtureRequest) -> ReducedVehicle:
-    model, maneuver = build(request.param), CARS[request.param]
-    factors = (1.0, 1.0), (1.3, -0.7), (0.8, 1.2)
-    runs = [TrainingRun(model, maneuver.perturbed(*f), s) for f in factors for s in model.starts]
-    settings = validated(slow_manifold.METHOD, model.kind, {"sweeps": 0})
-    return slow_manifold.fit(model, runs, settings)
 
 
 def lifted(reduced: ReducedVehicle, maneuver, start: str) -> np.ndarray:
