@@ -59,9 +59,8 @@ def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
     reach = max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0
     lasting = model.kind != "ae"
     longest = max(scenario.maneuver.duration for scenario in training) if lasting else np.inf
-    edges = np.max(largest, axis=0), reach, longest
-    most, reach, longest = (edge * (1.0 + 1e-6) for edge in edges)
-    return InputRange(most, middle, reach, longest)
+    edge = 1.0 + 1e-6
+    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge)
 
 
 def _values(model: Model, maneuver: Maneuver) -> np.ndarray:

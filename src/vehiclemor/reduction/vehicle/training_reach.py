@@ -69,7 +69,7 @@ class TrainingReach:
 
 
 NOTHING_KNOWN = TrainingReach(
-    np.zeros((0, LEVELS)), MOVING, *np.zeros((2, 0)), np.zeros((0, 0)), np.zeros(0)
+    np.zeros((0, LEVELS)), MOVING, np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros(0)
 )
 
 
@@ -83,7 +83,8 @@ def durations(times: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 def overstayed(times: np.ndarray, sizes: np.ndarray, lasted: np.ndarray) -> tuple[float, int]:
     """When a run has first lasted too long, and in which column."""
     columns = len(lasted) // 2
-    beyond = (durations(times, sizes[:, :columns]) > lasted).any(axis=2)
+    beyond = np.max(durations(times, sizes[:, :columns]) / lasted, axis=2)
+    first = np.flatnonzero(np.max(beyond, axis=1) > 1.0)
     # Rounding may see the edge elsewhere than the compiled loop.
-    sample = int(beyond.any(axis=1).argmax()) if beyond.any() else len(times) - 1
-    return float(times[sample]), int(beyond[sample].argmax()) % columns
+    sample = int(first[0]) if len(first) else len(times) - 1
+    return float(times[sample]), int(np.argmax(beyond[sample])) % columns
