@@ -20,9 +20,11 @@ from vehiclemor.simulation.integrators.structures import Signal
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
 DEGREE = 5
+# Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
+KEPT = 512
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT)
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
     times = maneuver.times
@@ -31,7 +33,7 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     return times, inputs
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT)
 def signal_of(maneuver: Maneuver) -> Ready:
     """Piecewise polynomial inputs of a maneuver.
 

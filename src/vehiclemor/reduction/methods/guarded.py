@@ -14,7 +14,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.interface import Method, Offline, ReducedModel
+from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import validated
@@ -129,10 +129,19 @@ def joined(run: Trajectory, later: Trajectory, kept: int) -> Trajectory:
     )
 
 
-def fit(model: DynamicModel, training: Training, settings: GuardedSettings) -> GuardedModel:
-    """Fit both."""
-    fast = component("method", settings.fast).fit(model, training, _of_fast(model, settings))
-    safe = component("method", settings.safe).fit(model, training, _of_safe(model, settings))
+def fit(
+    model: DynamicModel,
+    training: Training,
+    settings: GuardedSettings,
+    others: FitOther | None = None,
+) -> GuardedModel:
+    """Fit both, by `others` if it is given."""
+
+    def anew(name: str, given: Any) -> ReducedModel:
+        return component("method", name).fit(model, training, given)
+
+    fast = (others or anew)(settings.fast, _of_fast(model, settings))
+    safe = (others or anew)(settings.safe, _of_safe(model, settings))
     parts = fast.offline, safe.offline
     return GuardedModel(
         fast,
@@ -184,4 +193,5 @@ METHOD = Method(
     refusal=no_steered_vehicle,
     check=check,
     fit=fit,
+    fits_others=True,
 )
