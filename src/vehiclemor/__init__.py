@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -29,9 +30,11 @@ _DEFINED_IN = {
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    "Signal": "vehiclemor.signals",
     "VehiclemorError": "vehiclemor.errors",
 }
 __all__ = [
+    "Signal",
     "VehiclemorError",
     "compare",
     "describe",
