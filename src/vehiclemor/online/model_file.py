@@ -87,7 +87,7 @@ def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
         raise InputError(f"{saved.method} of {model.name}: {error}") from None
     texts = parts, dict(saved.settings), list(saved.training), parameters_of(model)
     variables: dict[str, Any] = {
-        name: ((), json.dumps(content)) for name, content in zip(TEXTS, texts, strict=True)
+        name: ((), json.dumps(text)) for name, text in zip(TEXTS, texts, strict=True)
     }
     for name, array in (writer.arrays | {"fingerprint": fingerprint(model)}).items():
         dimensions = [f"{name}_{axis}" for axis in range(array.ndim)]
@@ -115,17 +115,17 @@ def read(path: Any) -> Saved:
         If the file is missing, damaged, something else, or of another version or another model.
     """
     path = file_path("path", path)
-    content, attrs = _content(path)
+    stored, attrs = content(path)
     try:
         method, name = str(attrs["method"]), str(attrs["model"])
-        parts, settings, training, parameters = (json.loads(content.pop(key)) for key in TEXTS)
+        parts, settings, training, parameters = (json.loads(stored.pop(key)) for key in TEXTS)
         model = _model(name, parameters)
         reduces: Method = component("method", method)
         reduces.check(model, for_method(model, method, settings))
-        then, now = content.pop("fingerprint"), fingerprint(model)
+        then, now = stored.pop("fingerprint"), fingerprint(model)
         if then.shape != now.shape or not np.allclose(then, now, SAME, SAME * np.abs(now).max()):
             raise FileError(f"the equations of {name} have changed since")
-        reduced = Reader(model, content).value(parts)
+        reduced = Reader(model, stored).value(parts)
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
     except (ValueError, VehiclemorError) as error:
@@ -150,8 +150,14 @@ def _model(name: str, parameters: Mapping[str, Any]) -> Model:
     return build(name, overrides=changed) if changed else model
 
 
-def _content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a file that is whole and of this version."""
+def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and attributes of a file that is whole and of this version.
+
+    Raises
+    ------
+    FileError
+        If there is none.
+    """
     with opened(path, "saved model") as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:

@@ -8,8 +8,6 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder
 
-FOLDER = "reduced"
-
 
 def load(path: Any) -> ReducedOrderModel:
     """A reduced model from the file that its `save` has written; nothing is fitted.
@@ -40,12 +38,12 @@ def rom(model: str) -> ReducedOrderModel:
     InputError
         If none ships for a model of this name.
     """
-    known = shipped()
+    known = {path.stem: path for path in shipped_folder().glob("*.nc")}
     if model not in known:
-        raise unknown("shipped reduced model", model, known)
+        raise unknown("model with a reduced one that ships", model, known)
     return load(known[model])
 
 
-def shipped() -> dict[str, Path]:
-    """Files of the models that ship, by the name of the full model."""
-    return {path.stem: path for path in sorted((data_folder() / FOLDER).glob("*.nc"))}
+def shipped_folder() -> Path:
+    """Folder of the models that ship, each under the name of the full model."""
+    return data_folder() / "reduced"
