@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.signals import Signal as Signal
+    from vehiclemor.online.saved import load as load
+    from vehiclemor.online.saved import rom as rom
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -34,6 +36,7 @@ _DEFINED_IN = {
     "Signal": "vehiclemor.signals",
     "VehiclemorError": "vehiclemor.errors",
     "reduce": "vehiclemor.online.rom",
+    **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
 }
 __all__ = [
     "Signal",
@@ -41,12 +44,14 @@ __all__ = [
     "compare",
     "describe",
     "figures",
+    "load",
     "maneuvers",
     "methods",
     "model",
     "models",
     "plot",
     "reduce",
+    "rom",
     "run_study",
     "simulate",
     "studies",
