@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.online.rom import reduce as reduce
-    from vehiclemor.signals import Signal as Signal
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.

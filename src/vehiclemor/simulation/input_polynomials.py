@@ -21,6 +21,8 @@ from vehiclemor.simulation.integrators.structures import Signal
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
 DEGREE = 5
+# Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
+KEPT = 512
 
 
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
@@ -28,7 +30,7 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     return maneuver.recorded if isinstance(maneuver, signals.Signal) else _recorded(maneuver)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT)
 def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     times, inputs = maneuver.recorded
     inputs = loop_array(inputs)
@@ -51,7 +53,7 @@ def signal_of(maneuver: Maneuver) -> Ready:
     return maneuver.kept["ready"]
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT)
 def _found_signal(maneuver: Maneuver) -> Ready:
     """Polynomials of a function, searched for.
 
