@@ -134,8 +134,8 @@ def timed_cases(
     results = [evaluate(experiment)[kept] for experiment in experiments.values()]
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
-    every = (rounds or CASE_ROUNDS,) * 2
-    seconds, offline = _rounds(list(experiments.values()), every)
+    every = rounds or CASE_ROUNDS
+    seconds, offline = _rounds(list(experiments.values()), (every, every))
     points = f"{maneuver.samples} time points"
     times = _dataset(experiments, seconds, offline, points).isel(scenario=0, drop=True)
     dataset = dataset.merge(times)
