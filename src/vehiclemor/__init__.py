@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.online.rom import reduce as reduce
+    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -30,10 +31,12 @@ _DEFINED_IN = {
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    "Signal": "vehiclemor.signals",
     "VehiclemorError": "vehiclemor.errors",
     "reduce": "vehiclemor.online.rom",
 }
 __all__ = [
+    "Signal",
     "VehiclemorError",
     "compare",
     "describe",
