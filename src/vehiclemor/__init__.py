@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.online.batch_signals import Signals as Signals
+    from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.signals import Signal as Signal
 
@@ -32,11 +34,14 @@ _DEFINED_IN = {
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
+    "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "reduce": "vehiclemor.online.rom",
+    "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
     "Signal",
+    "Signals",
     "VehiclemorError",
     "compare",
     "describe",
@@ -49,6 +54,7 @@ __all__ = [
     "reduce",
     "run_study",
     "simulate",
+    "simulate_many",
     "studies",
 ]
 

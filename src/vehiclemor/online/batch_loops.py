@@ -1,4 +1,4 @@
-"""Many runs of one time loop and what is delivered of them: no Python between the runs, compiled."""
+"""Many runs of one time loop and what is delivered of them, compiled: no Python between them."""
 
 import math
 from typing import NamedTuple

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from vehiclemor.registry import unknown
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Times (s) that differ by less are one.
 SAME_TIME = 1e-9
@@ -91,8 +88,8 @@ class Found(NamedTuple):
         Quantities (runs, times, names).
     status, message, remark
         Of each run, see `Trajectory`.
-    indicator, until
-        What each run tells of itself, see `Trust`; not a number where it tells nothing.
+    indicator, until, reason
+        What each run tells of itself, see `Trust`; the first is not a number where it is nothing.
     counts
         Solver counts (runs, counts).
     seconds
@@ -105,31 +102,35 @@ class Found(NamedTuple):
     remark: np.ndarray
     indicator: np.ndarray
     until: np.ndarray
+    reason: np.ndarray
     counts: np.ndarray
     seconds: np.ndarray
 
     @classmethod
     def empty(cls, runs: int, shape: tuple[int, int], counts: int) -> Found:
         """Room for so many runs."""
-        text = [np.full(runs, "", dtype=object) for _ in range(2)]
+        text = [np.full(runs, "", dtype=object) for _ in range(3)]
         return cls(
             np.empty((runs, *shape)),
             np.full(runs, "ok", dtype=object),
-            *text,
+            *text[:2],
             np.full(runs, np.nan),
             np.full(runs, np.inf),
+            text[2],
             np.zeros((runs, counts), dtype=np.int64),
             np.zeros(runs),
         )
-
-    def part(self, runs: slice) -> Found:
-        """Some of the runs, to be written."""
-        return Found(*(array[runs] for array in self))
 
     def write(self, runs: Any, other: Found) -> None:
         """Write results of some of the runs."""
         for array, values in zip(self, other, strict=True):
             array[runs] = values
+
+    def refuse(self, refused: Mapping[int, str], status: str = "rejected") -> None:
+        """Write runs (number -> why) of which there are no numbers."""
+        for run, why in refused.items():
+            self.values[run], self.until[run] = np.nan, 0.0
+            self.status[run], self.message[run] = status, why
 
     def write_trajectory(self, run: int, found: Trajectory, rows: np.ndarray, columns: Any) -> None:
         """Write a trajectory, of which some rows and columns are kept."""
@@ -139,7 +140,9 @@ class Found(NamedTuple):
         self.remark[run], self.seconds[run] = found.remark, found.seconds
         self.counts[run] = list(found.counts.values())
         if found.trust is not None:
-            self.indicator[run], self.until[run] = found.trust.indicator, found.trust.until
+            trust = found.trust
+            self.indicator[run], self.until[run] = trust.indicator, trust.until
+            self.reason[run] = trust.reason
 
 
 def dataset(

@@ -6,23 +6,25 @@ Arguments of its loops are packed once; from run to run only words of them chang
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Prepared, address_of_array, cache_lines, loops
+from vehiclemor.codegen.loops import Loop, Prepared, cache_lines, loops, ready
 from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.online.batch_loops import Lifted, Recorded, Stage, Told, Wanted
 from vehiclemor.online.batch_result import Found, Selection
+from vehiclemor.online.batch_signals import Given, Signals, addresses, given_of
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.simulation.checks import check_inputs, cut_short, lifted_wheels, out_of_validity
+from vehiclemor.simulation.checks import checked_maneuver, lifted_wheels, out_of_validity
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
+from vehiclemor.simulation.input_polynomials import signal_of
 from vehiclemor.simulation.paths import PATH_LOOPS
-from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.projection_windows import smooth_spans, whole_space
 from vehiclemor.simulation.run_plans import Solver
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.spare_spaces import SpareSpaces
@@ -31,7 +33,6 @@ from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start
 
 NOTHING = np.zeros(0, dtype=np.int64)
 NO_STAGE = Stage(NOTHING, NOTHING, NOTHING, NOTHING.reshape(0, 0), NOTHING)
-WORD = 8
 
 
 class Begin(NamedTuple):
@@ -101,27 +102,52 @@ class BatchRuns:
         self.solver, self.tolerance = fitted.solver, fitted.tolerance
 
     def found(self, signals: Sequence[Maneuver], starts: Sequence[Start]) -> Found:
-        """Results of some runs, in their order; they have as many output times."""
-        kinds: dict[Hashable, list[int]] = {}
-        begins, given = [], []
-        for run, (signal, start) in enumerate(zip(signals, starts, strict=True)):
-            check_inputs(signal, self.model.definition)
-            times, _ = self.chosen.samples(signal)
-            inputs = recorded_inputs(signal)[1] if times is None else signal.at(times)
-            begin = self._begin(start, inputs[0])
-            begins.append(begin)
-            given.append(inputs)
-            recorded = signal.duration, signal.samples, len(begin.excited[0])
-            kinds.setdefault((*recorded, begin.until < signal.duration), []).append(run)
+        """Results of some runs, in their order, none of which is lost by another's failure."""
+        alike: dict[Hashable, list[int]] = {(): [*range(len(signals))]}
+        if not isinstance(signals, Signals):
+            alike = _by([(signal.duration, signal.samples) for signal in signals])
+        if len(alike) == 1:
+            return self._recorded_alike(signals, starts)
         shape = len(self.chosen.samples(signals[0])[1]), len(self.chosen.columns)
         whole = Found.empty(len(signals), shape, len(DYNAMIC_COUNTS))
-        for kind, runs in kinds.items():
-            parts = [[of[run] for run in runs] for of in (signals, begins, given)]
-            found = self._of_kind(kind, *parts)
-            if len(kinds) == 1:
-                return found
-            whole.write(runs, found)
+        for runs in alike.values():
+            own = [signals[run] for run in runs], [starts[run] for run in runs]
+            whole.write(runs, self._recorded_alike(*own))
         return whole
+
+    def _recorded_alike(self, signals: Sequence[Maneuver], starts: Sequence[Start]) -> Found:
+        """Results of runs with the same output times."""
+        names = self.model.inputs
+        times, rows = self.chosen.samples(signals[0])
+        refused: dict[int, str] = {}
+        if isinstance(signals, Signals):
+            signal, given = signals.first.for_inputs(names), signals.given(names, times)
+            outside = outside_of_bounds(self.model.definition, given.inputs)
+            refused = {run: refusal(signals[run], self.model) for run in outside}
+            runs = np.setdiff1d(np.arange(len(signals)), outside).tolist()
+            given = given if not refused else given.part(runs)
+        else:
+            refused = {run: m for run, s in enumerate(signals) if (m := refusal(s, self.model))}
+            runs = [run for run in range(len(signals)) if run not in refused]
+            complete = [signals[run].for_inputs(names) for run in runs]
+            if runs:
+                signal, given = complete[0], given_of(complete, times)
+        found = Found.empty(
+            len(signals), (len(rows), len(self.chosen.columns)), len(DYNAMIC_COUNTS)
+        )
+        found.refuse(refused)
+        if not runs:
+            return found
+        begins = [self._begin(starts[run], given.inputs[k, 0]) for k, run in enumerate(runs)]
+        kinds = _by([(begin.excited.shape[1], begin.until < signal.duration) for begin in begins])
+        for kind, numbers in kinds.items():
+            of_kind = given if len(kinds) == 1 else given.part(numbers)
+            key = signal.duration, signal.samples, *kind
+            part = self._of_kind(key, signal, of_kind, [begins[k] for k in numbers])
+            if len(numbers) == len(signals):
+                return part
+            found.write([runs[k] for k in numbers], part)
+        return found
 
     def _begin(self, start: Start, inputs: np.ndarray) -> Begin:
         """Where a run from a start begins."""
@@ -132,53 +158,53 @@ class BatchRuns:
         return Begin(state, known.state, known.excited, known.until)
 
     def _of_kind(
-        self,
-        kind: Hashable,
-        signals: Sequence[Maneuver],
-        begins: Sequence[Begin],
-        given: Sequence[np.ndarray],
+        self, kind: Hashable, signal: Maneuver, given: Given, begins: Sequence[Begin]
     ) -> Found:
-        """Results of runs that are recorded alike."""
-        space = self._spare.taken(kind, lambda: self._space(signals[0], begins[0], given[0]))
-        runs, samples = len(signals), len(space.times)
-        inputs = np.stack(given)
+        """Results of runs that are recorded alike and excite as many modes.
+
+        Parameters
+        ----------
+        signal
+            One with their output times.
+        """
+        space = self._spare.taken(kind, lambda: self._space(signal, begins[0], given.inputs[0]))
         starts = np.stack([begin.state for begin in begins])
         full = np.stack([begin.full for begin in begins])
-        full = full if full.shape[1] else np.empty((0, 0))
-        until = np.array([begin.until for begin in begins])
         excited = np.stack([begin.excited for begin in begins])
-        held = [signal_of(signal) for signal in signals]
-        end = float(space.times[-1])
-        spans = [self.windows.spans(signal.bundle.edges, end) for signal in held]
-        words = b"".join([s.words + p.words for s, p in zip(held, spans, strict=True)])
-        table = np.frombuffer(words, dtype=np.int64).reshape(runs, -1)
-        integrate, of_inputs = space.integrate, _addresses(inputs)
+        until = np.array([begin.until for begin in begins])
+        # Ends of segments -> spans between them.
+        ends = {edges.tobytes(): edges for edges in given.edges}
+        cut = {
+            key: ready(smooth_spans(edges, self.windows.edges, float(space.times[-1])))
+            for key, edges in ends.items()
+        }
+        words = b"".join([cut[edges.tobytes()].words for edges in given.edges])
+        spans = np.frombuffer(words, dtype=np.int64).reshape(len(begins), -1)
+        call, of_inputs = space.integrate, addresses(given.inputs)
+        signal_at, spans_at = call.address("signal.edges"), call.address("spans.edges")
         places = [
-            integrate.address("start"),
-            integrate.address("output.given"),
-            integrate.address("output.direct_until"),
-            *range(first := integrate.address("signal.edges"), first + len(held[0].words) // WORD),
-            *range(first := integrate.address("spans.edges"), first + len(spans[0].words) // WORD),
+            call.address("start"),
+            call.address("output.given"),
+            call.address("output.direct_until"),
+            *range(signal_at, signal_at + given.words.shape[1]),
+            *range(spans_at, spans_at + spans.shape[1]),
         ]
-        columns = _addresses(starts), of_inputs, until.view(np.int64), table
-        integration = _stage(integrate, places, columns)
-        decay, lifting = self._lifting_stages(space, of_inputs, excited)
-        told = self._told(runs, len(space.wanted.samples))
+        columns = addresses(starts), of_inputs, until.view(np.int64), given.words, spans
+        told = self._told(len(begins), len(space.wanted.samples))
         loop = _loop().prepared(
-            integration,
-            decay,
-            lifting,
+            _stage(call, places, columns),
+            *self._lifting_stages(space, of_inputs, excited),
             space.recorded,
             space.lifted,
-            inputs,
-            full,
+            given.inputs,
+            full if full.shape[1] else np.empty((0, 0)),
             space.wanted,
             len(self.model.limits[0]),
             told,
         )
         _, seconds = timed(loop)
         self._spare.give_back(kind, space)
-        return self._judged(told, signals, space.times, seconds / runs)
+        return self._judged(told, given.remarks, space.times, seconds / len(begins))
 
     def _lifting_stages(
         self, space: Space, of_inputs: np.ndarray, excited: np.ndarray
@@ -191,7 +217,7 @@ class BatchRuns:
                 places, columns = [call.address("inputs")], [of_inputs]
             if not k and len(space.stages) == 2:
                 places += [call.address("rates"), call.address("amplitudes")]
-                rates = _addresses(excited)
+                rates = addresses(excited)
                 columns += [rates, rates + excited[0, 0].nbytes]
             stages.append(_stage(call, places, columns, rows, len(of_inputs)))
         return (NO_STAGE, *stages)[-2:] if stages else (NO_STAGE, NO_STAGE)  # type: ignore[return-value]
@@ -200,15 +226,11 @@ class BatchRuns:
         """Space for runs over signals with the same output times."""
         times, rows = self.chosen.samples(signal)
         how = Solver(self.solver, self.tolerance, times)
-        loop, arguments = self.system.prepared(
-            signal, begin.state, self.windows, how, begin.until
-        )
+        loop, arguments = self.system.prepared(signal, begin.state, self.windows, how, begin.until)
         output = arguments.output
         direct = not len(output.places)
         moments = output.samples if direct else output.moments
-        recorded = Recorded(
-            output.counts, output.path, moments, output.places, arguments.buffer
-        )
+        recorded = Recorded(output.counts, output.path, moments, output.places, arguments.buffer)
         points = np.empty((0, 0)) if direct else output.inputs
         lifted, stages = Lifted(output.path, points, np.empty(0), NOTHING), ()
         if self.reduced is not None:
@@ -245,11 +267,11 @@ class BatchRuns:
         )
 
     def _judged(
-        self, told: Told, signals: Sequence[Maneuver], times: np.ndarray, seconds: float
+        self, told: Told, remarks: Sequence[str], times: np.ndarray, seconds: float
     ) -> Found:
         """What is told, in words, as of single runs."""
         definition, names = self.model.definition, self.model.limits[0]
-        runs, samples = len(signals), len(times)
+        runs, samples = len(told.ends), len(times)
         found = Found.empty(runs, (0, 0), 0)._replace(
             values=told.result, counts=told.counts, seconds=np.full(runs, seconds)
         )
@@ -268,22 +290,45 @@ class BatchRuns:
             if self.reduced is not None:
                 trust = self.reduced.lift.trust(largest[run], firsts[run], moments[run][1])
             if trust is not None:
-                found.indicator[run] = trust.indicator
+                found.indicator[run], found.reason[run] = trust.indicator, trust.reason
                 if trust.reason and not message:
                     found.status[run], found.message[run] = "untrusted", trust.message
         found.until[:] = until
         for run in np.flatnonzero((told.outside[:, len(names) :] < samples).any(axis=1)).tolist():
             first = told.outside[run, len(names) :].tolist()
             found.remark[run] = lifted_wheels(definition.loads, first, times)
-        for run, signal in enumerate(signals):
-            if remark := cut_short(signal):
+        for run, remark in enumerate(remarks):
+            if remark:
                 found.remark[run] = "; ".join(part for part in (found.remark[run], remark) if part)
         return found
 
 
-def _addresses(arrays: np.ndarray) -> np.ndarray:
-    """Addresses (runs,) of the parts of an array along its first dimension."""
-    return address_of_array(arrays) + np.arange(len(arrays)) * arrays[0].nbytes
+def _by(keys: Sequence[Hashable]) -> dict[Any, list[int]]:
+    """Numbers of equal keys."""
+    found: dict[Any, list[int]] = {}
+    for k, key in enumerate(keys):
+        found.setdefault(key, []).append(k)
+    return found
+
+
+def outside_of_bounds(definition: ModelDefinition, inputs: np.ndarray) -> list[int]:
+    """Runs whose inputs (runs, samples, inputs) leave the bounds that a model declares."""
+    outside = np.zeros(len(inputs), dtype=bool)
+    for column, quantity in enumerate(definition.inputs):
+        if quantity.name in definition.validity:
+            low, high = definition.validity[quantity.name]
+            values = inputs[:, :, column]
+            outside |= ((values < low) | (values > high)).any(axis=1)
+    return np.flatnonzero(outside).tolist()
+
+
+def refusal(signal: Maneuver, model: DynamicModel) -> str:
+    """Why a maneuver can't be run, empty if it can."""
+    try:
+        signal_of(checked_maneuver(signal, model.definition))
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def _stage(
@@ -304,5 +349,5 @@ def _stage(
     )
 
 
-def _loop():
+def _loop() -> Loop:
     return loops((*PATH_LOOPS, "online.batch_loops"), ("many_runs",))["many_runs"]
