@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -111,10 +111,7 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
     """A model of equations of motion."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
-    values = {
-        key: parameters[key] if declared.size > 1 else float(parameters[key])
-        for key, declared in definition.parameters.items()
-    }
+    values = declared_values(definition, parameters)
     with blamed(f"model {definition.name!r}: check"):
         definition.check(values)
     equations, digest = compiled(definition.name, definition.derive)
@@ -127,6 +124,14 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
         initial = {name: real_array(x) for name, x in definition.starts(values).items()}
     _check_states(definition, initial)
     return DynamicModel(definition, equations, parameters, digest, constants, initial)
+
+
+def declared_values(definition: ModelDefinition, parameters: ParameterSet) -> dict[str, Any]:
+    """Parameters by name as a declaration takes them: floats and points."""
+    return {
+        key: parameters[key] if declared.size > 1 else float(parameters[key])
+        for key, declared in definition.parameters.items()
+    }
 
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:

@@ -95,19 +95,24 @@ class Lifting(ShortRepr):
     def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
         return {}
 
+    def text(self, modes: int) -> tuple[str, np.ndarray]:
+        """Source and constants of the kernel; without modes for a start that excites none."""
+        right = self.transient.right[:modes]
+        pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
+        pairs = pairs.reshape(2 * modes, right.shape[1])
+        shared = [self.coefficients, self.reference[None]]
+        rows = np.vstack([*shared, pairs] if modes else shared)
+        rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
+        text = lifting_text(self.features, self.layout, len(self.parameters), modes)
+        return text, np.concatenate([self.parameters, rows.ravel()])
+
     def _kernel(self, modes: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
-        """Address and constants of the kernel; without modes for a start that excites none."""
+        """Address and constants of the kernel."""
         if (modes, lanes) not in self._made:
-            right = self.transient.right[:modes]
-            pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
-            pairs = pairs.reshape(2 * modes, right.shape[1])
-            shared = [self.coefficients, self.reference[None]]
-            rows = np.vstack([*shared, pairs] if modes else shared)
-            rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-            text = lifting_text(self.features, self.layout, len(self.parameters), modes)
+            text, constants = self.text(modes)
             kernels = Kernels(kernel_sources(text))
             address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
-            self._made[modes, lanes] = address, np.concatenate([self.parameters, rows.ravel()])
+            self._made[modes, lanes] = address, constants
         return self._made[modes, lanes]
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
