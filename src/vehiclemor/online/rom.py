@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
@@ -162,6 +163,7 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
+        number("time", time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
 
@@ -196,12 +198,12 @@ class ReducedOrderModel(ShortRepr):
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
         """Which output is beyond what the full model declares, if one is."""
-        names, numbers, ranges = limits_of(self.model.definition)
+        names, places, ranges = limits_of(self.model.definition)
         if not names:
             return ""
         outputs = self.outputs(states, inputs)
-        for name, number, (low, high) in zip(names, numbers, ranges, strict=False):
-            values = outputs[:, number]
+        for name, place, (low, high) in zip(names, places, ranges, strict=False):
+            values = outputs[:, place]
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
