@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.online.rom import reduce as reduce
+    from vehiclemor.online.saved import load as load
+    from vehiclemor.online.saved import rom as rom
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -32,18 +34,21 @@ _DEFINED_IN = {
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
     "VehiclemorError": "vehiclemor.errors",
     "reduce": "vehiclemor.online.rom",
+    **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
 }
 __all__ = [
     "VehiclemorError",
     "compare",
     "describe",
     "figures",
+    "load",
     "maneuvers",
     "methods",
     "model",
     "models",
     "plot",
     "reduce",
+    "rom",
     "run_study",
     "simulate",
     "studies",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class ReducedOrderModel(ShortRepr):
     settings
         All of its settings.
     training
-        What it has been trained on.
+        What it has been trained on; of a loaded model the content of each scenario.
     reduced
         What the method's fit gave.
     """
@@ -51,7 +52,7 @@ class ReducedOrderModel(ShortRepr):
     model: Model
     method: str
     settings: Settings
-    training: tuple[Scenario, ...]
+    training: tuple[Scenario | Mapping[str, Any], ...]
     reduced: ReducedModel
 
     @cached_property
@@ -208,6 +209,27 @@ class ReducedOrderModel(ShortRepr):
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
         return ""
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write it into one netCDF file, which `load` reads.
+
+        Parameters
+        ----------
+        overwrite
+            Whether a file that is there is replaced.
+
+        Raises
+        ------
+        InputError
+            If the path is taken, or the method makes something that can't be written.
+        VehiclemorError
+            If the file can't be written; then there is none, or the old one.
+        """
+        from vehiclemor.online.model_file import Saved, write
+
+        training = [run.content if isinstance(run, Scenario) else run for run in self.training]
+        saved = Saved(self.model, self.method, self.settings, tuple(training), self.reduced)
+        return write(saved, path, overwrite)
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""

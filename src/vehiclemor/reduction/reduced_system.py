@@ -189,9 +189,6 @@ def transformed_system(
     """
     dim = len(system.reference)
 
-    def lift(run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return system.along("full_state", run.path, inputs, 2 * len(model.coordinates))
-
     return ReducedSystem(
         model,
         system,
@@ -201,7 +198,19 @@ def transformed_system(
         settings.solver,
         settings.tolerance,
         encode,
-        lift,
+        FullStates(system, 2 * len(model.coordinates)).lift,
         judge=judge,
         names=tuple(names),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FullStates(ShortRepr):
+    """Full states, so many, by the kernel `full_state` of a transformed system."""
+
+    system: System
+    size: int
+
+    def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """Full states (samples, size) of a run."""
+        return self.system.along("full_state", run.path, inputs, self.size)
