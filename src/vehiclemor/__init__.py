@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -32,11 +33,13 @@ _DEFINED_IN = {
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    "Signal": "vehiclemor.signals",
     "VehiclemorError": "vehiclemor.errors",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
 }
 __all__ = [
+    "Signal",
     "VehiclemorError",
     "compare",
     "describe",

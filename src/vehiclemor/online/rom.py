@@ -16,10 +16,11 @@ from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
+from vehiclemor.simulation.checks import check_positive, checked_array, checked_path, limits_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.study.input_range import input_range
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.scenario import Scenario
 
@@ -103,7 +104,16 @@ class ReducedOrderModel(ShortRepr):
         chosen = self.model.definition.maneuver if maneuver is None else maneuver
         if isinstance(chosen, str):
             chosen = component("maneuver", chosen)
-        return self.reduced.simulate(chosen, self.model.starts[0] if start is None else start)
+        begun = self.model.starts[0] if start is None else start
+        run = self.reduced.simulate(chosen, begun)
+        if run.trust or self._judges_itself:
+            return run
+        own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
+        return run.judged(self.input_range.trust(self.model, Scenario(chosen, own)))
+
+    @cached_property
+    def _judges_itself(self) -> bool:
+        return component("method", self.method).own_limits
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""
@@ -170,13 +180,31 @@ class ReducedOrderModel(ShortRepr):
         found = self.model.along("outputs", self.state_space.full_states(states, u), u)
         return found[0] if single else found
 
-    def trust(self, state: Any, inputs: Any) -> Trust | None:
+    def trust(self, state: Any, inputs: Any) -> Trust:
         """How far a state, or states (samples, dim), go in what the model knows.
 
-        None of a model that does not judge itself.
+        A model that does not judge itself knows the inputs that it was trained on, and the full
+        one the ranges of validity that it declares.  Where a run came from is not in a state.
         """
         states, u, _ = self._samples(state, inputs)
-        return self.state_space.trust(states, u)
+        found = self.state_space.trust(states, u)
+        if found is None and not self._judges_itself:
+            found = input_range(self.model, self.training).trust_of_inputs(self.inputs, u)
+        left = self._left_validity(states, u)
+        return Trust(np.inf, 0.0, left) if left else found or Trust(0.0)
+
+    def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
+        """Which output is beyond what the full model declares, if one is."""
+        names, numbers, ranges = limits_of(self.model.definition)
+        if not names:
+            return ""
+        outputs = self.outputs(states, inputs)
+        for name, number, (low, high) in zip(names, numbers, ranges, strict=False):
+            values = outputs[:, number]
+            wrong = values[~((values >= low) & (values <= high))]
+            if len(wrong):
+                return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
+        return ""
 
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write it into one netCDF file, which `load` reads.

@@ -12,7 +12,7 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_inputs
+from vehiclemor.simulation.checks import checked_maneuver
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
@@ -131,7 +131,7 @@ class ReducedSystem(ShortRepr):
         begin: float = 0.0,
     ) -> Run:
         """Path of the reduced states, from a full state at a time; see `System.run`."""
-        check_inputs(maneuver, self.model.definition)
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         # Output times begin with zero.
         first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
         state = self._encoded(start, first[0])
