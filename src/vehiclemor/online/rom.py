@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
@@ -20,7 +21,7 @@ from vehiclemor.simulation.checks import check_positive, checked_array, checked_
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.study.input_range import input_range
+from vehiclemor.study.input_range import InputRange, input_range
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.scenario import Scenario
 
@@ -44,6 +45,8 @@ class ReducedOrderModel(ShortRepr):
         What it has been trained on; of a loaded model the content of each scenario.
     reduced
         What the method's fit gave.
+    known
+        Range of the inputs of its training, where the runs themselves are not at hand.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
@@ -53,6 +56,7 @@ class ReducedOrderModel(ShortRepr):
     settings: Settings
     training: tuple[Scenario | Mapping[str, Any], ...]
     reduced: ReducedModel
+    known: InputRange | None = None
 
     @cached_property
     def state_space(self) -> StateSpace:
@@ -112,6 +116,12 @@ class ReducedOrderModel(ShortRepr):
         return run.judged(self.input_range.trust(self.model, Scenario(chosen, own)))
 
     @cached_property
+    def input_range(self) -> InputRange:
+        """Range of the inputs of the training runs."""
+        runs = tuple(run for run in self.training if isinstance(run, Scenario))
+        return self.known or input_range(self.model, runs)
+
+    @cached_property
     def _judges_itself(self) -> bool:
         return component("method", self.method).own_limits
 
@@ -161,6 +171,7 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
+        number("time", time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
 
@@ -189,18 +200,18 @@ class ReducedOrderModel(ShortRepr):
         states, u, _ = self._samples(state, inputs)
         found = self.state_space.trust(states, u)
         if found is None and not self._judges_itself:
-            found = input_range(self.model, self.training).trust_of_inputs(self.inputs, u)
+            found = self.input_range.trust_of_inputs(self.inputs, u)
         left = self._left_validity(states, u)
         return Trust(np.inf, 0.0, left) if left else found or Trust(0.0)
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
         """Which output is beyond what the full model declares, if one is."""
-        names, numbers, ranges = limits_of(self.model.definition)
+        names, places, ranges = limits_of(self.model.definition)
         if not names:
             return ""
         outputs = self.outputs(states, inputs)
-        for name, number, (low, high) in zip(names, numbers, ranges, strict=False):
-            values = outputs[:, number]
+        for name, place, (low, high) in zip(names, places, ranges, strict=False):
+            values = outputs[:, place]
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
@@ -224,8 +235,8 @@ class ReducedOrderModel(ShortRepr):
         from vehiclemor.online.model_file import Saved, write
 
         training = [run.content if isinstance(run, Scenario) else run for run in self.training]
-        saved = Saved(self.model, self.method, self.settings, tuple(training), self.reduced)
-        return write(saved, path, overwrite)
+        how = self.method, self.settings, tuple(training)
+        return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""

@@ -58,10 +58,6 @@ def refusal(path: Path) -> str:
     return line
 
 
-def features(parts: dict[str, Any]) -> dict[str, Any]:
-    return parts["fields"]["features"]["fields"]
-
-
 LOADED = """
 import json, sys
 import vehiclemor as vm
@@ -182,7 +178,7 @@ def replaced(places: str, value: Any) -> Callable[[xr.Dataset, dict[str, Any]], 
     """Puts a value at `a.b.c` in the parts of a model."""
 
     def change(_: object, parts: dict[str, Any]) -> None:
-        *path, last = places.split(".")
+        *path, last = ["reduced", *places.split(".")]
         for name in path:
             parts = parts[name]
         parts[last] = value
