@@ -65,7 +65,7 @@ class Kernels:
         lanes
             Samples that it takes at once, see `llvm_kernels.kernel_module`.
         """
-        return machine(self.sources[name], lanes)[0] if name in self.sources else 0
+        return _machine(self.sources[name], lanes)[0] if name in self.sources else 0
 
     def call(self, name: str, *arrays: np.ndarray) -> None:
         """Run a kernel.
@@ -81,7 +81,7 @@ class Kernels:
             If an array is too short or of another kind.
         """
         source = self.sources[name]
-        function = machine(source, 1)[1]
+        function = _machine(source, 1)[1]
         function(*[_checked(source, k, array) for k, array in enumerate(arrays)])
 
 
@@ -105,7 +105,7 @@ def _checked(source: KernelSource, place: int, array: Any) -> int:
 
 
 @once
-def machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCode]:
+def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
     parts = [source.text, str(lanes), source_digest(("codegen",), (), ()), compiler_identity()]
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]

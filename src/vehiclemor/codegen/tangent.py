@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import KernelSource, kernel_sources, machine
+from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
 from vehiclemor.codegen.object_cache import fetched
 from vehiclemor.codegen.once import once
 from vehiclemor.codegen.sources import source_digest
@@ -94,7 +94,9 @@ def _function(source: KernelSource, lanes: int) -> Callable[..., None]:
     """Machine code of a tangent as a C function; in lanes it is told how long rows are."""
     kinds: list[Any] = [ctypes.c_void_p] * len(source.arguments)
     kinds += [ctypes.c_int64] * (2 if lanes > 1 else 0)
-    return ctypes.CFUNCTYPE(None, *kinds)(machine(source, lanes)[0])
+    return ctypes.CFUNCTYPE(None, *kinds)(
+        Kernels({source.name: source}).address(source.name, lanes)
+    )
 
 
 @once
