@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.online.rom import reduce as reduce
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -30,6 +31,7 @@ _DEFINED_IN = {
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
     "VehiclemorError": "vehiclemor.errors",
+    "reduce": "vehiclemor.online.rom",
 }
 __all__ = [
     "VehiclemorError",
@@ -41,6 +43,7 @@ __all__ = [
     "model",
     "models",
     "plot",
+    "reduce",
     "run_study",
     "simulate",
     "studies",

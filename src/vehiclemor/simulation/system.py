@@ -306,35 +306,49 @@ class System(ShortRepr):
         direct_until: float,
     ) -> Plan:
         """What runs of a maneuver share."""
+        times = output_times(solver.times, maneuver, begin=solver.begin)
+        signal = signal_of(maneuver)
+        end = float(times[-1]) if len(times) else maneuver.duration
+        spans = windows.spans(signal.bundle.edges, end, solver.begin)
+        nothing = np.empty(0)
+        output = Output(times, nothing, nothing, *NO_POINTS, direct_until)
+        loop, arguments, sizes = self.loop(windows, solver, signal, spans, output)
+        modules = catalogue.integrator(solver.name).modules
+        cubic = solver.times is None and not solver.begin and "cubic" in modules
+        cubic = cubic and len(times) >= LANES and direct_until < times[-1]
+        given = recorded_inputs(maneuver)[1] if cubic else None
+        return Plan(loop, arguments, sizes, given, windows, [])
+
+    def loop(
+        self,
+        windows: ProjectionWindows,
+        solver: Solver,
+        signal: Ready,
+        spans: Ready,
+        output: Output,
+    ) -> tuple[Loop, RunArguments, tuple[int, int, int]]:
+        """The compiled time loop, its arguments but for space, and the sizes of that."""
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
-        times = output_times(solver.times, maneuver, begin=solver.begin)
-        signal = signal_of(maneuver)
-        end = float(times[-1]) if len(times) else maneuver.duration
         steps = self.steps(name) if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
         nothing = np.empty(0)
+        longest = float(solver.longest_step or np.inf)
         arguments = RunArguments(
             nothing,
             self.called(formulation, name if steps else ""),
             signal,
-            windows.spans(signal.bundle.edges, end, solver.begin),
+            spans,
             windows.subspaces,
             self.method(name, active),
-            catalogue.control_of(
-                solver.name, float(solver.tolerance), float(solver.longest_step or np.inf)
-            ),
-            Output(times, nothing, nothing, *NO_POINTS, direct_until),
+            catalogue.control_of(solver.name, float(solver.tolerance), longest),
+            output,
             nothing,
             nothing,
         )
         floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
-        loop = catalogue.time_loop(chosen, formulation, steps)
-        cubic = solver.times is None and not solver.begin and "cubic" in chosen.modules
-        cubic = cubic and len(times) >= LANES and direct_until < times[-1]
-        given = recorded_inputs(maneuver)[1] if cubic else None
-        return Plan(loop, arguments, (n, floats, dim + 8), given, windows, [])
+        return catalogue.time_loop(chosen, formulation, steps), arguments, (n, floats, dim + 8)

@@ -189,7 +189,7 @@ def _tested(
         start = start_of(model, scenario)
         if experiment.keep == "errors":
             trajectory = _sound(model, reduced, scenario, start)
-            trajectory = _warned(model, experiment, scenario, trajectory)
+            trajectory = warned(model, experiment.method, experiment.training, scenario, trajectory)
             return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
@@ -207,21 +207,21 @@ def _tested(
     return attempt(run)
 
 
-def _warned(
-    model: Model, experiment: Experiment, scenario: Scenario, run: Trajectory
+def warned(
+    model: Model, method: str, training: tuple[Scenario, ...], scenario: Scenario, run: Trajectory
 ) -> Trajectory:
     """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
-    if run.trust or component("method", experiment.method).own_limits:
+    if run.trust or component("method", method).own_limits:
         return run
-    return run.judged(input_range(model, experiment.training).trust(model, scenario))
+    return run.judged(input_range(model, training).trust(model, scenario))
 
 
 def _remarked(model: Model, experiment: Experiment, run: Trajectory) -> Trajectory:
     """A run with a remark where a protocol would not trust it; its status is the method's own."""
-    warned = _warned(model, experiment, experiment.test[0], run)
-    if warned.status == run.status:
+    judged = warned(model, experiment.method, experiment.training, experiment.test[0], run)
+    if judged.status == run.status:
         return run
-    told = f"not to be trusted {warned.message}"
+    told = f"not to be trusted {judged.message}"
     return replace(run, remark="; ".join(part for part in (run.remark, told) if part))
 
 

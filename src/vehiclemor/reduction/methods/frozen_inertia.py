@@ -60,7 +60,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         partners=partners(names),
     )
     cost = Offline(time.process_time() - began)
-    return transformed_system(model, system, encode, cost, settings, judge)
+    return transformed_system(model, system, encode, cost, settings, names, judge)
 
 
 METHOD = Method(

@@ -16,6 +16,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
+from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
@@ -88,6 +89,11 @@ class GuardedModel(ShortRepr):
         if any(getattr(self.fast, name, value) != value for name, value in online.items()):
             return replace(self.fast, **online)  # type: ignore[type-var]
         return self.fast
+
+    @property
+    def state_space(self) -> StateSpace:
+        """That of the fast model, which tells where it is not to be trusted any more."""
+        return self.ahead.state_space  # type: ignore[attr-defined]
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The fast run; from where it can't be trusted on, the safe one."""

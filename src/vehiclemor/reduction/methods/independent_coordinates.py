@@ -31,6 +31,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
     n = len(model.coordinates)
     chosen = np.array([*PLACES, *(n + place for place in PLACES)])
     whole = list(chosen)
+    names = [model.definition.states[i] for i in whole]
 
     def encode(state: np.ndarray, _: np.ndarray) -> np.ndarray:
         return state[chosen].copy()
@@ -43,10 +44,10 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         model.error_scale[chosen],
         np.array([whole.index(i) for i in model.active if i in whole]),
         np.array([whole.index(i) for i in model.rotating], dtype=np.int64),
-        partners=partners([model.definition.states[i] for i in whole]),
+        partners=partners(names),
     )
     cost = Offline(time.process_time() - began)
-    return transformed_system(model, system, encode, cost, settings)
+    return transformed_system(model, system, encode, cost, settings, names)
 
 
 METHOD = Method(

@@ -17,8 +17,9 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
@@ -100,6 +101,7 @@ class ReducedVehicle(ShortRepr):
     @cached_property
     def equations(self) -> ReducedSystem:
         """The compiled equations with the ways there and back."""
+        x, y, heading = self.model.definition.planar
         return ReducedSystem(
             self.model,
             self.system,
@@ -109,7 +111,18 @@ class ReducedVehicle(ShortRepr):
             self.solver,
             self.tolerance,
             self.encoded,
+            lambda run, inputs, _: self._lifted(run, inputs)[0],
+            judge=lambda run, inputs: self._lifted(run, inputs)[1],
+            names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
         )
+
+    @property
+    def state_space(self) -> ReducedSystem:
+        """The reduced equations: a state tells nothing of what has decayed after the start."""
+        return self.equations
+
+    def _lifted(self, run: Run, inputs: np.ndarray) -> tuple[np.ndarray, Trust | None]:
+        return self.lift.states(run.times, run.path, inputs, np.empty((2, 0, 2)))
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
