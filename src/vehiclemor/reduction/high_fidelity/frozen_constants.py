@@ -9,7 +9,8 @@ from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
 from vehiclemor.multibody.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
-from vehiclemor.simulation.build import compiled, hoisted_constants
+from vehiclemor.simulation.build import compiled
+from vehiclemor.simulation.constants import hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
     made, _ = compiled("high_fidelity_frozen_inertia", _derive)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
-    return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
+    return made, hoisted_constants(made, model.parameters.flat(), [*free_lengths(model), *fixed])
 
 
 def _derive() -> "Program":

@@ -38,6 +38,15 @@ def projected_vehicle(
     def lift(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
         return from_heading_frame(run.path)
 
+    def slopes(state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        heading_of = np.full(len(state), state[heading])
+        found = turned(np.eye(len(state)), shape.pairs, heading_of).T
+        there = from_heading_frame(state[None])[0]
+        for a, b in shape.pairs:
+            found[a, heading] -= there[b]
+            found[b, heading] += there[a]
+        return found, np.zeros((len(state), len(inputs)))
+
     def project(states: np.ndarray) -> np.ndarray:
         # Oblique projection, along the directions that the test basis does not see.
         mean, basis, test = spaces.means[0], spaces.trial_basis[0], spaces.test_basis[0]
@@ -55,6 +64,7 @@ def projected_vehicle(
         encode,
         lift,
         project=project,
+        slopes=slopes,
     )
 
 
