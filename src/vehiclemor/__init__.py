@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.online.rom import reduce as reduce
+    from vehiclemor.online.saved import load as load
+    from vehiclemor.online.saved import rom as rom
+    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -30,20 +33,25 @@ _DEFINED_IN = {
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    "Signal": "vehiclemor.signals",
     "VehiclemorError": "vehiclemor.errors",
     "reduce": "vehiclemor.online.rom",
+    **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
 }
 __all__ = [
+    "Signal",
     "VehiclemorError",
     "compare",
     "describe",
     "figures",
+    "load",
     "maneuvers",
     "methods",
     "model",
     "models",
     "plot",
     "reduce",
+    "rom",
     "run_study",
     "simulate",
     "studies",

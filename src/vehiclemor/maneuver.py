@@ -71,11 +71,9 @@ class Maneuver(ShortRepr):
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
         within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
-        for name, bounds in FACTORS.items():
-            factor = number(f"{name} factor", getattr(self, f"{name}_factor"))
-            if name == "frequency" and factor <= 0.0:
-                raise InputError(f"{name} factor: {factor:g} is not positive")
-            object.__setattr__(self, f"{name}_factor", within(f"{name} factor", factor, bounds))
+        for name in FACTORS:
+            factor = checked_factor(name, getattr(self, f"{name}_factor"))
+            object.__setattr__(self, f"{name}_factor", factor)
 
     def __str__(self) -> str:
         return f"maneuver {self.name!r}"
@@ -88,6 +86,11 @@ class Maneuver(ShortRepr):
     def times(self) -> np.ndarray:
         """Equidistant output times (samples,) in s."""
         return np.linspace(0.0, self.duration, self.samples)
+
+    @property
+    def recorded(self) -> tuple[np.ndarray, np.ndarray]:
+        """Output times (samples,) in s, and the inputs (samples, number of inputs) at them."""
+        return (times := self.times), self.at(times)
 
     @property
     def break_points(self) -> tuple[float, ...]:
@@ -121,6 +124,18 @@ class Maneuver(ShortRepr):
             If a factor is not finite, or out of its bounds.
         """
         return replace(self, frequency_factor=frequency, amplitude_factor=amplitude)
+
+    def for_inputs(self, names: tuple[str, ...]) -> "Maneuver":  # noqa: ARG002
+        """The maneuver as a model with these inputs takes it."""
+        return self
+
+
+def checked_factor(name: str, value: object) -> float:
+    """A factor on the frequency or amplitude; `InputError` if it is none, or out of bounds."""
+    factor = number(f"{name} factor", value)
+    if name == "frequency" and factor <= 0.0:
+        raise InputError(f"{name} factor: {factor:g} is not positive")
+    return within(f"{name} factor", factor, FACTORS[name])
 
 
 # Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.

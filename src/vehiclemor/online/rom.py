@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
@@ -40,7 +42,7 @@ class ReducedOrderModel(ShortRepr):
     settings
         All of its settings.
     training
-        What it has been trained on.
+        What it has been trained on; of a loaded model the content of each scenario.
     reduced
         What the method's fit gave.
     """
@@ -50,7 +52,7 @@ class ReducedOrderModel(ShortRepr):
     model: Model
     method: str
     settings: Settings
-    training: tuple[Scenario, ...]
+    training: tuple[Scenario | Mapping[str, Any], ...]
     reduced: ReducedModel
 
     @cached_property
@@ -162,6 +164,7 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
+        number("time", time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
 
@@ -226,16 +229,37 @@ class ReducedOrderModel(ShortRepr):
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
         """Which output is beyond what the full model declares, if one is."""
-        names, numbers, ranges = limits_of(self.model.definition)
+        names, places, ranges = limits_of(self.model.definition)
         if not names:
             return ""
         outputs = self.outputs(states, inputs)
-        for name, number, (low, high) in zip(names, numbers, ranges, strict=False):
-            values = outputs[:, number]
+        for name, place, (low, high) in zip(names, places, ranges, strict=False):
+            values = outputs[:, place]
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
         return ""
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write it into one netCDF file, which `load` reads.
+
+        Parameters
+        ----------
+        overwrite
+            Whether a file that is there is replaced.
+
+        Raises
+        ------
+        InputError
+            If the path is taken, or the method makes something that can't be written.
+        VehiclemorError
+            If the file can't be written; then there is none, or the old one.
+        """
+        from vehiclemor.online.model_file import Saved, write
+
+        training = [run.content if isinstance(run, Scenario) else run for run in self.training]
+        saved = Saved(self.model, self.method, self.settings, tuple(training), self.reduced)
+        return write(saved, path, overwrite)
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""

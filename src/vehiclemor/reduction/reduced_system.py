@@ -14,7 +14,7 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_inputs
+from vehiclemor.simulation.checks import checked_maneuver
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.kernel_derivatives import (
@@ -138,7 +138,7 @@ class ReducedSystem(ShortRepr):
         function, names, along = chosen(of, RESULTS), parameter_names(by), Along(CONSTANTS)
         if not names:
             along = Along(PLACES[str(by)])
-        elif self.system.constants is self.model.constants:
+        elif np.array_equal(self.system.constants, self.model.constants):
             along = Along(CONSTANTS, self.model.constants_along(names))
         else:
             raise InputError(
@@ -177,7 +177,7 @@ class ReducedSystem(ShortRepr):
         begin: float = 0.0,
     ) -> Run:
         """Path of the reduced states, from a full state at a time; see `System.run`."""
-        check_inputs(maneuver, self.model.definition)
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         # Output times begin with zero.
         first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
         state = self._encoded(start, first[0])
@@ -242,15 +242,7 @@ def transformed_system(
         See `ReducedSystem`.
     """
     dim = len(system.reference)
-
-    n = 2 * len(model.coordinates)
-
-    def lift(run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return system.along("full_state", run.path, inputs, n)
-
-    def slopes(state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return full_state_slopes(system.kernels, (state, inputs, system.constants), n)
-
+    full = FullStates(system, 2 * len(model.coordinates))
     return ReducedSystem(
         model,
         system,
@@ -260,8 +252,25 @@ def transformed_system(
         settings.solver,
         settings.tolerance,
         encode,
-        lift,
+        full.lift,
         judge=judge,
         names=tuple(names),
-        slopes=slopes,
+        slopes=full.slopes,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FullStates(ShortRepr):
+    """Full states, so many, by the kernel `full_state` of a transformed system."""
+
+    system: System
+    size: int
+
+    def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """Full states (samples, size) of a run."""
+        return self.system.along("full_state", run.path, inputs, self.size)
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Their derivatives by state and inputs."""
+        arrays = state, inputs, self.system.constants
+        return full_state_slopes(self.system.kernels, arrays, self.size)

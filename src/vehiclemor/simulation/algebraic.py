@@ -15,12 +15,13 @@ from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import unknown
+from vehiclemor.signals import Signal
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
-    check_inputs,
     check_positive,
     checked_array,
     checked_inputs,
+    checked_maneuver,
     output_times,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
@@ -225,8 +226,12 @@ class AlgebraicModel(Model):
         InputError
             As of `inputs_of`.
         """
-        check_inputs(maneuver, self.definition)
-        return _sampled(maneuver)
+        maneuver = checked_maneuver(maneuver, self.definition)
+        if not isinstance(maneuver, Signal):
+            return _sampled(maneuver)
+        if "sampled" not in maneuver.kept:
+            maneuver.kept["sampled"] = _ready_samples(maneuver)
+        return maneuver.kept["sampled"]
 
     def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
         """Inputs (samples, number of inputs) of a maneuver as the loops want them.
@@ -236,7 +241,7 @@ class AlgebraicModel(Model):
         InputError
             If they are not the model's, or one isn't finite.
         """
-        check_inputs(maneuver, self.definition)
+        maneuver = checked_maneuver(maneuver, self.definition)
         return checked_inputs(maneuver.at(times), times, self.inputs)
 
     def solve_path(
@@ -382,11 +387,13 @@ def _iteration(tolerance: float, shortest: float) -> Ready:
     return ready(newton_loops.Iteration(tolerance, *limits))
 
 
-@lru_cache(maxsize=64)
-def _sampled(maneuver: Maneuver) -> Sampled:
+def _ready_samples(maneuver: Maneuver) -> Sampled:
     times, inputs = recorded_inputs(maneuver)
     checked_inputs(inputs, times, maneuver.inputs)
     return times, inputs, ready(newton_loops.Samples(inputs))
+
+
+_sampled = lru_cache(maxsize=64)(_ready_samples)
 
 
 def new_counts() -> np.ndarray:

@@ -10,6 +10,7 @@ from vehiclemor.arguments import number, quoted, real_array, within
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.signals import Signal
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -72,15 +73,26 @@ def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.nd
     return inputs
 
 
-def check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
-    """Raise `InputError` if a maneuver is none, or gives other inputs than a model has.
+def checked_maneuver(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
+    """A maneuver, a signal with all inputs that a model has.
 
-    Nor may an input leave the bounds in which the model declares that it means anything.
+    Raises
+    ------
+    InputError
+        If it is none, gives other inputs than the model has, or one that leaves the bounds in which
+        the model declares that it means anything.
     """
     if not isinstance(maneuver, Maneuver):
         wrong = quoted(maneuver)
         raise InputError(f"{wrong} is not a maneuver: get one by its name from the registry")
-    _check_inputs(maneuver, definition)
+    if not isinstance(maneuver, Signal):
+        _check_inputs(maneuver, definition)
+        return maneuver
+    if definition not in maneuver.kept:
+        complete = maneuver.for_inputs(tuple(quantity.name for quantity in definition.inputs))
+        _check_bounds(complete, definition)
+        maneuver.kept[definition] = complete
+    return maneuver.kept[definition]
 
 
 # A maneuver is checked once for all its runs.
@@ -92,14 +104,17 @@ def _check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
             f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
             f"{definition.name} needs {', '.join(names)}"
         )
+    _check_bounds(maneuver, definition)
+
+
+def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     units = {quantity.name: quantity.unit for quantity in definition.inputs}
     bounded = {name: b for name, b in definition.validity.items() if name in units}
     if not bounded:
         return
-    times = maneuver.times
-    values = maneuver.at(times)
+    times, values = maneuver.recorded
     for name, (low, high) in bounded.items():
-        column = values[:, names.index(name)]
+        column = values[:, maneuver.inputs.index(name)]
         outside = np.flatnonzero(np.isfinite(column) & ((column < low) | (column > high)))
         if len(outside):
             sample, unit = outside[0], units[name]
@@ -113,10 +128,11 @@ def check_resolved(maneuver: Maneuver) -> None:
     """Raise `InputError` if the output times are too far apart to show the inputs.
 
     Between two output times without a corner an input stays within a quarter of its range of the
-    straight line, as a sine of three samples a period does; it may leave it once.
+    straight line, as a sine of three samples a period does; it may leave it once.  A signal is
+    known between them.
     """
     times, between = maneuver.times, 0.38
-    if len(times) == 1:
+    if len(times) == 1 or isinstance(maneuver, Signal):
         return
     step = times[1]
     values = maneuver.at(times)

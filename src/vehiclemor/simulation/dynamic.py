@@ -14,7 +14,7 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
-    check_inputs,
+    checked_maneuver,
     cut_short,
     left_validity,
     lifted_wheels,
@@ -242,7 +242,7 @@ class DynamicModel(Model):
         windows
             Formulation of the system and its subspaces by window.
         """
-        check_inputs(maneuver, self.definition)
+        maneuver = checked_maneuver(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step, begin)

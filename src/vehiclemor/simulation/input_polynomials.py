@@ -3,7 +3,7 @@
 Between two break points of a maneuver an input is smooth: polynomials of degree 5 through the
 Chebyshev points of equal pieces (L. N. Trefethen, Approximation Theory and Approximation Practice,
 2013, chapter 2), halved until the error half-way between these points is below `ACCURACY` times the
-input's largest value.
+input's largest value.  A signal brings its own.
 """
 
 from functools import cache, lru_cache
@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from vehiclemor import signals
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
@@ -20,20 +21,41 @@ from vehiclemor.simulation.integrators.structures import Signal
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
 DEGREE = 5
+# Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
+KEPT = 512
 
 
-@lru_cache(maxsize=64)
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    times = maneuver.times
-    inputs = loop_array(maneuver.at(times))
+    return maneuver.recorded if isinstance(maneuver, signals.Signal) else _recorded(maneuver)
+
+
+@lru_cache(maxsize=KEPT)
+def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+    times, inputs = maneuver.recorded
+    inputs = loop_array(inputs)
     times.flags.writeable = inputs.flags.writeable = False
     return times, inputs
 
 
-@lru_cache(maxsize=64)
 def signal_of(maneuver: Maneuver) -> Ready:
-    """Piecewise polynomial inputs of a maneuver.
+    """Piecewise polynomial inputs of a maneuver, those of a signal as they are.
+
+    Raises
+    ------
+    InputError
+        If an input isn't finite, or isn't smooth between the break points that the maneuver names.
+    """
+    if not isinstance(maneuver, signals.Signal):
+        return _found_signal(maneuver)
+    if "ready" not in maneuver.kept:
+        maneuver.kept["ready"] = ready(Signal(*maneuver.polynomials))
+    return maneuver.kept["ready"]
+
+
+@lru_cache(maxsize=KEPT)
+def _found_signal(maneuver: Maneuver) -> Ready:
+    """Polynomials of a function, searched for.
 
     Raises
     ------
@@ -56,7 +78,7 @@ def signal_of(maneuver: Maneuver) -> Ready:
     largest = np.abs(samples).max(axis=0) + 1e-300
     parts = [_segment(maneuver, (a, b), largest, (times, samples)) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
-    return ready(Signal(edges, first.astype(np.int64), np.concatenate(parts)))
+    return ready(Signal(edges, first.astype(np.int64), np.empty(0), np.concatenate(parts)))
 
 
 def _segment(

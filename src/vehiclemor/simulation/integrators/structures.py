@@ -21,6 +21,8 @@ class Signal(NamedTuple):
         Ends of the smooth segments (segments + 1,) in s.
     first
         Number of the first piece of each segment (segments + 1,).
+    starts
+        Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
     coefficients
         Polynomials (pieces, inputs, 6) in the part of the piece that has passed, lowest power
         first.
@@ -28,6 +30,7 @@ class Signal(NamedTuple):
 
     edges: Vector
     first: IntVector
+    starts: Vector
     coefficients: Cube
 
 
