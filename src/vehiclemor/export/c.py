@@ -35,9 +35,7 @@ def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
 
 def _header(system: ExportedSystem, step: float) -> str:
     def listed(title: str, quantities: Sequence) -> list[str]:
-        rows = [
-            f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)
-        ]
+        rows = [f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)]
         return [f"   {title}:", *rows]
 
     sizes = system.sizes

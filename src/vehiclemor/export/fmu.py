@@ -99,7 +99,9 @@ def shared_library(texts: dict[str, str], compiled: tuple[str, ...]) -> bytes | 
 
 def _build_description(system: ExportedSystem) -> bytes:
     root = ElementTree.Element("fmiBuildDescription", fmiVersion="3.0")
-    build = ElementTree.SubElement(root, "BuildConfiguration", modelIdentifier=identifier(system))
+    build = ElementTree.SubElement(
+        root, "BuildConfiguration", modelIdentifier=identifier(system)
+    )
     files = ElementTree.SubElement(build, "SourceFileSet", language="C99")
     for name in sources(3):
         ElementTree.SubElement(files, "SourceFile", name=name)

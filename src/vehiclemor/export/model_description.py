@@ -52,12 +52,16 @@ def variables(system: ExportedSystem) -> list[Variable]:
         found.append(Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated"))
     for q, value in zip(system.parameters, system.values.tolist(), strict=True):
         name = f"parameter.{q.name}"
-        found.append(Variable(name, q.unit, q.long_name, "parameter", "tunable", "exact", value))
+        found.append(
+            Variable(name, q.unit, q.long_name, "parameter", "tunable", "exact", value)
+        )
     return found
 
 
 def _local(name: str, quantity, initial: str, start: float | None = None) -> Variable:
-    return Variable(name, quantity.unit, quantity.long_name, "local", "continuous", initial, start)
+    return Variable(
+        name, quantity.unit, quantity.long_name, "local", "continuous", initial, start
+    )
 
 
 def model_description(system: ExportedSystem, token: str, step: float, fmi: int) -> bytes:
@@ -134,7 +138,9 @@ def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
             ElementTree.SubElement(unit, "BaseUnit", given)
 
 
-def _variable(listed: ElementTree.Element, variable: Variable, reference: int, fmi: int) -> None:
+def _variable(
+    listed: ElementTree.Element, variable: Variable, reference: int, fmi: int
+) -> None:
     own = {
         "name": variable.name,
         "valueReference": str(reference),
