@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.exporting.export import export as export
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
@@ -35,6 +36,7 @@ _DEFINED_IN = {
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "VehiclemorError": "vehiclemor.errors",
+    "export": "vehiclemor.exporting.export",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
 }
@@ -43,6 +45,7 @@ __all__ = [
     "VehiclemorError",
     "compare",
     "describe",
+    "export",
     "figures",
     "load",
     "maneuvers",

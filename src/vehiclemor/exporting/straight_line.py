@@ -2,23 +2,23 @@
 
 The text of a kernel also has batches of elementary functions and weighted sums, which are for the
 vector units; here they are written out.  What is left are numbers, names, entries of the arguments,
-`+ - * /`, comparisons and calls of `FUNCTIONS`: short enough for any printer or interpreter.
+`+ - * /`, comparisons and calls: short enough for any printer or interpreter.
 """
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from vehiclemor.codegen.kernel_statements import KernelText, places
 from vehiclemor.codegen.vector_lanes import LANES, padded
 
-# Names of C's library, of which other systems have their own; besides these there are `pow`, and
-# `select(test, then, otherwise)`.
+# Names of C's library, of which other systems have their own.  Besides these there are `pow`,
+# `select(test, then, otherwise)`, and `entry(row, place)` of a table.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
     *("atan2", "fabs", "fmax", "fmin", "floor"),
 )
-RENAMED = {"abs": "fabs", "np.abs": "fabs", "np.floor": "floor"}
+RENAMED = {"abs": "fabs", "np.abs": "fabs", "np.floor": "floor", "max": "fmax", "min": "fmin"}
 # Function that has batches -> what gives its results.
 BATCHES = {"sincos": ("sin", "cos"), "atan": ("atan",)}
 
@@ -72,7 +72,7 @@ def entries(name: str, count: int) -> list[ast.expr]:
     return [ast.Subscript(ast.Name(name), ast.Constant(i)) for i in range(count)]
 
 
-def numbers(values: Sequence[float]) -> list[ast.expr]:
+def numbers(values: Iterable[float]) -> list[ast.expr]:
     """Expressions of numbers."""
     return [ast.Constant(float(value)) for value in values]
 
@@ -159,10 +159,11 @@ class _Reader:
             case ast.BinOp(left, operator, right):
                 return ast.BinOp(self._value(left), operator, self._value(right))
             case ast.UnaryOp(ast.USub(), operand):
-                value = self._value(operand)
                 # In C two signs in a row are a decrement.
-                negative = isinstance(value, ast.Constant)
-                return ast.Constant(-value.value) if negative else ast.UnaryOp(ast.USub(), value)
+                match value := self._value(operand):
+                    case ast.Constant(value=float() as number):
+                        return ast.Constant(-number)
+                return ast.UnaryOp(ast.USub(), value)
             case ast.Compare(left, [operator], [right]):
                 return ast.Compare(self._value(left), [operator], [self._value(right)])
             case ast.IfExp(test, then, otherwise):

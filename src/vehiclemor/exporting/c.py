@@ -8,14 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from vehiclemor import __version__
-from vehiclemor.export.straight_line import StraightLine
-from vehiclemor.export.system import ExportedSystem
+from vehiclemor.exporting.straight_line import StraightLine
+from vehiclemor.exporting.system import SIGNATURES, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
-# Function -> names of its arguments, in order, and of its result.
-SIGNATURES = {"constants": ("p", "c"), "derivative": ("x", "u", "c", "dx")}
-SIGNATURES["outputs"] = ("x", "u", "c", "y")
+SELECT = """\
+static double select(int test, double then, double otherwise)
+{
+    return test ? then : otherwise;
+}"""
+ENTRY = """\
+static double entry(double row, int place)
+{
+    return vehiclemor_table[(long)row + place];
+}"""
 STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
 
 
@@ -35,7 +41,9 @@ def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
 
 def _header(system: ExportedSystem, step: float) -> str:
     def listed(title: str, quantities: Sequence) -> list[str]:
-        rows = [f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)]
+        rows = [
+            f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)
+        ]
         return [f"   {title}:", *rows]
 
     sizes = system.sizes
@@ -50,7 +58,7 @@ def _header(system: ExportedSystem, step: float) -> str:
     states = [_declared(_start(name), sizes["x"]) for name in starts]
     lines = [
         f"/* {system.name}: {system.summary}.",
-        f"   Written by vehiclemor {__version__}.",
+        f"   Written by {TOOL}.",
         "",
         *listed("States x", system.states),
         *listed("Inputs u", system.inputs),
@@ -71,7 +79,7 @@ def _header(system: ExportedSystem, step: float) -> str:
         *(f"extern {declared};" for declared in (_declared("parameters", sizes["p"]), *states)),
         f"#define vehiclemor_start vehiclemor_{_start(starts[0])}",
         "",
-        "/* Constants c that follow from the parameters p: call it once, and whenever p changes. */",
+        "/* Constants c follow from the parameters p: needed once, and whenever p changes. */",
         *(f"void vehiclemor_{name}({_arguments(name)});" for name in SIGNATURES),
         "",
         "/* Take x over a step of h seconds; inputs are linear from u to u_end, which may be u. */",
@@ -98,18 +106,18 @@ def _arguments(name: str) -> str:
 
 def _model(system: ExportedSystem) -> str:
     parts = [
-        f"/* {system.name}: straight-line functions, written by vehiclemor {__version__}. */",
+        f"/* {system.name}: straight-line functions, written by {TOOL}. */",
         '#include <math.h>\n\n#include "vehiclemor_model.h"',
         _array("parameters", system.values),
         *(_array(_start(name), state) for name, state in system.starts.items()),
     ]
-    functions = {name: c_function(name, system.functions[name]) for name in SIGNATURES}
-    if any("select(" in text for text in functions.values()):
-        parts.append(
-            "static double select(int test, double then, double otherwise)\n"
-            "{\n    return test ? then : otherwise;\n}"
-        )
-    return "\n\n".join([*parts, *functions.values()]) + "\n"
+    functions = [c_function(name, system.functions[name]) for name in SIGNATURES]
+    if any("select(" in text for text in functions):
+        parts.append(SELECT)
+    if len(system.table):
+        parts.append(f"static {_array('table', system.table)}")
+        parts.append(ENTRY)
+    return "\n\n".join([*parts, *functions]) + "\n"
 
 
 def _array(name: str, values: np.ndarray) -> str:
