@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
+    from vehiclemor.online.batch_signals import Signals as Signals
+    from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
@@ -35,13 +37,16 @@ _DEFINED_IN = {
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
+    "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
+    "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
     "Signal",
+    "Signals",
     "VehiclemorError",
     "compare",
     "describe",
@@ -57,6 +62,7 @@ __all__ = [
     "rom",
     "run_study",
     "simulate",
+    "simulate_many",
     "studies",
 ]
 

@@ -56,25 +56,32 @@ class Pieces(NamedTuple):
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
-        edges, first, starts, coefficients = self
+        return evaluated(self.coefficients, *self.located(times))
+
+    def located(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers of the pieces in which times (n,) lie, and the parts of them that have passed."""
+        edges, first, starts, _ = self
         if len(starts):
             rows = np.searchsorted(starts, times, side="right") - 1
             rows = np.clip(rows, 0, len(starts) - 1)
-            parts = (times - starts[rows]) / self.lengths[rows]
-        else:
-            segments: Any = 0
-            if len(edges) > 2:
-                segments = np.searchsorted(edges, times, side="right") - 1
-                segments = np.clip(segments, 0, len(edges) - 2)
-            pieces, begin = first[segments + 1] - first[segments], edges[segments]
-            places = (times - begin) / (edges[segments + 1] - begin) * pieces
-            rows = np.clip(places.astype(np.int64), 0, pieces - 1)
-            parts, rows = places - rows, rows + first[segments]
-        own, parts = coefficients[rows], parts[:, None]
-        values = own[:, :, DEGREE]
-        for power in range(DEGREE - 1, -1, -1):
-            values = own[:, :, power] + parts * values
-        return values
+            return rows, (times - starts[rows]) / self.lengths[rows]
+        segments: Any = 0
+        if len(edges) > 2:
+            segments = np.searchsorted(edges, times, side="right") - 1
+            segments = np.clip(segments, 0, len(edges) - 2)
+        pieces, begin = first[segments + 1] - first[segments], edges[segments]
+        places = (times - begin) / (edges[segments + 1] - begin) * pieces
+        rows = np.clip(places.astype(np.int64), 0, pieces - 1)
+        return rows + first[segments], places - rows
+
+
+def evaluated(coefficients: np.ndarray, rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Values (..., n, inputs) of polynomials (..., pieces, inputs, 6), see `Pieces.located`."""
+    own, parts = coefficients[..., rows, :, :], parts[:, None]
+    values = own[..., DEGREE]
+    for power in range(DEGREE - 1, -1, -1):
+        values = own[..., power] + parts * values
+    return values
 
 
 def held(times: np.ndarray, values: np.ndarray) -> Pieces:
@@ -86,15 +93,16 @@ def held(times: np.ndarray, values: np.ndarray) -> Pieces:
     return Pieces(edges, np.arange(len(edges)), np.empty(0), coefficients)
 
 
-def linear(times: np.ndarray, values: np.ndarray) -> Pieces:
-    """Straight lines between samples."""
+def linear(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Coefficients of straight lines between samples."""
+    del times
     coefficients = _constant(values[:-1])
     coefficients[:, :, 1] = np.diff(values, axis=0)
-    return _pieces(times, values, coefficients)
+    return coefficients
 
 
-def cubic(times: np.ndarray, values: np.ndarray) -> Pieces:
-    """The cubic spline with continuous second derivatives, not-a-knot at its ends."""
+def cubic(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Coefficients of the spline with continuous second derivatives, not-a-knot at its ends."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(times, values)
@@ -102,10 +110,19 @@ def cubic(times: np.ndarray, values: np.ndarray) -> Pieces:
     lengths = np.diff(times)[:, None]
     for power in range(len(spline.c)):
         coefficients[:, :, power] = spline.c[-1 - power] * lengths**power
-    return _pieces(times, values, coefficients)
+    return coefficients
 
 
-HOLDS = {"linear": linear, "zero": held, "cubic": cubic}
+# Coefficients (intervals, inputs, 6) that don't depend on what other columns hold.
+CONTINUOUS = {"linear": linear, "cubic": cubic}
+HOLDS = ("linear", "zero", "cubic")
+
+
+def through(times: np.ndarray, values: np.ndarray, hold: str) -> Pieces:
+    """Polynomials through samples (n, inputs) by one of `HOLDS`."""
+    if hold == "zero":
+        return held(times, values)
+    return joined(times, values, CONTINUOUS[hold](times, values))
 
 
 def _constant(values: np.ndarray) -> np.ndarray:
@@ -114,7 +131,7 @@ def _constant(values: np.ndarray) -> np.ndarray:
     return coefficients
 
 
-def _pieces(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> Pieces:
+def joined(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> Pieces:
     """One piece for each interval; segments end where a quiet stretch begins or ends."""
     first = _quiet_ends(times, values)
     edges, starts = times[first], np.empty(0)

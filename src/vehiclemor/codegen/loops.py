@@ -78,6 +78,11 @@ class Prepared:
         """Run the loop; the lock of the interpreter is released meanwhile."""
         return self._entry(self.words)
 
+    @property
+    def entry(self) -> int:
+        """Address of the loop, for loops that call it."""
+        return ctypes.cast(self._entry, ctypes.c_void_p).value or 0  # type: ignore[arg-type]
+
     def address(self, name: str) -> int:
         """Number of the word that is the address of an array; its shape follows."""
         return self._places[name]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vehiclemor.exporting.straight_line import StraightLine
-from vehiclemor.exporting.system import SIGNATURES, ExportedSystem
+from vehiclemor.exporting.system import SIGNATURES, TOOL, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\

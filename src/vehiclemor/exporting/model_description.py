@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from vehiclemor.exporting.system import ExportedSystem
+from vehiclemor.exporting.system import TOOL, ExportedSystem
 from vehiclemor.exporting.units import base_units
 from vehiclemor.multibody.quantities import Quantity
 

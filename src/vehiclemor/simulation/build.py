@@ -14,7 +14,7 @@ from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, Values
-from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.parameters import ParameterSet, load_parameters, overridden
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -59,9 +59,19 @@ def build(
     definition: ModelDefinition = component("model", name)
     path = parameter_file or definition.parameter_file
     parameters = load_parameters(name, definition.parameters, path, overrides)
-    make = _algebraic if definition.kind == "ae" else _dynamic
     with first_use(name):
-        return make(definition, parameters)
+        return _made(definition, parameters)
+
+
+def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
+    """The model with some of its parameters changed: name -> value in SI units; see `build`."""
+    declared = model.definition.parameters
+    return _made(model.definition, overridden(model.parameters, declared, overrides))
+
+
+def _made(definition: ModelDefinition, parameters: ParameterSet) -> Model:
+    make = _algebraic if definition.kind == "ae" else _dynamic
+    return make(definition, parameters)
 
 
 def build_derived(name: str) -> Model | None:

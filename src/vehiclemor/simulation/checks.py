@@ -247,12 +247,14 @@ def left_validity(
     if sample == len(times):
         return "", sample
     name = names[first.index(sample)]
-    low, high = definition.validity[name]
     value = outputs[sample, [quantity.name for quantity in definition.outputs].index(name)]
-    return (
-        f"{name} is {value:.4g} at t = {times[sample]:.6g} s; the model holds "
-        f"from {low:g} to {high:g}"
-    ), sample
+    return out_of_validity(definition, name, value, times[sample]), sample
+
+
+def out_of_validity(definition: ModelDefinition, name: str, value: float, time: float) -> str:
+    """That an output has left its range of validity at a time in s."""
+    low, high = definition.validity[name]
+    return f"{name} is {value:.4g} at t = {time:.6g} s; the model holds from {low:g} to {high:g}"
 
 
 def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:

@@ -129,7 +129,7 @@ class Stepper:
         edges, coefficients = np.zeros(2), np.zeros((1, self.system.inputs, 6))
         span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
         counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
-        signal = ready(Signal(edges, one, coefficients))
+        signal = ready(Signal(edges, one, np.empty(0), coefficients))
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
         n = len(self.system.error_scale)
         output = Output(sample, np.empty((1, n)), counts, *NO_POINTS, np.inf)

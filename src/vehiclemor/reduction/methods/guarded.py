@@ -111,10 +111,14 @@ class GuardedModel(ShortRepr):
         else:
             begin, state = float(run.time[kept]), run.states[kept]
         later = self.safe.simulate(maneuver, state, begin)
-        why = trust.reason or run.message
-        told = f"from t = {begin:.4g} s on by {self.safe_name}: {why}"
+        told = handed_over(begin, self.safe_name, trust.reason or run.message)
         remark = "; ".join(part for part in (told, later.remark) if part)
         return replace(joined(run, later, kept), remark=remark, trust=trust)
+
+
+def handed_over(begin: float, name: str, why: str) -> str:
+    """That a method does a run from a time in s on."""
+    return f"from t = {begin:.4g} s on by {name}: {why}"
 
 
 def joined(run: Trajectory, later: Trajectory, kept: int) -> Trajectory:

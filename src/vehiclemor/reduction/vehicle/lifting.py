@@ -145,7 +145,7 @@ class Lifting(ShortRepr):
         excited
             By the start, as `excited` gives it.
         """
-        return self._lifted(self._space((times, path, inputs), excited, len(times)), len(times))
+        return self._lifted(self.space((times, path, inputs), excited, len(times)), len(times))
 
     def of_run(
         self, run: Run, inputs: np.ndarray, excited: np.ndarray
@@ -154,12 +154,12 @@ class Lifting(ShortRepr):
         held = run.kept.get("lifted")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self._space((times, run.whole, inputs), excited.copy(), run.rows)
+            held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
             run.kept["lifted"] = held
         held.excited[:] = excited
         return self._lifted(held, run.rows)
 
-    def _space(
+    def space(
         self, recorded: tuple[np.ndarray, np.ndarray, np.ndarray], excited: np.ndarray, rows: int
     ) -> LiftingSpace:
         """Arrays of the loops and these, packed once."""
@@ -190,22 +190,28 @@ class Lifting(ShortRepr):
             for place in places:
                 call.words[place] = rows
             call()
-        return space.states, self._trust(
-            space.times, rows, space.largest.tolist(), space.first.tolist()
+        largest, first = space.largest.tolist(), space.first.tolist()
+        left = min(first, default=rows)
+        return space.states, self.trust(
+            largest, first, float(space.times[left]) if left < rows else np.inf
         )
 
-    def _trust(
-        self, times: np.ndarray, rows: int, largest: list[float], first: list[int]
-    ) -> Trust | None:
-        """How far a run has gone; none if nothing tells."""
+    def trust(self, largest: list[float], first: list[int], until: float) -> Trust | None:
+        """How far a run has gone; none if nothing tells.
+
+        Parameters
+        ----------
+        largest, first
+            Largest magnitude of each watched quantity, and the first row at which it is above 1.
+        until
+            Time (s) of the first of these rows; infinite if there is none.
+        """
         if not largest:
             return None
-        sample = min(first)
-        if sample == rows:
+        if np.isinf(until):
             return Trust(max(largest))
-        name = self.features.watched[first.index(sample)][1]
-        reason = f"{name} leaves what the training runs have covered"
-        return Trust(max(largest), float(times[sample]), reason)
+        name = self.features.watched[first.index(min(first))][1]
+        return Trust(max(largest), until, f"{name} leaves what the training runs have covered")
 
 
 def decayed(excited: np.ndarray) -> float:

@@ -149,7 +149,7 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        known, inputs = self._known(start), recorded_inputs(maneuver)[1]
+        known, inputs = self.known(start), recorded_inputs(maneuver)[1]
         run = self.equations.run(maneuver, start, direct_until=known.until)
         states, trust = self.lift.of_run(run, inputs, known.excited)
         if not len(run.places) or run.places[0, 1] < 0.0:
@@ -159,7 +159,7 @@ class ReducedVehicle(ShortRepr):
         run.give_back()
         return found
 
-    def _known(self, start: Start) -> KnownStart:
+    def known(self, start: Start) -> KnownStart:
         """A start with what it excites; kept by its name or its numbers."""
         key = start if isinstance(start, str) else self.model.start(start).tobytes()
         found = self._starts.get(key)
