@@ -13,7 +13,7 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -59,8 +59,8 @@ def chosen(name: str) -> Choice:
 
 def fitted(choice: Choice) -> ReducedOrderModel:
     """The chosen model, fitted."""
-    model, method, settings = choice.protocol.model, choice.method, choice.settings
-    return reduce(model, method, training=choice.training, **settings)
+    settings: dict[str, Any] = choice.settings
+    return reduce(choice.protocol.model, choice.method, training=choice.training, **settings)
 
 
 def path_of(name: str) -> Path:
@@ -100,7 +100,7 @@ def difference(choice: Choice, one: ReducedOrderModel, other: ReducedOrderModel)
 
 def main() -> int:
     """Write or check the files; exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Make the reduced models that ship.")
     parser.add_argument("--check", action="store_true", help="compare with a fit, write nothing")
     parser.add_argument("models", nargs="*", default=data_names("protocols"), metavar="MODEL")
     given = parser.parse_args()

@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
+from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import training_runs
@@ -305,6 +308,31 @@ def test_rates_are_those_of_the_steps(pair: Pair) -> None:
     # The trapezoidal rule, whose error is of the third order.
     mean = 0.5 * (space.rates(state, u, time) + space.rates(later, u, time + dt))
     np.testing.assert_allclose((later - state) / dt, mean, rtol=1e-6, atol=1e-6)
+
+
+def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> None:
+    settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {})).model_dump()
+    made = ReducedOrderModel(pair.model, pair.name, settings, (), pair.fit())
+    again = load(made.save(tmp_path / "model.nc"))
+    assert (again.method, again.settings) == (made.method, settings)
+    assert again.reduced.offline == made.reduced.offline
+    assert again.reduced.effective_rank == made.reduced.effective_rank
+    for maneuver in (pair.maneuver, pair.maneuver.perturbed(0.9, 1.3)):
+        first, second = made.simulate(maneuver), again.simulate(maneuver)
+        np.testing.assert_array_equal(second.states, first.states)
+        np.testing.assert_array_equal(second.outputs, first.outputs)
+        for name in ("counts", "status", "message", "remark", "trust"):
+            assert getattr(second, name) == getattr(first, name)
+    states = pair.model.simulate(pair.maneuver).states
+    best, nearest = (rom.reduced.best_approximation(states) for rom in (made, again))
+    assert (best is None) == (nearest is None)
+    if best is not None:
+        np.testing.assert_array_equal(nearest, best)
+    if made.states:
+        assert again.states == made.states
+        inputs = np.full(len(made.inputs), 1e-3)
+        steps = [rom.step(rom.state(inputs=inputs), inputs, 1e-2) for rom in (made, again)]
+        np.testing.assert_array_equal(steps[1], steps[0])
 
 
 def test_unknown_start_is_refused(pair: Pair) -> None:

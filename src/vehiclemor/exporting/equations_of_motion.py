@@ -10,7 +10,7 @@ from vehiclemor.exporting.straight_line import StraightLine, call, entries, numb
 from vehiclemor.exporting.system import TRUST, ExportedSystem
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.reduced_system import ReducedSystem
-from vehiclemor.simulation.build import declared_values, solved_parameters
+from vehiclemor.simulation.constants import solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 
@@ -20,9 +20,9 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
     definition, equations = model.definition, model.equations
     sources = equations.sources
     quantities = parameter_quantities(model)
-    declared = declared_values(definition, model.parameters)
-    solved = solved_parameters(definition, declared, model.parameters, equations)
-    values = np.concatenate([model.parameters.flat(), [solved[key] for key in definition.solved]])
+    flat = model.parameters.flat()
+    solved = solved_parameters(definition, flat, equations)
+    values = np.concatenate([flat, [solved[key] for key in definition.solved]])
     given = {
         "_x": entries("x", len(definition.states)),
         "_u": entries("u", len(definition.inputs)),

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, quoted
+from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component
-from vehiclemor.short_repr import ShortRepr
+from vehiclemor.short_repr import ShortRepr, shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.method_settings import Settings, for_method
@@ -33,8 +33,9 @@ from vehiclemor.study.store import INTEGRITY, opened, write_dataset
 SCHEMA = 1
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
-# Relative difference of a model's equations that rounding explains.
-SAME = 1e-9
+# Differences of what a model's equations give that rounding explains: relative, and as part of the
+# largest number.
+SAME, ROUNDING = 1e-8, 1e-12
 
 
 @dataclass(frozen=True)
@@ -122,15 +123,14 @@ def read(path: Any) -> Saved:
         model = _model(name, parameters)
         reduces: Method = component("method", method)
         reduces.check(model, for_method(model, method, settings))
-        then, now = stored.pop("fingerprint"), fingerprint(model)
-        if then.shape != now.shape or not np.allclose(then, now, SAME, SAME * np.abs(now).max()):
+        if not _alike(stored.pop("fingerprint"), fingerprint(model)):
             raise FileError(f"the equations of {name} have changed since")
         reduced = Reader(model, stored).value(parts)
-    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError) as error:
+        return Saved(model, method, settings, tuple(training), reduced)
+    except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
-    except (ValueError, VehiclemorError) as error:
-        raise _unfit(path, str(error)) from None
-    return Saved(model, method, settings, tuple(training), reduced)
+    except (SyntaxError, ValueError, VehiclemorError) as error:
+        raise _unfit(path, " ".join(str(error).split())) from None
 
 
 def fingerprint(model: Model) -> np.ndarray:
@@ -140,6 +140,11 @@ def fingerprint(model: Model) -> np.ndarray:
     equations = "residual" if model.kind == "ae" else "derivative"
     parts = [model.evaluated(name, state, u) for name in (equations, "outputs")]
     return np.concatenate(parts)
+
+
+def _alike(then: np.ndarray, now: np.ndarray) -> bool:
+    rounding = ROUNDING * np.abs(now).max()
+    return then.shape == now.shape and np.allclose(then, now, SAME, rounding)
 
 
 def _model(name: str, parameters: Mapping[str, Any]) -> Model:
@@ -164,7 +169,7 @@ def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             raise FileError(f"{path}: not a saved model")
         for name, here in (("saved_model", SCHEMA), ("vehiclemor", version("vehiclemor"))):
             if attrs.get(name) != here:
-                was = f"{name} {quoted(attrs.get(name))} where this is {here!r}"
+                was = f"{name} {shortened(str(attrs.get(name)))} where this is {here}"
                 raise FileError(f"{path}: saved by another version, {was}; reduce the model again")
         return {name: variable[...] for name, variable in file.variables.items()}, attrs
 

@@ -22,6 +22,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.errors import InputError
+from vehiclemor.online.bounds import check
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
 
@@ -124,13 +125,14 @@ class Reader:
         Raises
         ------
         KeyError, TypeError, ValueError, AttributeError
-            If it stands for nothing.
+            If it stands for nothing, or does not fit the rest.
         """
         if not isinstance(part, dict):
             return part
         if "same" in part:
             return self._made[part["same"]]
         made = self._made[place] = self._of_kind(part, place)
+        check(made)
         return made
 
     def _of_kind(self, part: dict[str, Any], place: str) -> Any:

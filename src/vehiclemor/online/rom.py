@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
@@ -163,12 +164,43 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
+        number("time", time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
         """Time derivative (dim,) of a state."""
         return self.state_space.rates(self._state(state), self._inputs(inputs), time)
+
+    def jacobian(
+        self,
+        state: Any,
+        inputs: Any,
+        with_respect_to: str | Sequence[str] = "state",
+        of: str = "rhs",
+        time: float = 0.0,
+    ) -> np.ndarray:
+        """Analytic derivatives (results, columns) at a state and inputs.
+
+        Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
+
+        Parameters
+        ----------
+        with_respect_to
+            `state`, `inputs`, or names of the model's parameters, of which each component has a
+            column; a reduced model has them only where it holds the model's own equations.
+        of
+            `rhs` or `outputs`; of a kinematic model `outputs` or `coordinates`.
+        time
+            In s: models with control periods have another basis in each.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the model has no such derivatives.
+        """
+        u = self._inputs(inputs)
+        return self.state_space.derivatives(self._state(state), u, time, with_respect_to, of)
 
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
@@ -197,12 +229,12 @@ class ReducedOrderModel(ShortRepr):
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
         """Which output is beyond what the full model declares, if one is."""
-        names, numbers, ranges = limits_of(self.model.definition)
+        names, places, ranges = limits_of(self.model.definition)
         if not names:
             return ""
         outputs = self.outputs(states, inputs)
-        for name, number, (low, high) in zip(names, numbers, ranges, strict=False):
-            values = outputs[:, number]
+        for name, place, (low, high) in zip(names, places, ranges, strict=False):
+            values = outputs[:, place]
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"

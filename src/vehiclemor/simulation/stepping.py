@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from ctypes import c_double
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from vehiclemor.codegen.loops import Prepared, ready
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.simulation.integrators.structures import Output, Signal, Spans
 from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
 from vehiclemor.simulation.run_plans import NO_POINTS, Solver
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
@@ -37,6 +39,8 @@ class StepSpace(NamedTuple):
         Number (1,) of the projection window.
     coefficients
         Of the inputs (1, inputs, 6).
+    means
+        Origins (windows, n) of the subspaces.
     first
         The word of the first step to try, as a number.
     """
@@ -49,6 +53,7 @@ class StepSpace(NamedTuple):
     times: tuple[np.ndarray, ...]
     window: np.ndarray
     coefficients: np.ndarray
+    means: np.ndarray
     first: c_double
 
 
@@ -63,12 +68,19 @@ class Stepper:
         Formulation of the system and its subspaces; in more windows than one the time tells which.
     solver, tolerance
         Integrator and its tolerance.
+    moved
+        Whether the state at the beginning is the origin of the window's subspace.
     """
 
     def __init__(
-        self, system: System, windows: ProjectionWindows, solver: str, tolerance: float
+        self,
+        system: System,
+        windows: ProjectionWindows,
+        solver: str,
+        tolerance: float,
+        moved: bool = False,
     ) -> None:
-        self.system, self.windows = system, windows
+        self.system, self.windows, self.moved = system, windows, moved
         self.solver = Solver(solver, tolerance)
         self._spare: list[StepSpace] = []
 
@@ -103,6 +115,8 @@ class Stepper:
                 array[-1] = length
             space.first.value = length
             space.window[0] = window
+            if self.moved:
+                space.means[window] = space.state
             space.counts.fill(0)
             status = space.call()
             if status:
@@ -133,8 +147,11 @@ class Stepper:
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
         n = len(self.system.error_scale)
         output = Output(sample, np.empty((1, n)), counts, *NO_POINTS, np.inf)
+        windows = self.windows
+        if self.moved:
+            windows = replace(windows, means=windows.means.copy())
         loop, given, (n, floats, integers) = self.system.loop(
-            self.windows, self.solver, signal, spans, output
+            windows, self.solver, signal, spans, output
         )
         arguments = given._replace(
             start=np.empty(n), buffer=np.empty(floats), integers=np.empty(integers, dtype=np.int64)
@@ -150,6 +167,7 @@ class Stepper:
             (edges, span, sample),
             window,
             coefficients,
+            windows.means,
             first,
         )
 
@@ -160,7 +178,7 @@ class Stepper:
         if spaces.formulation == "full":
             return rates
         window = next(self._parts(time, 2.0 * SHORTEST))[2]
-        rank, mean = int(spaces.ranks[window]), spaces.means[window]
+        rank, mean = int(spaces.ranks[window]), state if self.moved else spaces.means[window]
         trial, test = spaces.trial_basis[window, :rank], spaces.test_basis[window, :rank]
         if spaces.formulation == "state":
             place = mean + test @ (state - mean) @ trial
@@ -178,6 +196,13 @@ class Stepper:
         change = np.concatenate([q, projected - np.linalg.solve(mass, force)[:, 0]])
         free = self._evaluated("derivative", place, inputs, n)[half:]
         return np.concatenate([moved, free + self._evaluated("speeds", change, inputs, half)])
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: Along
+    ) -> np.ndarray:
+        """Analytic derivatives (n, columns) of the rates."""
+        window = next(self._parts(time, 2.0 * SHORTEST))[2]
+        return rate_derivatives(self.system, self.windows, window, state, inputs, by)
 
     def _evaluated(
         self, kernel: str, state: np.ndarray, inputs: np.ndarray, size: int

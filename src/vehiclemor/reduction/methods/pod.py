@@ -27,11 +27,12 @@ from vehiclemor.simulation.model import Model
 SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2}
 ControlPeriod = Annotated[float, Field(gt=0.0, description="length of a control period in s")]
 Restart = Annotated[
-    Literal["own", "full_model"],
+    Literal["own", "projected", "full_model"],
     Field(
         description="where a control period starts: own: where the one before has ended; "
-        "full_model: at the full model's state then, as in a model-predictive controller that is "
-        "told it; here the full model runs beside"
+        "projected: at the full model's state, projected onto the period's subspace (paper, step "
+        "6); full_model: at that state itself, the origin of the subspace from there on, as in a "
+        "model-predictive controller; the full model runs beside both"
     ),
 ]
 
@@ -72,8 +73,9 @@ def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel
     """One POD subspace for each control period of the training runs."""
     edges = window_edges(training[0].maneuver.duration, settings.control_period)
     reduced = fit_subspaces(model, training, edges, settings)
-    if isinstance(reduced, DynamicProjection) and getattr(settings, "restart", "") == "full_model":
-        return RestartedProjection(**vars(reduced))
+    restart = getattr(settings, "restart", "own")
+    if isinstance(reduced, DynamicProjection) and restart != "own":
+        return RestartedProjection(**vars(reduced), moved=restart == "full_model")
     return reduced
 
 
