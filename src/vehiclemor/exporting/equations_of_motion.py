@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from functools import partial, reduce
-
 import numpy as np
 
-from vehiclemor.exporting.straight_line import StraightLine, call, entries, numbers, straight_line
-from vehiclemor.exporting.system import TRUST, ExportedSystem
+from vehiclemor.codegen.kernels import KernelSource
+from vehiclemor.exporting.straight_line import (
+    StraightLine,
+    entries,
+    numbers,
+    straight_line,
+    tangent_line,
+)
+from vehiclemor.exporting.system import SEED, SIGNATURES, TRUST, ExportedSystem
+from vehiclemor.exporting.trust import trust, trust_tangent
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.simulation.constants import solved_parameters
@@ -27,11 +33,13 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         "_x": entries("x", len(definition.states)),
         "_u": entries("u", len(definition.inputs)),
         "_constants": entries("c", equations.constants),
+        "_parameters": entries("p", len(quantities)),
     }
-    functions = {key: straight_line(sources[key].text, given) for key in ("derivative", "outputs")}
-    functions["constants"] = straight_line(
-        sources["constants"].text, {"_parameters": entries("p", len(quantities))}
-    )
+
+    def tangents() -> dict[str, StraightLine]:
+        seeds = {name: entries(f"{name[1:2]}{SEED}", len(own)) for name, own in given.items()}
+        return {f"{k}_tangent": tangent_line(sources[k], given, seeds).pruned() for k in SIGNATURES}
+
     return ExportedSystem(
         name,
         model.summary,
@@ -41,7 +49,8 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         quantities,
         values,
         model.initial,
-        {key: function.pruned() for key, function in functions.items()},
+        {key: straight_line(sources[key].text, given).pruned() for key in SIGNATURES},
+        tangents,
     )
 
 
@@ -56,34 +65,43 @@ def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
 
 
 def reduced_system(
-    reduced: ReducedSystem, name: str, lift: tuple[str, np.ndarray]
+    reduced: ReducedSystem, name: str, lift: tuple[KernelSource, np.ndarray] | None
 ) -> ExportedSystem:
     """A reduced system: its states are lifted, then the model's outputs follow from them.
 
     Parameters
     ----------
     lift
-        Text and constants of the kernel that gives full states, and after them what is watched; the
-        text is empty where the states are the model's.
+        The kernel that gives full states, and after them what is watched, with its constants; none
+        where the states are the model's.
     """
     model, system = reduced.model, reduced.system
     definition, full = model.definition, 2 * len(model.coordinates)
-    inputs = entries("u", system.inputs)
-    own = {"_x": entries("x", len(reduced.states)), "_u": inputs}
-    derivative = straight_line(
-        system.kernels.sources["derivative"].text, own | {"_constants": numbers(system.constants)}
-    )
+    own = {"_x": entries("x", len(reduced.states)), "_u": entries("u", system.inputs)}
+    seeds = {key: entries(f"{key[1:]}{SEED}", len(listed)) for key, listed in own.items()}
+    rates = system.kernels.sources["derivative"], own | {"_constants": numbers(system.constants)}
+    derivative = straight_line(rates[0].text, rates[1])
+    source = model.kernels.sources["outputs"]
     lifted = StraightLine({}, own["_x"])
-    if lift[0]:
-        lifted = straight_line(lift[0], own | {"_constants": numbers(lift[1])})
-    outputs = straight_line(
-        model.kernels.sources["outputs"].text,
-        {"_x": lifted.results, "_u": inputs, "_constants": numbers(model.constants)},
-        lifted,
-    )
-    used = [call("fabs", size) for size in lifted.results[full:]]
-    trust = [reduce(partial(call, "fmax"), used)] if used else []
-    outputs = StraightLine(outputs.assignments, [*outputs.results, *trust])
+    if lift is not None:
+        lifting = lift[0], own | {"_constants": numbers(lift[1])}
+        lifted = straight_line(lifting[0].text, lifting[1])
+    given = {"_x": lifted.results, "_u": own["_u"], "_constants": numbers(model.constants)}
+    outputs = straight_line(source.text, given, lifted)
+    used = lifted.results[full:]
+
+    def tangents() -> dict[str, StraightLine]:
+        moved = StraightLine(lifted.assignments, seeds["_x"])
+        if lift is not None:
+            moved = tangent_line(*lifting, seeds, lifted)
+        found = tangent_line(source, given, seeds | {"_x": moved.results}, moved)
+        further = [trust_tangent(used, moved.results[full:])] if used else []
+        return {
+            "constants_tangent": StraightLine({}, []),
+            "derivative_tangent": tangent_line(*rates, seeds).pruned(),
+            "outputs_tangent": found.followed_by(further).pruned(),
+        }
+
     known = {q.name: q for q in (*definition.coordinates, *definition.speeds)}
     nothing = np.zeros(system.inputs)
     return ExportedSystem(
@@ -91,13 +109,14 @@ def reduced_system(
         f"reduced model of: {model.summary}",
         tuple(known.get(n, Quantity(n, "1", "reduced coordinate")) for n in reduced.states),
         definition.inputs,
-        (*definition.outputs, *([TRUST] if trust else [])),
+        (*definition.outputs, *([TRUST] if used else [])),
         (),
         np.zeros(0),
         {key: reduced.begin(key, nothing) for key in model.starts},
         {
             "constants": StraightLine({}, []),
             "derivative": derivative.pruned(),
-            "outputs": outputs.pruned(),
+            "outputs": outputs.followed_by([trust(used)] if used else []).pruned(),
         },
+        tangents,
     )

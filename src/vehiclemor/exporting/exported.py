@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.equations_of_motion import full_system, reduced_system
 from vehiclemor.exporting.path_map import map_system
@@ -37,11 +38,12 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            return reduced_system(what.equations, name, what.lift.text(0))
+            text, constants = what.lift.text(0)
+            return reduced_system(what.equations, name, (*kernel_sources(text).values(), constants))
         case ReducedSystem() if what.spaces.formulation == "full":
             kernels, constants = what.system.kernels, what.system.constants
             if "full_state" in kernels:
-                return reduced_system(what, name, (kernels.sources["full_state"].text, constants))
+                return reduced_system(what, name, (kernels.sources["full_state"], constants))
             if what.states == what.model.definition.states:
-                return reduced_system(what, name, ("", constants))
+                return reduced_system(what, name, None)
     raise InputError(f"{name} can't be exported: its equations are no straight-line program")

@@ -10,13 +10,14 @@ from collections.abc import Iterable
 from typing import NamedTuple
 from xml.etree import ElementTree
 
+from vehiclemor.exporting.c import MODEL, STEPPER, TANGENT
 from vehiclemor.exporting.system import TOOL, ExportedSystem
 from vehiclemor.exporting.units import base_units
 from vehiclemor.multibody.quantities import Quantity
 
 CAPABILITIES = {
-    2: {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"},
-    3: {"canGetAndSetFMUState": "true", "canSerializeFMUState": "true"},
+    2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"),
+    3: ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"),
 }
 # What an importer proposes, in s.
 STOP, COMMUNICATION = 10.0, 0.01
@@ -87,7 +88,7 @@ def model_description(system: ExportedSystem, token: str, step: float, fmi: int)
     root.set("guid" if fmi == 2 else "instantiationToken", token)
     if fmi == 2:
         root.set("numberOfEventIndicators", "0")
-    common = {"modelIdentifier": identifier(system), **CAPABILITIES[fmi]}
+    common = {"modelIdentifier": identifier(system), **dict.fromkeys(CAPABILITIES[fmi], "true")}
     exchange = ElementTree.SubElement(root, "ModelExchange", common)
     simulation = ElementTree.SubElement(
         root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"}
@@ -122,7 +123,7 @@ def identifier(system: ExportedSystem) -> str:
 
 def sources(fmi: int) -> tuple[str, ...]:
     """Files that a binary is compiled of."""
-    return f"vehiclemor_fmi{fmi}.c", "vehiclemor_model.c", "vehiclemor_step.c"
+    return f"vehiclemor_fmi{fmi}.c", MODEL, TANGENT, STEPPER
 
 
 def _units(root: ElementTree.Element, names: Iterable[str]) -> None:

@@ -6,9 +6,17 @@ import ast
 
 import numpy as np
 
+from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.exporting.straight_line import StraightLine, call, entries, straight_line
-from vehiclemor.exporting.system import TRUST, ExportedSystem
+from vehiclemor.exporting.straight_line import (
+    StraightLine,
+    call,
+    entries,
+    straight_line,
+    tangent_line,
+)
+from vehiclemor.exporting.system import SEED, TRUST, ExportedSystem
+from vehiclemor.exporting.trust import trust, trust_tangent
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.polynomials.kernels import map_kernel
 
@@ -17,21 +25,32 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     """Outputs as polynomials in cells of the inputs; a table has their coefficients."""
     definition, coefficients = reduced.model.definition, reduced.cells.coefficients
     columns = reduced.columns[len(definition.coordinates) :]
-    used = sorted(set(columns))
-    table = np.zeros((*coefficients.shape[:2], padded(len(used))))
-    table[:, :, : len(used)] = coefficients[:, :, used]
+    kept = sorted(set(columns))
+    table = np.zeros((*coefficients.shape[:2], padded(len(kept))))
+    table[:, :, : len(kept)] = coefficients[:, :, kept]
     size = table[0].size
-    inputs = {"_u": entries("u", len(definition.inputs))}
-    before = straight_line(_cell_text(reduced, size), inputs)
-    *places, row, indicator = before.results
-    outputs = straight_line(
-        map_kernel(reduced.moving, reduced.degree, tuple(used.index(c) for c in columns)),
-        {
-            "_x": places,
-            "_coefficients": [call("entry", row, ast.Constant(i)) for i in range(size)],
-        },
-        before,
-    )
+    n = len(definition.inputs)
+    before = straight_line(_cell_text(reduced, size), {"_u": entries("u", n)})
+    places, row, used = before.results[:n], before.results[n], before.results[n + 1 :]
+    (source,) = kernel_sources(
+        map_kernel(reduced.moving, reduced.degree, tuple(kept.index(c) for c in columns))
+    ).values()
+    rows = [call("entry", row, ast.Constant(i)) for i in range(size)]
+    given = {"_x": places, "_coefficients": rows}
+    outputs = straight_line(source.text, given, before)
+
+    def tangents() -> dict[str, StraightLine]:
+        scales, halves = reduced.cells.scales, reduced.cells.halves
+        seeds = entries(f"u{SEED}", n)
+        moved = [_times(scale, seed) for scale, seed in zip(scales, seeds, strict=True)]
+        steps = [_times(2.0 * half, step) for half, step in zip(halves, moved, strict=True)]
+        found = tangent_line(source, given, {"_x": steps}, before)
+        return {
+            "constants_tangent": nothing,
+            "derivative_tangent": nothing,
+            "outputs_tangent": found.followed_by([trust_tangent(used, moved)]).pruned(),
+        }
+
     nothing = StraightLine({}, [])
     return ExportedSystem(
         name,
@@ -45,19 +64,24 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
         {
             "constants": nothing,
             "derivative": nothing,
-            "outputs": StraightLine(outputs.assignments, [*outputs.results, indicator]).pruned(),
+            "outputs": outputs.followed_by([trust(used)]).pruned(),
         },
+        tangents,
         table.ravel(),
     )
 
 
+def _times(factor: float, value: ast.expr) -> ast.expr:
+    return ast.BinOp(ast.Constant(float(factor)), ast.Mult(), value)
+
+
 def _cell_text(reduced: PathMapModel, size: int) -> str:
-    """Kernel that gives the place in a cell (inputs,), where its coefficients begin, and the trust.
+    """Kernel that gives places in a cell, where its coefficients begin, and places in the box.
 
     It does what `map_loops.map_path` does for a sample.
     """
     centres, scales, halves, tops, counts, _ = reduced.cells
-    lines, row, indicator = [], "0.0", "0.0"
+    lines, row, n = [], "0.0", len(centres)
     for i in range(len(centres)):
         lines += [
             f"p{i} = (_u[{i}] - {float(centres[i])!r}) * {float(scales[i])!r}",
@@ -66,8 +90,6 @@ def _cell_text(reduced: PathMapModel, size: int) -> str:
             f"_result[{i}] = 2.0 * (q{i} - n{i}) - 1.0",
         ]
         row = f"({row} * {float(counts[i])!r} + n{i})"
-        indicator = f"max({indicator}, abs(p{i}))"
-    n = len(centres)
-    lines += [f"row = {row} * {float(size)!r}", f"indicator = {indicator}"]
-    lines += [f"_result[{n}] = row", f"_result[{n + 1}] = indicator"]
+        lines.append(f"_result[{n + 1 + i}] = p{i}")
+    lines += [f"row = {row} * {float(size)!r}", f"_result[{n}] = row"]
     return "\n    ".join(["def cell(_u, _result):", *lines]) + "\n"

@@ -9,7 +9,9 @@ import ast
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from vehiclemor.codegen.kernel_statements import KernelText, places
+from vehiclemor.codegen.kernel_statements import SEED, KernelText, places
+from vehiclemor.codegen.kernels import KernelSource
+from vehiclemor.codegen.tangent import tangent_source
 from vehiclemor.codegen.vector_lanes import LANES, padded
 
 # Names of C's library, of which other systems have their own.  Besides these there are `pow`,
@@ -36,6 +38,10 @@ class StraightLine(NamedTuple):
 
     assignments: dict[str, ast.expr]
     results: list[ast.expr]
+
+    def followed_by(self, results: Sequence[ast.expr]) -> "StraightLine":
+        """The same with further results."""
+        return StraightLine(self.assignments, [*self.results, *results])
 
     def pruned(self) -> "StraightLine":
         """The same without assignments that no result needs."""
@@ -67,6 +73,20 @@ def straight_line(
     return StraightLine(reader.assignments, [reader.results[i] for i in sorted(reader.results)])
 
 
+def tangent_line(
+    source: KernelSource,
+    given: Mapping[str, Sequence[ast.expr]],
+    seeds: Mapping[str, Sequence[ast.expr]],
+    before: StraightLine | None = None,
+) -> StraightLine:
+    """The derivative of a kernel along seeds of some of its arguments, see `tangent_text`."""
+    moved = {name: seed for name, seed in seeds.items() if name in source.arguments}
+    text = tangent_source(source, tuple(moved)).text
+    return straight_line(
+        text, {**given} | {SEED + name: seed for name, seed in moved.items()}, before
+    )
+
+
 def entries(name: str, count: int) -> list[ast.expr]:
     """Expressions of the entries of an array."""
     return [ast.Subscript(ast.Name(name), ast.Constant(i)) for i in range(count)]
@@ -93,6 +113,7 @@ class _Reader:
         # What the text's names and scratch space stand for by now.
         self._known: dict[str, ast.expr] = {}
         self._work: dict[int, ast.expr] = {}
+        self._copies: dict[str, int] = {}
 
     def read(self, statement: ast.stmt, kernel: KernelText) -> None:
         match statement:
@@ -138,9 +159,9 @@ class _Reader:
             return value
         # A letter first: names of the text may be reserved words elsewhere.
         own = unused = f"v_{name.lstrip('_')}"
-        count = 1
         while unused in self.assignments:
-            unused, count = f"{own}_{count}", count + 1
+            self._copies[own] = self._copies.get(own, 0) + 1
+            unused = f"{own}_{self._copies[own]}"
         self.assignments[unused] = value
         return ast.Name(unused)
 

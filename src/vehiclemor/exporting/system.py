@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 
@@ -15,8 +15,17 @@ from vehiclemor.short_repr import ShortRepr
 # Who has written it.
 TOOL = f"vehiclemor {version('vehiclemor')}"
 # Function -> names of its arguments, in order, and of its result.
-SIGNATURES = {"constants": ("p", "c"), "derivative": ("x", "u", "c", "dx")}
-SIGNATURES["outputs"] = ("x", "u", "c", "y")
+SIGNATURES = {
+    "constants": ("p", "c"),
+    "derivative": ("x", "u", "c", "dx"),
+    "outputs": ("x", "u", "c", "y"),
+}
+# Derivatives along seeds of the arguments: what the results change by.
+SEED = "_seed"
+TANGENTS = {
+    f"{name}_tangent": (*given, *(f"{argument}{SEED}" for argument in given), f"{result}_change")
+    for name, (*given, result) in SIGNATURES.items()
+}
 TRUST = Quantity("trust_indicator", "1", "how far it goes: beyond 1 the reduced model isn't known")
 
 
@@ -36,6 +45,8 @@ class ExportedSystem(ShortRepr):
         Name -> state; the default first.
     functions
         `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
+    tangents
+        Makes the functions of `TANGENTS`.
     table
         What `entry(row, place)` reads, a number at row + place; empty if there is none.
     """
@@ -51,6 +62,7 @@ class ExportedSystem(ShortRepr):
     values: np.ndarray
     starts: Mapping[str, np.ndarray]
     functions: Mapping[str, StraightLine]
+    tangents: Callable[[], Mapping[str, StraightLine]]
     table: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
