@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.online.training import scenario_of, training_set
+from vehiclemor.online.training import training_set
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -46,6 +46,8 @@ class ReducedOrderModel(ShortRepr):
         What it has been trained on; of a loaded model the content of each scenario.
     reduced
         What the method's fit gave.
+    known
+        Range of the inputs of its training, where the runs themselves are not at hand.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
@@ -55,6 +57,7 @@ class ReducedOrderModel(ShortRepr):
     settings: Settings
     training: tuple[Scenario | Mapping[str, Any], ...]
     reduced: ReducedModel
+    known: InputRange | None = None
 
     @cached_property
     def state_space(self) -> StateSpace:
@@ -115,17 +118,14 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def _range(self) -> InputRange | None:
-        """Inputs of the training: what a model knows that does not judge itself.
+        """Inputs of the training, if the model does not judge itself."""
+        return None if component("method", self.method).own_limits else self.input_range
 
-        None if nothing is known of the training, as where its maneuvers are not registered.
-        """
-        if component("method", self.method).own_limits:
-            return None
-        known = [run if isinstance(run, Scenario) else scenario_of(run) for run in self.training]
-        scenarios = tuple(run for run in known if run is not None)
-        if not scenarios or len(scenarios) < len(known):
-            return None
-        return input_range(self.model, scenarios)
+    @cached_property
+    def input_range(self) -> InputRange:
+        """Range of the inputs of the training."""
+        runs = tuple(run for run in self.training if isinstance(run, Scenario))
+        return self.known or input_range(self.model, runs)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""
@@ -180,6 +180,36 @@ class ReducedOrderModel(ShortRepr):
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
         """Time derivative (dim,) of a state."""
         return self.state_space.rates(self._state(state), self._inputs(inputs), time)
+
+    def jacobian(
+        self,
+        state: Any,
+        inputs: Any,
+        with_respect_to: str | Sequence[str] = "state",
+        of: str = "rhs",
+        time: float = 0.0,
+    ) -> np.ndarray:
+        """Analytic derivatives (results, columns) at a state and inputs.
+
+        Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
+
+        Parameters
+        ----------
+        with_respect_to
+            `state`, `inputs`, or names of the model's parameters, of which each component has a
+            column; a reduced model has them only where it holds the model's own equations.
+        of
+            `rhs` or `outputs`; of a kinematic model `outputs` or `coordinates`.
+        time
+            In s: models with control periods have another basis in each.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the model has no such derivatives.
+        """
+        u = self._inputs(inputs)
+        return self.state_space.derivatives(self._state(state), u, time, with_respect_to, of)
 
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
@@ -241,8 +271,8 @@ class ReducedOrderModel(ShortRepr):
         from vehiclemor.online.model_file import Saved, write
 
         training = [run.content if isinstance(run, Scenario) else run for run in self.training]
-        saved = Saved(self.model, self.method, self.settings, tuple(training), self.reduced)
-        return write(saved, path, overwrite)
+        how = self.method, self.settings, tuple(training)
+        return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""

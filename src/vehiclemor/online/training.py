@@ -1,13 +1,12 @@
 """What a model is trained on where nobody tests it: names, and what a user hands in."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import component, names, unknown
+from vehiclemor.registry import component, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol
@@ -42,18 +41,6 @@ def training_set(
     for scenario in scenarios:
         check(model, scenario)
     return tuple(scenarios)
-
-
-def scenario_of(content: Mapping[str, Any]) -> Scenario | None:
-    """The scenario that a file tells of; none if its maneuver is not known, or another one now."""
-    if content["maneuver"] not in names("maneuver"):
-        return None
-    factors = content["frequency"], content["amplitude"]
-    maneuver = component("maneuver", content["maneuver"]).perturbed(*factors)
-    start = content["start"]
-    own = start if isinstance(start, str) else tuple(start)
-    found = Scenario(maneuver, own, content["speed"])
-    return found if found.content["inputs"] == content["inputs"] else None
 
 
 def _nominal(model: Model) -> Scenario:
