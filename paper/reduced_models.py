@@ -96,7 +96,7 @@ def difference(choice: Choice, one: ReducedOrderModel, other: ReducedOrderModel)
     for scenario in choice.protocol.sets["validation"][:COMPARED]:
         start = start_of(choice.protocol.model, scenario)
         a, b = (rom.simulate(scenario.maneuver, start).outputs for rom in (one, other))
-        largest = max(largest, float(np.max(np.abs(a - b) / np.ptp(a, axis=0).clip(1e-12))))
+        largest = max(largest, float(np.max(np.abs(a - b) / np.ptp(a, axis=0).clip(1e-6))))
     return largest
 
 

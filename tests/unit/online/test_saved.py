@@ -232,7 +232,7 @@ def replaced(places: str, value: Any) -> Callable[[xr.Dataset, dict[str, Any]], 
     """Puts a value at `a.b.c` in the parts of a model."""
 
     def change(_: object, found: dict[str, Any]) -> None:
-        *path, last = ["reduced", *places.split(".")]
+        *path, last = places.split(".")
         for name in path:
             found = found[name]
         found[last] = value
@@ -241,23 +241,25 @@ def replaced(places: str, value: Any) -> Callable[[xr.Dataset, dict[str, Any]], 
 
 
 HARM = "__import__('pathlib').Path('harm').touch()"
-FEATURES = "fields.features.fields"
+FEATURES = "reduced.fields.features.fields"
 
 
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        ("class", "os:system"),
-        ("class", "vehiclemor.files:write_text"),
-        ("class", "vehiclemor.reduction.vehicle.features:monomials.__globals__"),
-        ("class", "vehiclemor.cli.app:main"),
-        ("fields.offline", {"function": "os:abort"}),
-        ("fields.offline", {"function": "subprocess:run"}),
-        ("fields.offline", {"code": HARM}),
-        ("fields.offline", {"method": "__reduce__", "of": {"model": ""}}),
-        ("fields.offline", {"same": "reduced.nothing"}),
-        ("fields.offline.fields", {"seconds": 0.0}),
-        ("fields.coefficients", {"array": "reduced.nothing"}),
+        ("reduced.class", "os:system"),
+        ("reduced.class", "vehiclemor.files:write_text"),
+        ("reduced.class", "vehiclemor.reduction.vehicle.features:monomials.__globals__"),
+        ("reduced.class", "vehiclemor.cli.app:main"),
+        ("reduced.fields.offline", {"function": "os:abort"}),
+        ("reduced.fields.offline", {"function": "subprocess:run"}),
+        ("reduced.fields.offline", {"code": HARM}),
+        ("reduced.fields.offline", {"method": "__reduce__", "of": {"model": ""}}),
+        ("reduced.fields.offline", {"same": "reduced.nothing"}),
+        ("reduced.fields.offline.fields", {"seconds": 0.0}),
+        ("reduced", {"tuple": [1.0]}),
+        ("known", {"function": "vehiclemor.reduction.trust:trust_of"}),
+        ("reduced.fields.coefficients", {"array": "reduced.nothing"}),
         # Texts that would become machine code: nothing but arithmetic, of their own numbers.
         (f"{FEATURES}.terms.tuple", [HARM] * 8),
         (f"{FEATURES}.terms.tuple", ["_x[99999]"] * 8),
