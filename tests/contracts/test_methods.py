@@ -22,6 +22,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+from vehiclemor.study.scenario import Scenario
 
 METHODS = names("method")
 
@@ -350,7 +351,8 @@ def test_jacobians_are_the_slopes_of_rates_and_outputs(pair: Pair, by: str) -> N
 
 def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> None:
     settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {})).model_dump()
-    made = ReducedOrderModel(pair.model, pair.name, settings, (), pair.fit())
+    training = (Scenario(pair.maneuver, pair.model.starts[0]),)
+    made = ReducedOrderModel(pair.model, pair.name, settings, training, pair.fit())
     again = load(made.save(tmp_path / "model.nc"))
     assert (again.method, again.settings) == (made.method, settings)
     assert again.reduced.offline == made.reduced.offline

@@ -24,6 +24,7 @@ from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr, shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
+from vehiclemor.study.input_range import InputRange
 from vehiclemor.study.method_settings import Settings, for_method
 from vehiclemor.study.provenance import attributes, code_digest
 from vehiclemor.study.scenario import parameters_of
@@ -33,6 +34,8 @@ from vehiclemor.study.store import INTEGRITY, opened, write_dataset
 SCHEMA = 1
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
+# What is taken apart.
+PARTS = ("reduced", "known")
 # Differences of what a model's equations give that rounding explains: relative, and as part of the
 # largest number.
 SAME, ROUNDING = 1e-8, 1e-12
@@ -52,6 +55,8 @@ class Saved(ShortRepr):
         What it was trained on: the content of each scenario.
     reduced
         What the method's `fit` gave.
+    known
+        Range of the inputs of its training.
     """
 
     model: Model
@@ -59,6 +64,7 @@ class Saved(ShortRepr):
     settings: Settings
     training: tuple[Mapping[str, Any], ...]
     reduced: Any
+    known: InputRange
 
 
 def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
@@ -83,7 +89,7 @@ def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
         raise InputError(f"{path} is there already; overwrite=True replaces a file")
     model, writer = saved.model, Writer(saved.model)
     try:
-        parts = writer.part(saved.reduced)
+        parts = {name: writer.part(getattr(saved, name), name) for name in PARTS}
     except InputError as error:
         raise InputError(f"{saved.method} of {model.name}: {error}") from None
     texts = parts, dict(saved.settings), list(saved.training), parameters_of(model)
@@ -125,8 +131,9 @@ def read(path: Any) -> Saved:
         reduces.check(model, for_method(model, method, settings))
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
             raise FileError(f"the equations of {name} have changed since")
-        reduced = Reader(model, stored).value(parts)
-        return Saved(model, method, settings, tuple(training), reduced)
+        reader = Reader(model, stored)
+        made = {name: reader.value(parts[name], name) for name in PARTS}
+        return Saved(model, method, settings, tuple(training), **made)
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:

@@ -27,11 +27,9 @@ from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
 
 # Rooms whose classes are parts of reduced models.
-ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.")
+ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
 # What of a model may be a part of a reduced one.
 OWN = ("system", "kernels")
-# Place of all of it, in which the others stand.
-WHOLE = "reduced"
 # Kinds of arrays, and as what they are stored.
 STORED = {"f": "f8", "i": "i8", "b": "i1", "c": "f8"}
 
@@ -53,7 +51,7 @@ class Writer:
                 self._known[id(own)] = own, {"model": name}
         self._own_sources = model.kernels.sources
 
-    def part(self, value: Any, place: str = WHOLE) -> Any:
+    def part(self, value: Any, place: str) -> Any:
         """A value as JSON has it; its arrays apart.
 
         Raises
@@ -119,7 +117,7 @@ class Reader:
         self._model, self._arrays = model, arrays
         self._made: dict[str, Any] = {}
 
-    def value(self, part: Any, place: str = WHOLE) -> Any:
+    def value(self, part: Any, place: str) -> Any:
         """What a part stands for.
 
         Raises

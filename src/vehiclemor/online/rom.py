@@ -13,6 +13,7 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.online.training import training_set
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -21,7 +22,7 @@ from vehiclemor.simulation.checks import check_positive, checked_array, checked_
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.study.input_range import input_range
+from vehiclemor.study.input_range import InputRange, input_range
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.scenario import Scenario
 
@@ -45,6 +46,8 @@ class ReducedOrderModel(ShortRepr):
         What it has been trained on; of a loaded model the content of each scenario.
     reduced
         What the method's fit gave.
+    known
+        Range of the inputs of its training, where the runs themselves are not at hand.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
@@ -54,6 +57,7 @@ class ReducedOrderModel(ShortRepr):
     settings: Settings
     training: tuple[Scenario | Mapping[str, Any], ...]
     reduced: ReducedModel
+    known: InputRange | None = None
 
     @cached_property
     def state_space(self) -> StateSpace:
@@ -107,16 +111,21 @@ class ReducedOrderModel(ShortRepr):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
         run = self.reduced.simulate(chosen, begun)
-        if run.trust or self._judges_itself:
+        if run.trust or self._range is None:
             return run
-        from vehiclemor.study.evaluate import warned
-
         own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
-        return warned(self.model, self.method, self.training, Scenario(chosen, own), run)
+        return run.judged(self._range.trust(self.model, Scenario(chosen, own)))
 
     @cached_property
-    def _judges_itself(self) -> bool:
-        return component("method", self.method).own_limits
+    def _range(self) -> InputRange | None:
+        """Inputs of the training, if the model does not judge itself."""
+        return None if component("method", self.method).own_limits else self.input_range
+
+    @cached_property
+    def input_range(self) -> InputRange:
+        """Range of the inputs of the training."""
+        runs = tuple(run for run in self.training if isinstance(run, Scenario))
+        return self.known or input_range(self.model, runs)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""
@@ -211,8 +220,12 @@ class ReducedOrderModel(ShortRepr):
     def outputs(self, state: Any, inputs: Any) -> np.ndarray:
         """Outputs (outputs,) at a state, or (samples, outputs) along states (samples, dim)."""
         states, u, single = self._samples(state, inputs)
-        found = self.model.along("outputs", self.state_space.full_states(states, u), u)
-        return found[0] if single else found
+        full = self.state_space.full_states(states, u)
+        if not single:
+            return self.model.along("outputs", full, u)
+        found = np.empty(len(self.model.outputs))
+        self.model.kernels.call("outputs", full[0], u[0], self.model.constants, found)
+        return found
 
     def trust(self, state: Any, inputs: Any) -> Trust:
         """How far a state, or states (samples, dim), go in what the model knows.
@@ -222,8 +235,8 @@ class ReducedOrderModel(ShortRepr):
         """
         states, u, _ = self._samples(state, inputs)
         found = self.state_space.trust(states, u)
-        if found is None and not self._judges_itself:
-            found = input_range(self.model, self.training).trust_of_inputs(self.inputs, u)
+        if found is None and self._range is not None:
+            found = self._range.trust_of_inputs(self.inputs, u)
         left = self._left_validity(states, u)
         return Trust(np.inf, 0.0, left) if left else found or Trust(0.0)
 
@@ -258,23 +271,27 @@ class ReducedOrderModel(ShortRepr):
         from vehiclemor.online.model_file import Saved, write
 
         training = [run.content if isinstance(run, Scenario) else run for run in self.training]
-        saved = Saved(self.model, self.method, self.settings, tuple(training), self.reduced)
-        return write(saved, path, overwrite)
+        how = self.method, self.settings, tuple(training)
+        return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""
         if np.ndim(state) < 2:
             return self._state(state)[None], self._inputs(inputs)[None], True
-        states = checked_path(state, len(self.state_space.states), "states")
+        states = checked_path(state, self._dim, "states")
         return states, checked_path(inputs, len(self.inputs), "inputs", len(states)), False
 
     def _state(self, state: Any) -> np.ndarray:
-        return checked_array(state, len(self.state_space.states), "state", self._name)
+        return checked_array(state, self._dim, "state", self._name)
 
     def _inputs(self, inputs: Any, name: str = "inputs") -> np.ndarray:
         return checked_array(inputs, len(self.model.inputs), name, self._name)
 
-    @property
+    @cached_property
+    def _dim(self) -> int:
+        return len(self.state_space.states)
+
+    @cached_property
     def _name(self) -> str:
         return f"{self.model.name} by {self.method}"
 
@@ -307,7 +324,6 @@ def reduce(
     VehiclemorError
         If a name or value is wrong, or the method can't reduce the model.
     """
-    from vehiclemor.online.training import training_set
     from vehiclemor.progress import first_use
     from vehiclemor.reduction.validation import checked_fit, validated
     from vehiclemor.simulation.build import build

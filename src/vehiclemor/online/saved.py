@@ -19,7 +19,7 @@ def load(path: Any) -> ReducedOrderModel:
     """
     saved = read(path)
     return ReducedOrderModel(
-        saved.model, saved.method, saved.settings, saved.training, saved.reduced
+        saved.model, saved.method, saved.settings, saved.training, saved.reduced, saved.known
     )
 
 

@@ -101,7 +101,7 @@ class Propagator:
         while steps < len(found):
             found[steps:] += growth**steps * found[:-steps]
             steps *= 2
-        return found.real @ self.right.real.T - found.imag @ self.right.imag.T
+        return np.real(found @ self.right.T)
 
 
 @lru_cache(maxsize=16)
@@ -109,8 +109,8 @@ def _prepared(model: DynamicModel) -> tuple[VehicleShape, Propagator]:
     shape = VehicleShape(model)
     rates, right = np.linalg.eig(shape.linearised.a)
     # Of two conjugate modes one counts twice.
-    upper = rates.imag >= 0.0
-    twice = np.where(rates.imag > 0.0, 2.0, 1.0)
+    upper = np.imag(rates) >= 0.0
+    twice = np.where(np.imag(rates) > 0.0, 2.0, 1.0)
     return shape, Propagator(rates[upper], np.linalg.inv(right)[upper], (right * twice)[:, upper])
 
 

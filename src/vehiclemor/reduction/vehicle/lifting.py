@@ -151,7 +151,25 @@ class Lifting(ShortRepr):
         excited
             By the start, as `excited` gives it.
         """
-        return self._lifted(self.space((times, path, inputs), excited, len(times)), len(times))
+        recorded = times, path, inputs
+        if len(times) > 1 or excited.shape[1]:
+            return self._lifted(self.space(recorded, excited, len(times)), len(times))
+        # One sample and then another, as in a closed loop.
+        try:
+            held, own = self._single.pop()
+        except IndexError:
+            own = tuple(array.copy() for array in recorded)
+            held = self.space(own, excited, 1)
+        for array, given in zip(own, recorded, strict=True):
+            array[:] = given
+        states, trust = self._lifted(held, 1)
+        states = states.copy()
+        self._single.append((held, own))
+        return states, trust
+
+    @cached_property
+    def _single(self) -> list[tuple[LiftingSpace, tuple[np.ndarray, ...]]]:
+        return []
 
     def of_run(
         self, run: Run, inputs: np.ndarray, excited: np.ndarray
@@ -166,7 +184,7 @@ class Lifting(ShortRepr):
         return self._lifted(held, run.rows)
 
     def space(
-        self, recorded: tuple[np.ndarray, np.ndarray, np.ndarray], excited: np.ndarray, rows: int
+        self, recorded: tuple[np.ndarray, ...], excited: np.ndarray, rows: int
     ) -> LiftingSpace:
         """Arrays of the loops and these, packed once."""
         (times, path, inputs), calls = recorded, []
