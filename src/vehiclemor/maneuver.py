@@ -88,11 +88,6 @@ class Maneuver(ShortRepr):
         return np.linspace(0.0, self.duration, self.samples)
 
     @property
-    def recorded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Output times (samples,) in s, and the inputs (samples, number of inputs) at them."""
-        return (times := self.times), self.at(times)
-
-    @property
     def break_points(self) -> tuple[float, ...]:
         """Times in s inside the run at which the inputs are not smooth."""
         with blamed(f"{self}: corners"):

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-DEGREE = 5
+# Times that differ by so little, relative to what they are, are one.
+ROUNDING = 1e-12
 # Samples whose spacing differs by less, relative to it, are equidistant.
 EQUIDISTANT = 1e-9
 # A stretch of equal samples is quiet from so long (s) on: a run at rest could step over its end.
@@ -26,8 +27,8 @@ class Pieces(NamedTuple):
     starts
         Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
     coefficients
-        Polynomials (pieces, inputs, 6) in the part of the piece that has passed, lowest power
-        first.
+        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
+        power first.
     """
 
     edges: np.ndarray
@@ -51,7 +52,7 @@ class Pieces(NamedTuple):
     def derivative(self) -> Pieces:
         """By time; jumps have none."""
         rates = np.zeros_like(self.coefficients)
-        rates[:, :, :-1] = self.coefficients[:, :, 1:] * np.arange(1.0, DEGREE + 1)
+        rates[:, :, :-1] = self.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
         return self._replace(coefficients=rates / self.lengths[:, None, None])
 
     def at(self, times: np.ndarray) -> np.ndarray:
@@ -64,15 +65,16 @@ class Pieces(NamedTuple):
         else:
             segments: Any = 0
             if len(edges) > 2:
-                segments = np.searchsorted(edges, times, side="right") - 1
+                reached = times + ROUNDING * (1.0 + times)
+                segments = np.searchsorted(edges, reached, side="right") - 1
                 segments = np.clip(segments, 0, len(edges) - 2)
             pieces, begin = first[segments + 1] - first[segments], edges[segments]
             places = (times - begin) / (edges[segments + 1] - begin) * pieces
             rows = np.clip(places.astype(np.int64), 0, pieces - 1)
             parts, rows = places - rows, rows + first[segments]
         own, parts = coefficients[rows], parts[:, None]
-        values = own[:, :, DEGREE]
-        for power in range(DEGREE - 1, -1, -1):
+        values = own[:, :, -1]
+        for power in range(own.shape[2] - 2, -1, -1):
             values = own[:, :, power] + parts * values
         return values
 
@@ -81,15 +83,15 @@ def held(times: np.ndarray, values: np.ndarray) -> Pieces:
     """Each sample until the next; jumps are break points, the last sample only ends the run."""
     jumps = (values[1:-1] != values[:-2]).any(axis=1).nonzero()[0] + 1
     rows = np.concatenate([[0], jumps])
-    coefficients = _constant(values[rows])
     edges = np.concatenate([times[rows], times[-1:]])
-    return Pieces(edges, np.arange(len(edges)), np.empty(0), coefficients)
+    return Pieces(edges, np.arange(len(edges)), np.empty(0), values[rows, :, None])
 
 
 def linear(times: np.ndarray, values: np.ndarray) -> Pieces:
     """Straight lines between samples."""
-    coefficients = _constant(values[:-1])
-    coefficients[:, :, 1] = np.diff(values, axis=0)
+    coefficients = np.empty((len(values) - 1, values.shape[1], 2))
+    coefficients[:, :, 0] = values[:-1]
+    np.subtract(values[1:], values[:-1], out=coefficients[:, :, 1])
     return _pieces(times, values, coefficients)
 
 
@@ -98,7 +100,7 @@ def cubic(times: np.ndarray, values: np.ndarray) -> Pieces:
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(times, values)
-    coefficients = np.zeros((*spline.c.shape[1:], DEGREE + 1))
+    coefficients = np.empty((*spline.c.shape[1:], len(spline.c)))
     lengths = np.diff(times)[:, None]
     for power in range(len(spline.c)):
         coefficients[:, :, power] = spline.c[-1 - power] * lengths**power
@@ -108,20 +110,14 @@ def cubic(times: np.ndarray, values: np.ndarray) -> Pieces:
 HOLDS = {"linear": linear, "zero": held, "cubic": cubic}
 
 
-def _constant(values: np.ndarray) -> np.ndarray:
-    coefficients = np.zeros((*values.shape, DEGREE + 1))
-    coefficients[:, :, 0] = values
-    return coefficients
-
-
 def _pieces(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> Pieces:
     """One piece for each interval; segments end where a quiet stretch begins or ends."""
     first = _quiet_ends(times, values)
     edges, starts = times[first], np.empty(0)
-    for a, b in pairwise(first):
-        step = (times[b] - times[a]) / (b - a)
-        off = times[a : b + 1] - (times[a] + step * np.arange(b - a + 1))
-        if np.abs(off).max() > EQUIDISTANT * step:
+    for (a, b), (begin, end) in zip(pairwise(first.tolist()), pairwise(edges), strict=True):
+        step = (end - begin) / (b - a)
+        off = times[a : b + 1] - np.linspace(begin, end, b - a + 1)
+        if max(off.max(), -off.min()) > EQUIDISTANT * step:
             starts = times[:-1].copy()
             break
     return Pieces(edges, first, starts, coefficients)
@@ -130,11 +126,12 @@ def _pieces(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> 
 def _quiet_ends(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Numbers of the samples at which segments begin and end."""
     last = len(times) - 1
-    moves = (values[1:] != values[:-1]).any(axis=1)
+    moves = values[1:] != values[:-1]
+    if moves.all():
+        return np.array([0, last])
+    moves = moves.any(axis=1)
     changes = (moves[1:] != moves[:-1]).nonzero()[0] + 1
     ends = np.concatenate([[0], changes, [last]])
-    if len(changes):
-        quiet = ~moves[ends[:-1]] & (np.diff(times[ends]) >= QUIET)
-        # A change is one of segments if what lies on one of its sides is quiet.
-        ends = ends[np.concatenate([[True], quiet[1:] | quiet[:-1], [True]])]
-    return ends.astype(np.int64)
+    quiet = ~moves[ends[:-1]] & (np.diff(times[ends]) >= QUIET)
+    # A change is one of segments if what lies on one of its sides is quiet.
+    return ends[np.concatenate([[True], quiet[1:] | quiet[:-1], [True]])]

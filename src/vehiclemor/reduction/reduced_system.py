@@ -10,9 +10,9 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import checked_maneuver
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.system import System
@@ -106,6 +106,7 @@ class ReducedSystem(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
         """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         run = self.run(maneuver, start, begin=begin)
         inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))

@@ -21,12 +21,12 @@ from vehiclemor.simulation.checks import (
     check_positive,
     checked_array,
     checked_inputs,
-    checked_maneuver,
     output_times,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.lane_loops import LaneKernels
 from vehiclemor.simulation.lane_runs import LaneRuns
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed

@@ -12,26 +12,43 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor import signals
-from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11
+SIGNAL_LOOPS = "simulation.integrators.structures", "simulation.formulations.inputs"
 MOST_PIECES = 1 << 15
 DEGREE = 5
 
 
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    return maneuver.recorded if isinstance(maneuver, signals.Signal) else _recorded(maneuver)
+    if not isinstance(maneuver, signals.Signal):
+        return _recorded(maneuver)
+    # Kept with the signal, so not longer than it.
+    if "recorded" not in maneuver.kept:
+        ready, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
+        inputs = np.empty((len(times), ready.bundle.coefficients.shape[1]))
+        loops(SIGNAL_LOOPS, ("sampled",))["sampled"](ready, times, inputs)
+        inputs.flags.writeable = False
+        maneuver.kept["recorded"] = times, inputs
+    return maneuver.kept["recorded"]
+
+
+@lru_cache(maxsize=64)
+def _times(duration: float, samples: int) -> np.ndarray:
+    times = np.linspace(0.0, duration, samples)
+    times.flags.writeable = False
+    return times
 
 
 @lru_cache(maxsize=64)
 def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    times, inputs = maneuver.recorded
-    inputs = loop_array(inputs)
+    times = maneuver.times
+    inputs = loop_array(maneuver.at(times))
     times.flags.writeable = inputs.flags.writeable = False
     return times, inputs
 
