@@ -9,8 +9,13 @@ import numpy as np
 
 # Times that differ by so little, relative to what they are, are one.
 ROUNDING = 1e-12
-# Samples whose spacing differs by less, relative to it, are equidistant.
-EQUIDISTANT = 1e-9
+# Samples whose spacings differ by less, relative to them, are equidistant.
+EQUIDISTANT = 1e-8
+# Change of slope beside that of the neighbouring samples, times the spacing or `FINE` (s), relative
+# to the largest value, from which on a sample is a break point.  Measured on the 14-DOF vehicle, ten
+# seconds at 100 Hz, tolerance 2e-3: run through noise of 0.03 %, or a triangle of 10 s, and the
+# lateral position is off by 0.12 and 1.4 m, stopped at by less than 0.01 m.
+KINK, FINE = 1e-3, 0.01
 # A stretch of equal samples is quiet from so long (s) on: a run at rest could step over its end.
 QUIET = 0.1
 
@@ -111,27 +116,38 @@ HOLDS = {"linear": linear, "zero": held, "cubic": cubic}
 
 
 def _pieces(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> Pieces:
-    """One piece for each interval; segments end where a quiet stretch begins or ends."""
-    first = _quiet_ends(times, values)
-    edges, starts = times[first], np.empty(0)
-    for (a, b), (begin, end) in zip(pairwise(first.tolist()), pairwise(edges), strict=True):
-        step = (end - begin) / (b - a)
-        off = times[a : b + 1] - np.linspace(begin, end, b - a + 1)
-        if max(off.max(), -off.min()) > EQUIDISTANT * step:
-            starts = times[:-1].copy()
-            break
-    return Pieces(edges, first, starts, coefficients)
+    """One piece for each interval; segments end at kinks, and where quiet begins or ends."""
+    lengths = np.diff(times)
+    inner = _kinks(lengths, values) | _quiet_ends(times, values)
+    ends = [[0], inner.nonzero()[0] + 1, [len(lengths)]]
+    first = np.concatenate(ends) if inner.any() else np.array([0, len(lengths)])
+    even = lengths.max() - lengths.min() <= EQUIDISTANT * lengths[0]
+    return Pieces(times[first], first, np.empty(0) if even else times[:-1].copy(), coefficients)
+
+
+def _kinks(lengths: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """At which of the inner samples (n - 2,) the slope changes otherwise than beside it.
+
+    A curve that is sampled finely bends by as much from sample to sample; what is left of noise,
+    corners and coarse samples is what an integrator must not step over.
+    """
+    lengths = lengths[:, None]
+    spacing = 0.5 * (lengths[1:] + lengths[:-1])
+    slopes = (values[1:] - values[:-1]) / lengths
+    bends = np.zeros((len(values), values.shape[1]))
+    np.divide(slopes[1:] - slopes[:-1], spacing, out=bends[1:-1])
+    off = np.abs(bends[1:-1] - 0.5 * (bends[:-2] + bends[2:]))
+    largest = np.maximum(values.max(axis=0), -values.min(axis=0))
+    return (off * spacing * np.maximum(spacing, FINE) > KINK * largest).any(axis=1)
 
 
 def _quiet_ends(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Numbers of the samples at which segments begin and end."""
-    last = len(times) - 1
-    moves = values[1:] != values[:-1]
-    if moves.all():
-        return np.array([0, last])
-    moves = moves.any(axis=1)
-    changes = (moves[1:] != moves[:-1]).nonzero()[0] + 1
-    ends = np.concatenate([[0], changes, [last]])
-    quiet = ~moves[ends[:-1]] & (np.diff(times[ends]) >= QUIET)
-    # A change is one of segments if what lies on one of its sides is quiet.
-    return ends[np.concatenate([[True], quiet[1:] | quiet[:-1], [True]])]
+    """At which of the inner samples (n - 2,) a stretch of equal samples begins or ends."""
+    moves = (values[1:] != values[:-1]).any(axis=1)
+    inner = moves[1:] != moves[:-1]
+    if inner.any():
+        changes = np.concatenate([[0], inner.nonzero()[0] + 1, [len(times) - 1]])
+        quiet = ~moves[changes[:-1]] & (np.diff(times[changes]) >= QUIET)
+        # A change counts if what lies on one of its sides is quiet.
+        inner[changes[1:-1] - 1] = quiet[1:] | quiet[:-1]
+    return inner
