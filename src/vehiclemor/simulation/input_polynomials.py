@@ -38,6 +38,13 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     return maneuver.kept["recorded"]
 
 
+def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:
+    """The maneuver to which another is proportional, if it declares that it is."""
+    if not maneuver.linear_in_amplitude or maneuver.amplitude_factor == 1.0:
+        return None
+    return maneuver.perturbed(maneuver.frequency_factor)
+
+
 @lru_cache(maxsize=64)
 def _times(duration: float, samples: int) -> np.ndarray:
     times = np.linspace(0.0, duration, samples)
@@ -47,8 +54,12 @@ def _times(duration: float, samples: int) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    times = maneuver.times
-    inputs = loop_array(maneuver.at(times))
+    if (unit := _of_unit_amplitude(maneuver)) is not None:
+        times, inputs = _recorded(unit)
+        inputs = maneuver.amplitude_factor * inputs
+    else:
+        times = maneuver.times
+        inputs = loop_array(maneuver.at(times))
     times.flags.writeable = inputs.flags.writeable = False
     return times, inputs
 
@@ -77,6 +88,10 @@ def _found_signal(maneuver: Maneuver) -> Ready:
     InputError
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
+    if (unit := _of_unit_amplitude(maneuver)) is not None:
+        signal: Signal = _found_signal(unit).bundle
+        coefficients = maneuver.amplitude_factor * signal.coefficients
+        return ready(signal._replace(coefficients=coefficients))
     inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
     edges = np.array([0.0, *inner, maneuver.duration])
     probe = np.linspace(0.0, maneuver.duration, 1001)
