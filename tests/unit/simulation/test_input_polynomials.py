@@ -202,4 +202,4 @@ def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
         np.testing.assert_array_equal(scaled.edges, searched.edges)
         times = np.linspace(0.0, 3.0, 997)
         found, wanted = (Pieces(*signal).at(times) for signal in (scaled, searched))
-        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=4e-16)
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-15)
