@@ -61,26 +61,33 @@ class Pieces(NamedTuple):
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
-        edges, first, starts, coefficients = self
+        return evaluated(self.coefficients, *self.located(times))
+
+    def located(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers of the pieces in which times (n,) lie, and the parts of them that have passed."""
+        edges, first, starts, _ = self
         if len(starts):
             rows = np.searchsorted(starts, times, side="right") - 1
             rows = np.clip(rows, 0, len(starts) - 1)
-            parts = (times - starts[rows]) / self.lengths[rows]
-        else:
-            segments: Any = 0
-            if len(edges) > 2:
-                reached = times + ROUNDING * (1.0 + times)
-                segments = np.searchsorted(edges, reached, side="right") - 1
-                segments = np.clip(segments, 0, len(edges) - 2)
-            pieces, begin = first[segments + 1] - first[segments], edges[segments]
-            places = (times - begin) / (edges[segments + 1] - begin) * pieces
-            rows = np.clip(places.astype(np.int64), 0, pieces - 1)
-            parts, rows = places - rows, rows + first[segments]
-        own, parts = coefficients[rows], parts[:, None]
-        values = own[:, :, -1]
-        for power in range(own.shape[2] - 2, -1, -1):
-            values = own[:, :, power] + parts * values
-        return values
+            return rows, (times - starts[rows]) / self.lengths[rows]
+        segments: Any = 0
+        if len(edges) > 2:
+            reached = times + ROUNDING * (1.0 + times)
+            segments = np.searchsorted(edges, reached, side="right") - 1
+            segments = np.clip(segments, 0, len(edges) - 2)
+        pieces, begin = first[segments + 1] - first[segments], edges[segments]
+        places = (times - begin) / (edges[segments + 1] - begin) * pieces
+        rows = np.clip(places.astype(np.int64), 0, pieces - 1)
+        return rows + first[segments], places - rows
+
+
+def evaluated(coefficients: np.ndarray, rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Values (..., n, inputs) of polynomials (..., pieces, inputs, :), see `Pieces.located`."""
+    own, parts = coefficients[..., rows, :, :], parts[:, None]
+    values = own[..., -1]
+    for power in range(own.shape[-1] - 2, -1, -1):
+        values = own[..., power] + parts * values
+    return values
 
 
 def held(times: np.ndarray, values: np.ndarray) -> Pieces:
@@ -91,16 +98,17 @@ def held(times: np.ndarray, values: np.ndarray) -> Pieces:
     return Pieces(edges, np.arange(len(edges)), np.empty(0), values[rows, :, None])
 
 
-def linear(times: np.ndarray, values: np.ndarray) -> Pieces:
-    """Straight lines between samples."""
+def linear(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Coefficients of straight lines between samples."""
+    del times
     coefficients = np.empty((len(values) - 1, values.shape[1], 2))
     coefficients[:, :, 0] = values[:-1]
     np.subtract(values[1:], values[:-1], out=coefficients[:, :, 1])
-    return _pieces(times, values, coefficients)
+    return coefficients
 
 
-def cubic(times: np.ndarray, values: np.ndarray) -> Pieces:
-    """The cubic spline with continuous second derivatives, not-a-knot at its ends."""
+def cubic(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Coefficients of the spline with continuous second derivatives, not-a-knot at its ends."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(times, values)
@@ -108,20 +116,32 @@ def cubic(times: np.ndarray, values: np.ndarray) -> Pieces:
     lengths = np.diff(times)[:, None]
     for power in range(len(spline.c)):
         coefficients[:, :, power] = spline.c[-1 - power] * lengths**power
-    return _pieces(times, values, coefficients)
+    return coefficients
 
 
-HOLDS = {"linear": linear, "zero": held, "cubic": cubic}
+# Coefficients (intervals, inputs, degree + 1) that don't depend on what other columns hold.
+CONTINUOUS = {"linear": linear, "cubic": cubic}
+HOLDS = ("linear", "zero", "cubic")
 
 
-def _pieces(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> Pieces:
-    """One piece for each interval; segments end at kinks, and where quiet begins or ends."""
-    lengths = np.diff(times)
-    inner = _kinks(lengths, values) | _quiet_ends(times, values)
-    ends = [[0], inner.nonzero()[0] + 1, [len(lengths)]]
-    first = np.concatenate(ends) if inner.any() else np.array([0, len(lengths)])
+def through(times: np.ndarray, values: np.ndarray, hold: str) -> Pieces:
+    """Polynomials through samples (n, inputs) by one of `HOLDS`."""
+    if hold == "zero":
+        return held(times, values)
+    return joined(times, bent(times, values), CONTINUOUS[hold](times, values))
+
+
+def joined(times: np.ndarray, bends: np.ndarray, coefficients: np.ndarray) -> Pieces:
+    """One piece for each interval; segments end where samples are `bent`."""
+    lengths, ends = np.diff(times), [[0], bends.nonzero()[0] + 1, [len(times) - 1]]
+    first = np.concatenate(ends) if bends.any() else np.array([0, len(lengths)])
     even = lengths.max() - lengths.min() <= EQUIDISTANT * lengths[0]
     return Pieces(times[first], first, np.empty(0) if even else times[:-1].copy(), coefficients)
+
+
+def bent(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Which of the inner samples (n - 2,) are break points: kinks, and ends of quiet."""
+    return _kinks(np.diff(times), values) | _quiet_ends(times, values)
 
 
 def _kinks(lengths: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 from vehiclemor.arguments import file_path, number, quoted, real_array, within
 from vehiclemor.errors import FileError, InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
-from vehiclemor.piecewise import HOLDS, Pieces
+from vehiclemor.piecewise import HOLDS, Pieces, through
 from vehiclemor.registry import unknown
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class Signal(Maneuver):
         names = _names(inputs, values.shape[1])
         duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
         samples = _output_samples(duration, output_step)
-        pieces = HOLDS[hold](times, values)
+        pieces = through(times, values, hold)
         return cls(
             name,
             f"{len(times)} samples, {hold} hold",

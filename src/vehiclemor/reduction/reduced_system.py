@@ -1,6 +1,8 @@
 """A dynamic model in other states than its own: encode, integrate, lift."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +17,7 @@ from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.run_plans import Run, Solver
+from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
@@ -28,6 +31,11 @@ def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
 
 def _nothing_told(_: Run, __: np.ndarray) -> None:
     return
+
+
+def _given(states: np.ndarray) -> Run:
+    """States (samples, dim) as a run, all at time zero."""
+    return Run(np.zeros(len(states)), states, np.zeros(0), 0.0, "")
 
 
 def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
@@ -59,6 +67,8 @@ class ReducedSystem(ShortRepr):
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     judge
         (run of the system, inputs) -> what the model tells of it; nothing by default.
+    names
+        Of the system's states; the model's by default.
     """
 
     model: DynamicModel
@@ -72,6 +82,45 @@ class ReducedSystem(ShortRepr):
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
+    names: tuple[str, ...] = ()
+
+    @property
+    def state_space(self) -> ReducedSystem:
+        """Itself, see `StateSpace`."""
+        return self
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states that are stepped."""
+        return self.names or tuple(self.model.definition.states)
+
+    def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """State (dim,) of a start."""
+        return self._encoded(start, inputs).copy()
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        """The system as a function of state, inputs and length of time."""
+        return Stepper(self.system, self.spaces, self.solver, self.tolerance)
+
+    def step(
+        self, state: np.ndarray, inputs: np.ndarray, ends: np.ndarray | None, dt: float, time: float
+    ) -> np.ndarray:
+        """State (dim,) after dt s, see `Stepper`."""
+        return self.stepper.step(state, inputs, dt, time, ends)
+
+    def rates(self, state: np.ndarray, inputs: np.ndarray, time: float) -> np.ndarray:
+        """Time derivative (dim,) of a state."""
+        return self.stepper.rates(state, inputs, time)
+
+    def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """States (samples, 2 n) of the model."""
+        run = _given(states)
+        return self.lift(run, inputs, states[0])[:, : 2 * len(self.model.coordinates)]
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
+        """What the model tells of states, if it judges itself."""
+        return self.judge(_given(states), inputs)
 
     def run(
         self,
@@ -125,6 +174,7 @@ def transformed_system(
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
     offline: Offline,
     settings: OnlineSettings,
+    names: Sequence[str],
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told,
 ) -> ReducedSystem:
     """Equations in other states than the model's.
@@ -135,13 +185,10 @@ def transformed_system(
         The equations; its kernel `full_state` gives the full state of a transformed one.
     encode
         (full state (2 n,), inputs) -> transformed state (dim,).
-    judge
+    names, judge
         See `ReducedSystem`.
     """
     dim = len(system.reference)
-
-    def lift(run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return system.along("full_state", run.path, inputs, 2 * len(model.coordinates))
 
     return ReducedSystem(
         model,
@@ -152,6 +199,19 @@ def transformed_system(
         settings.solver,
         settings.tolerance,
         encode,
-        lift,
+        FullStates(system, 2 * len(model.coordinates)).lift,
         judge=judge,
+        names=tuple(names),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FullStates(ShortRepr):
+    """Full states, so many, by the kernel `full_state` of a transformed system."""
+
+    system: System
+    size: int
+
+    def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """Full states (samples, size) of a run."""
+        return self.system.along("full_state", run.path, inputs, self.size)

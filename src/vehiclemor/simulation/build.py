@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, Values
-from vehiclemor.parameters import ParameterSet, load_parameters
+from vehiclemor.parameters import ParameterSet, load_parameters, overridden
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -59,9 +59,19 @@ def build(
     definition: ModelDefinition = component("model", name)
     path = parameter_file or definition.parameter_file
     parameters = load_parameters(name, definition.parameters, path, overrides)
-    make = _algebraic if definition.kind == "ae" else _dynamic
     with first_use(name):
-        return make(definition, parameters)
+        return _made(definition, parameters)
+
+
+def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
+    """The model with some of its parameters changed: name -> value in SI units; see `build`."""
+    declared = model.definition.parameters
+    return _made(model.definition, overridden(model.parameters, declared, overrides))
+
+
+def _made(definition: ModelDefinition, parameters: ParameterSet) -> Model:
+    make = _algebraic if definition.kind == "ae" else _dynamic
+    return make(definition, parameters)
 
 
 def build_derived(name: str) -> Model | None:
@@ -101,10 +111,7 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
     """A model of equations of motion."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
-    values = {
-        key: parameters[key] if declared.size > 1 else float(parameters[key])
-        for key, declared in definition.parameters.items()
-    }
+    values = declared_values(definition, parameters)
     with blamed(f"model {definition.name!r}: check"):
         definition.check(values)
     equations, digest = compiled(definition.name, definition.derive)
@@ -117,6 +124,14 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
         initial = {name: real_array(x) for name, x in definition.starts(values).items()}
     _check_states(definition, initial)
     return DynamicModel(definition, equations, parameters, digest, constants, initial)
+
+
+def declared_values(definition: ModelDefinition, parameters: ParameterSet) -> dict[str, Any]:
+    """Parameters by name as a declaration takes them: floats and points."""
+    return {
+        key: parameters[key] if declared.size > 1 else float(parameters[key])
+        for key, declared in definition.parameters.items()
+    }
 
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:

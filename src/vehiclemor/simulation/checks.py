@@ -1,5 +1,6 @@
 """Checks at the border of a model that is ready to run, and of what its runs give."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,7 +21,11 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
         If the shape is another one or an entry isn't finite.
     """
     try:
-        array = np.atleast_1d(loop_array(value))
+        array = loop_array(value)
+        # In a third of the time: a product that is finite has finite factors.
+        if array.shape == (size,) and math.isfinite(array.dot(array)):
+            return array
+        array = np.atleast_1d(array)
     except (TypeError, ValueError):
         raise InputError(f"{name} is {quoted(value)}, {model} needs {size} numbers") from None
     if array.shape != (size,):
@@ -156,12 +161,14 @@ def left_validity(
     if sample == len(times):
         return "", sample
     name = names[first.index(sample)]
-    low, high = definition.validity[name]
     value = outputs[sample, [quantity.name for quantity in definition.outputs].index(name)]
-    return (
-        f"{name} is {value:.4g} at t = {times[sample]:.6g} s; the model holds "
-        f"from {low:g} to {high:g}"
-    ), sample
+    return out_of_validity(definition, name, value, times[sample]), sample
+
+
+def out_of_validity(definition: ModelDefinition, name: str, value: float, time: float) -> str:
+    """That an output has left its range of validity at a time in s."""
+    low, high = definition.validity[name]
+    return f"{name} is {value:.4g} at t = {time:.6g} s; the model holds from {low:g} to {high:g}"
 
 
 def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:

@@ -276,7 +276,7 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """See `recorded`; a remark is added to what there is to remark."""
         states, outputs, first = self._delivered(run, inputs, states)
-        (names, *_), times = self._limits, run.times
+        (names, *_), times = self.limits, run.times
         message = run.failure
         if not message:
             of_outputs = first[: len(names)]
@@ -301,18 +301,20 @@ class DynamicModel(Model):
         return found if trust is None else found.judged(trust)
 
     @cached_property
-    def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+    def limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+        """What outputs are watched for, see `limits_of`."""
         return limits_of(self.definition)
 
     @cached_property
     def _observers(self) -> dict[int, Ready]:
         return {}
 
-    def _observer(self, lanes: int) -> Ready:
+    def observer(self, lanes: int) -> Ready:
+        """How outputs follow from states, so many samples at once."""
         if lanes not in self._observers:
             kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
             states = 2 * len(self.coordinates)
-            observer = Observer(kernel, self.constants, *self._limits[1:], states)
+            observer = Observer(kernel, self.constants, *self.limits[1:], states)
             self._observers[lanes] = ready(observer)
         return self._observers[lanes]
 
@@ -345,8 +347,8 @@ class DynamicModel(Model):
         """The loop of `_delivered`, to be given a result; inputs are where the run is recorded."""
         n, samples = 2 * len(self.coordinates), len(run.times)
         width = -(-(n + len(self.outputs)) // LANES) * LANES
-        observer = self._observer(LANES if run.rows >= LANES else 1)
-        first = np.empty(len(self._limits[1]), dtype=np.int64)
+        observer = self.observer(LANES if run.rows >= LANES else 1)
+        first = np.empty(len(self.limits[1]), dtype=np.int64)
         scratch = cache_lines(len(states) + 1, width)[0].reshape(-1)
         loop, result = path_loops()["delivered"], np.empty((0, width))
         call = loop.prepared(states, inputs, run.places, observer, scratch, result, first)

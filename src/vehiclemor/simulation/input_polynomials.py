@@ -22,6 +22,8 @@ ACCURACY = 1e-11
 SIGNAL_LOOPS = "simulation.integrators.structures", "simulation.formulations.inputs"
 MOST_PIECES = 1 << 15
 DEGREE = 5
+# Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
+KEPT = 512
 
 
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
@@ -52,7 +54,7 @@ def _times(duration: float, samples: int) -> np.ndarray:
     return times
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT)
 def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     if (unit := _of_unit_amplitude(maneuver)) is not None:
         times, inputs = _recorded(unit)
@@ -79,7 +81,7 @@ def signal_of(maneuver: Maneuver) -> Ready:
     return maneuver.kept["ready"]
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=KEPT)
 def _found_signal(maneuver: Maneuver) -> Ready:
     """Polynomials of a function, searched for.
 

@@ -321,33 +321,45 @@ class System(ShortRepr):
         direct_until: float,
     ) -> Plan:
         """What runs over the output times of a maneuver share."""
+        times, nothing = output_times(solver.times, maneuver, begin=solver.begin), np.empty(0)
+        output = Output(times, nothing, nothing, *NO_POINTS, direct_until)
+        loop, arguments, sizes = self.loop(windows, solver, NO_BUNDLE, NO_BUNDLE, output)
+        modules = catalogue.integrator(solver.name).modules
+        whole = solver.times is None and not solver.begin
+        points = whole and "cubic" in modules
+        points = points and len(times) >= LANES and direct_until < times[-1]
+        return Plan(loop, arguments, sizes, whole, points, windows, [])
+
+    def loop(
+        self,
+        windows: ProjectionWindows,
+        solver: Solver,
+        signal: Ready,
+        spans: Ready,
+        output: Output,
+    ) -> tuple[Loop, RunArguments, tuple[int, int, int]]:
+        """The compiled time loop, its arguments but for space, and the sizes of that."""
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
-        times = output_times(solver.times, maneuver, begin=solver.begin)
         steps = self.steps(name) if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
         nothing = np.empty(0)
+        longest = float(solver.longest_step or np.inf)
         arguments = RunArguments(
             nothing,
             self.called(formulation, name if steps else ""),
-            NO_BUNDLE,
-            NO_BUNDLE,
+            signal,
+            spans,
             windows.subspaces,
             self.method(name, active),
-            catalogue.control_of(
-                solver.name, float(solver.tolerance), float(solver.longest_step or np.inf)
-            ),
-            Output(times, nothing, nothing, *NO_POINTS, direct_until),
+            catalogue.control_of(solver.name, float(solver.tolerance), longest),
+            output,
             nothing,
             nothing,
         )
         floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
-        loop = catalogue.time_loop(chosen, formulation, steps)
-        whole = solver.times is None and not solver.begin
-        points = whole and "cubic" in chosen.modules
-        points = points and len(times) >= LANES and direct_until < times[-1]
-        return Plan(loop, arguments, (n, floats, dim + 8), whole, points, windows, [])
+        return catalogue.time_loop(chosen, formulation, steps), arguments, (n, floats, dim + 8)

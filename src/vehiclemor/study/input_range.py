@@ -1,5 +1,6 @@
 """The range of the inputs that a method has been trained on, as its least claim to knowledge."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -41,6 +42,11 @@ class InputRange:
         if model.kind != "ae":
             names += [f"rate of {name}" for name in names]
         return trust_of(scenario.maneuver.times, np.hstack([used, off]), [*names, "initial speed"])
+
+    def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
+        """How far inputs (samples, inputs) go in the range; their rates are not looked at."""
+        used = inputs / np.maximum(self.largest[: inputs.shape[1]], 1e-12)
+        return trust_of(np.zeros(len(inputs)), used, [f"input {name}" for name in names])
 
 
 @lru_cache(maxsize=64)

@@ -101,7 +101,8 @@ def start_of(model: Model, scenario: Scenario) -> Start:
     return _state_at(model.name, parameters, scenario.start)
 
 
-@lru_cache(maxsize=256)
+# More than the runs of a protocol, over which all rows go.
+@lru_cache(maxsize=4096)
 def _state_at(model: str, parameters: str, start: str) -> np.ndarray:
     return build(model, overrides=json.loads(parameters)).start(start)
 

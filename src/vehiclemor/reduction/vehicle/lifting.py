@@ -95,19 +95,24 @@ class Lifting(ShortRepr):
     def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
         return {}
 
+    def text(self, modes: int) -> tuple[str, np.ndarray]:
+        """Source and constants of the kernel; without modes for a start that excites none."""
+        right = self.transient.right[:modes]
+        pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
+        pairs = pairs.reshape(2 * modes, right.shape[1])
+        shared = [self.coefficients, self.reference[None]]
+        rows = np.vstack([*shared, pairs] if modes else shared)
+        rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
+        text = lifting_text(self.features, self.layout, len(self.parameters), modes)
+        return text, np.concatenate([self.parameters, rows.ravel()])
+
     def _kernel(self, modes: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
-        """Address and constants of the kernel; without modes for a start that excites none."""
+        """Address and constants of the kernel."""
         if (modes, lanes) not in self._made:
-            right = self.transient.right[:modes]
-            pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
-            pairs = pairs.reshape(2 * modes, right.shape[1])
-            shared = [self.coefficients, self.reference[None]]
-            rows = np.vstack([*shared, pairs] if modes else shared)
-            rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-            text = lifting_text(self.features, self.layout, len(self.parameters), modes)
+            text, constants = self.text(modes)
             kernels = Kernels(kernel_sources(text))
             address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
-            self._made[modes, lanes] = address, np.concatenate([self.parameters, rows.ravel()])
+            self._made[modes, lanes] = address, constants
         return self._made[modes, lanes]
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
@@ -140,7 +145,25 @@ class Lifting(ShortRepr):
         excited
             By the start, as `excited` gives it.
         """
-        return self._lifted(self._space((times, path, inputs), excited, len(times)), len(times))
+        recorded = times, path, inputs
+        if len(times) > 1 or excited.shape[1]:
+            return self._lifted(self.space(recorded, excited, len(times)), len(times))
+        # One sample and then another, as in a closed loop.
+        try:
+            held, own = self._single.pop()
+        except IndexError:
+            own = tuple(array.copy() for array in recorded)
+            held = self.space(own, excited, 1)
+        for array, given in zip(own, recorded, strict=True):
+            array[:] = given
+        states, trust = self._lifted(held, 1)
+        states = states.copy()
+        self._single.append((held, own))
+        return states, trust
+
+    @cached_property
+    def _single(self) -> list[tuple[LiftingSpace, tuple[np.ndarray, ...]]]:
+        return []
 
     def of_run(
         self, run: Run, inputs: np.ndarray, excited: np.ndarray
@@ -149,13 +172,13 @@ class Lifting(ShortRepr):
         held = run.kept.get("lifted")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self._space((times, run.whole, inputs), excited.copy(), run.rows)
+            held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
             run.kept["lifted"] = held
         held.excited[:] = excited
         return self._lifted(held, run.rows)
 
-    def _space(
-        self, recorded: tuple[np.ndarray, np.ndarray, np.ndarray], excited: np.ndarray, rows: int
+    def space(
+        self, recorded: tuple[np.ndarray, ...], excited: np.ndarray, rows: int
     ) -> LiftingSpace:
         """Arrays of the loops and these, packed once."""
         (times, path, inputs), calls = recorded, []
@@ -185,22 +208,28 @@ class Lifting(ShortRepr):
             for place in places:
                 call.words[place] = rows
             call()
-        return space.states, self._trust(
-            space.times, rows, space.largest.tolist(), space.first.tolist()
+        largest, first = space.largest.tolist(), space.first.tolist()
+        left = min(first, default=rows)
+        return space.states, self.trust(
+            largest, first, float(space.times[left]) if left < rows else np.inf
         )
 
-    def _trust(
-        self, times: np.ndarray, rows: int, largest: list[float], first: list[int]
-    ) -> Trust | None:
-        """How far a run has gone; none if nothing tells."""
+    def trust(self, largest: list[float], first: list[int], until: float) -> Trust | None:
+        """How far a run has gone; none if nothing tells.
+
+        Parameters
+        ----------
+        largest, first
+            Largest magnitude of each watched quantity, and the first row at which it is above 1.
+        until
+            Time (s) of the first of these rows; infinite if there is none.
+        """
         if not largest:
             return None
-        sample = min(first)
-        if sample == rows:
+        if np.isinf(until):
             return Trust(max(largest))
-        name = self.features.watched[first.index(sample)][1]
-        reason = f"{name} leaves what the training runs have covered"
-        return Trust(max(largest), float(times[sample]), reason)
+        name = self.features.watched[first.index(min(first))][1]
+        return Trust(max(largest), until, f"{name} leaves what the training runs have covered")
 
 
 def decayed(excited: np.ndarray) -> float:

@@ -18,8 +18,9 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
@@ -101,6 +102,7 @@ class ReducedVehicle(ShortRepr):
     @cached_property
     def equations(self) -> ReducedSystem:
         """The compiled equations with the ways there and back."""
+        x, y, heading = self.model.definition.planar
         return ReducedSystem(
             self.model,
             self.system,
@@ -110,7 +112,18 @@ class ReducedVehicle(ShortRepr):
             self.solver,
             self.tolerance,
             self.encoded,
+            lambda run, inputs, _: self._lifted(run, inputs)[0],
+            judge=lambda run, inputs: self._lifted(run, inputs)[1],
+            names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
         )
+
+    @property
+    def state_space(self) -> ReducedSystem:
+        """The reduced equations: a state tells nothing of what has decayed after the start."""
+        return self.equations
+
+    def _lifted(self, run: Run, inputs: np.ndarray) -> tuple[np.ndarray, Trust | None]:
+        return self.lift.states(run.times, run.path, inputs, np.empty((2, 0, 2)))
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
@@ -138,7 +151,7 @@ class ReducedVehicle(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
-        known, inputs = self._known(start), recorded_inputs(maneuver)[1]
+        known, inputs = self.known(start), recorded_inputs(maneuver)[1]
         run = self.equations.run(maneuver, start, direct_until=known.until)
         states, trust = self.lift.of_run(run, inputs, known.excited)
         if not len(run.places) or run.places[0, 1] < 0.0:
@@ -148,7 +161,7 @@ class ReducedVehicle(ShortRepr):
         run.give_back()
         return found
 
-    def _known(self, start: Start) -> KnownStart:
+    def known(self, start: Start) -> KnownStart:
         """A start with what it excites; kept by its name or its numbers."""
         key = start if isinstance(start, str) else self.model.start(start).tobytes()
         found = self._starts.get(key)

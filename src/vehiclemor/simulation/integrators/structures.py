@@ -143,6 +143,8 @@ class Control(NamedTuple):
         Factors between which the step size stays.
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
+    first
+        First step to try in s; 0 if it is to be guessed.
     """
 
     tolerance: Float
@@ -162,6 +164,7 @@ class Control(NamedTuple):
     keep_least: Float
     keep_most: Float
     halve_last: Float
+    first: Float
 
 
 # Points of a step: the Chebyshev points of a cubic.

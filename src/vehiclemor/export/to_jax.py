@@ -1,0 +1,44 @@
+"""A system as a function of JAX."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.export.interpreter import evaluated
+from vehiclemor.export.packages import needed
+from vehiclemor.export.straight_line import FUNCTIONS
+from vehiclemor.export.system import ExportedSystem
+
+# Where JAX has another name.
+RENAMED = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
+RENAMED |= {"fabs": "abs"}
+
+
+def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:
+    """Function (x, u, p=own values) -> (dx, y) of arrays; for `jit`, `vmap`, `jacfwd` and so on.
+
+    It is as accurate as its arguments: in double precision where `jax_enable_x64` is set.
+
+    Raises
+    ------
+    InputError
+        If JAX isn't installed.
+    """
+    needed("jax")
+    import jax.numpy as jnp
+
+    functions = {name: getattr(jnp, RENAMED.get(name, name)) for name in FUNCTIONS}
+    functions["select"] = jnp.where
+    values = np.array(system.values)
+
+    def function(x: Any, u: Any, p: Any = values) -> tuple[Any, Any]:
+        arrays = {"x": x, "u": u, "p": p}
+        arrays["c"] = evaluated(system.functions["constants"], arrays, functions)
+        dx = evaluated(system.functions["derivative"], arrays, functions)
+        return jnp.stack(dx), jnp.stack(evaluated(system.functions["outputs"], arrays, functions))
+
+    function.__name__ = system.name
+    return function
