@@ -20,6 +20,13 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.exporting.export import export as export
+    from vehiclemor.online.batch_signals import Signals as Signals
+    from vehiclemor.online.batches import simulate_many as simulate_many
+    from vehiclemor.online.rom import reduce as reduce
+    from vehiclemor.online.saved import load as load
+    from vehiclemor.online.saved import rom as rom
+    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -29,20 +36,33 @@ _DEFINED_IN = {
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    "Signal": "vehiclemor.signals",
+    "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "export": "vehiclemor.exporting.export",
+    "reduce": "vehiclemor.online.rom",
+    **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
+    "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
+    "Signal",
+    "Signals",
     "VehiclemorError",
     "compare",
     "describe",
+    "export",
     "figures",
+    "load",
     "maneuvers",
     "methods",
     "model",
     "models",
     "plot",
+    "reduce",
+    "rom",
     "run_study",
     "simulate",
+    "simulate_many",
     "studies",
 ]
 

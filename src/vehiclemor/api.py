@@ -137,7 +137,7 @@ def simulate(
     method
         Registered name, see `methods()`.
     maneuver
-        Registered name; the model's own by default.
+        Registered name, maneuver or signal; the model's own by default.
     start
         Initial condition, by name or as a state (n,); the model's first by default.
     frequency, amplitude
@@ -166,6 +166,7 @@ def simulate(
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.maneuver import Maneuver
+    from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
@@ -176,6 +177,7 @@ def simulate(
     if maneuver is None:
         maneuver = ready.definition.maneuver
     base = maneuver if isinstance(maneuver, Maneuver) else component("maneuver", maneuver)
+    base = checked_maneuver(base, ready.definition)
     if rtol is not None:
         if "tolerance" in settings:
             raise InputError("rtol and tolerance are the same setting: give one of them")

@@ -37,6 +37,9 @@ class Maneuver(ShortRepr):
         Frequency factor -> times (s) at which the inputs are not smooth.
     frequency_factor, amplitude_factor
         Perturbation; 1 is the nominal maneuver.
+    linear_in_amplitude
+        Whether all inputs are proportional to the amplitude factor: then runs that differ in it
+        alone share what is made of the signal.
 
     Raises
     ------
@@ -55,6 +58,7 @@ class Maneuver(ShortRepr):
     corners: Callable[[float], tuple[float, ...]]
     frequency_factor: float = 1.0
     amplitude_factor: float = 1.0
+    linear_in_amplitude: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no maneuver, so that its author reads one clear line."""
@@ -71,11 +75,9 @@ class Maneuver(ShortRepr):
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
         within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
-        for name, bounds in FACTORS.items():
-            factor = number(f"{name} factor", getattr(self, f"{name}_factor"))
-            if name == "frequency" and factor <= 0.0:
-                raise InputError(f"{name} factor: {factor:g} is not positive")
-            object.__setattr__(self, f"{name}_factor", within(f"{name} factor", factor, bounds))
+        for name in FACTORS:
+            factor = checked_factor(name, getattr(self, f"{name}_factor"))
+            object.__setattr__(self, f"{name}_factor", factor)
 
     def __str__(self) -> str:
         return f"maneuver {self.name!r}"
@@ -122,6 +124,18 @@ class Maneuver(ShortRepr):
         """
         return replace(self, frequency_factor=frequency, amplitude_factor=amplitude)
 
+    def for_inputs(self, names: tuple[str, ...]) -> "Maneuver":  # noqa: ARG002
+        """The maneuver as a model with these inputs takes it."""
+        return self
+
+
+def checked_factor(name: str, value: object) -> float:
+    """A factor on the frequency or amplitude; `InputError` if it is none, or out of bounds."""
+    factor = number(f"{name} factor", value)
+    if name == "frequency" and factor <= 0.0:
+        raise InputError(f"{name} factor: {factor:g} is not positive")
+    return within(f"{name} factor", factor, FACTORS[name])
+
 
 # Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.
 TRAVEL_AMPLITUDE = 0.1
@@ -158,6 +172,7 @@ sine_travel = Maneuver(
     duration=10.0,
     samples=1001,
     corners=smooth,
+    linear_in_amplitude=True,
 )
 chirp_travel = replace(
     sine_travel,

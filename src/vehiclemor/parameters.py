@@ -160,9 +160,24 @@ def load_parameters(
         if entry.source not in content.sources:
             raise FileError(f"{where}.source: {entry.source!r} is not listed under sources")
         _check_value(entry.value, declared, where, FileError)
-    if overrides is not None and not isinstance(overrides, Mapping):
+    given = {} if overrides is None else overrides
+    return overridden(ParameterSet(model, entries), expected, given)
+
+
+def overridden(
+    parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
+) -> ParameterSet:
+    """Parameters of which some values are replaced.
+
+    Raises
+    ------
+    InputError
+        If an override names no parameter or has a wrong shape or value.
+    """
+    if not isinstance(overrides, Mapping):
         raise InputError(f"parameters must be a mapping of names to values, not {overrides!r}")
-    for name, value in (overrides or {}).items():
+    model, entries = parameters.model, dict(parameters.entries)
+    for name, value in overrides.items():
         if name not in entries:
             hint = did_you_mean(name, expected) or f"it has {', '.join(expected)}"
             raise InputError(f"{name!r} is not a parameter of {model}; {hint}")

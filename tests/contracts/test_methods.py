@@ -1,6 +1,8 @@
 """What every registered reduction method keeps, on every registered model that it accepts."""
 
 import copy
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +11,8 @@ import pytest
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
+from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import training_runs
@@ -18,6 +22,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+from vehiclemor.study.scenario import Scenario
 
 METHODS = names("method")
 
@@ -245,6 +250,135 @@ def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
         # A projection: what it gives is its own best approximation.
         again = reduced.best_approximation(best)
         np.testing.assert_allclose(again, best, rtol=0, atol=1e-12)
+
+
+def held(maneuver: Maneuver, count: int, hold: float, zero: bool) -> Maneuver:
+    """A maneuver's inputs at `count` times, held until the next one, or straight lines to it."""
+    ends = hold * np.arange(count + 1)
+    table = maneuver.at(np.linspace(0.0, 3.0, count + 1))
+
+    def signal(times: np.ndarray, _: float, __: float) -> np.ndarray:
+        first = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, count - 1)
+        part = 0.0 if zero else (times / hold - first)[:, None]
+        return table[first] + part * (table[first + 1] - table[first])
+
+    inner = tuple(ends[1:-1].tolist())
+    name, samples = f"{maneuver.name} held {zero}", 2 * count + 1
+    return Maneuver(name, "", signal, maneuver.inputs, ends[-1], samples, lambda _: inner)
+
+
+@pytest.mark.parametrize("zero", [True, False], ids=["held", "linear"])
+def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
+    if not hasattr(pair.fit(), "state_space"):
+        pytest.skip(f"{pair.name} gives whole runs alone")
+    # So that what is left is no error of the integration.
+    tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
+    reduced = replace(pair.fit(), **tight)
+    count, dt = 8, 0.13
+    maneuver = held(pair.maneuver, count, 2.0 * dt, zero)
+    run = pair.run(reduced, maneuver)
+    assert run.finished
+    space, inputs = reduced.state_space, maneuver.at(2.0 * dt * np.arange(count + 1))
+    state = space.begin(pair.model.starts[0], inputs[0])
+    assert len(space.states) == len(state)
+    dynamic = pair.model.kind != "ae"
+    scale = pair.model.error_scale if dynamic else 1.0
+    for sample in range(1, 2 * count + 1):
+        k, half = divmod(sample - 1, 2)
+        at_ends = [
+            inputs[k] + part * (inputs[k + 1] - inputs[k]) for part in (half / 2, (half + 1) / 2)
+        ]
+        u, ends = (inputs[k], None) if zero else at_ends
+        state = space.step(state, u, ends, dt, (sample - 1) * dt)
+        now = u if ends is None else ends
+        if zero and half:
+            # What follows the inputs at once jumps there.
+            continue
+        (found,) = space.full_states(state[None], now[None])
+        np.testing.assert_allclose(found / scale, run.states[sample] / scale, rtol=1e-6, atol=1e-6)
+
+
+def test_rates_are_those_of_the_steps(pair: Pair) -> None:
+    reduced = pair.fit()
+    if pair.model.kind == "ae" or not hasattr(reduced, "state_space"):
+        pytest.skip("there are no rates")
+    space, time, dt = replace(reduced, tolerance=1e-11).state_space, 1.63, 1e-5
+    u = pair.maneuver.at(np.array([time]))[0]
+    state = space.step(space.begin(pair.model.starts[0], u), u, None, 0.1, time - 0.1)
+    later = space.step(state, u, None, dt, time)
+    # The trapezoidal rule, whose error is of the third order.
+    mean = 0.5 * (space.rates(state, u, time) + space.rates(later, u, time + dt))
+    np.testing.assert_allclose((later - state) / dt, mean, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("by", ["state", "inputs"])
+def test_jacobians_are_the_slopes_of_rates_and_outputs(pair: Pair, by: str) -> None:
+    space = getattr(pair.fit(), "state_space", None)
+    if space is None:
+        pytest.skip(f"{pair.name} gives whole runs alone")
+    rom, time = ReducedOrderModel(pair.model, pair.name, {}, (), pair.fit()), 1.63
+    u = pair.maneuver.at(np.array([time]))[0]
+    state = rom.state(inputs=u)
+    if pair.model.kind == "ae":
+        if getattr(space, "slopes", None) is None:
+            with pytest.raises(InputError, match="no analytic derivatives"):
+                rom.jacobian(state, u, by, of="coordinates")
+            return
+        if by == "state":
+            pytest.skip("coordinates follow from the inputs")
+        results = {
+            "coordinates": lambda _, v: rom.state(inputs=v),
+            "outputs": lambda _, v: rom.outputs(rom.state(inputs=v), v),
+        }
+    else:
+        state = rom.step(rom.step(state, u, 0.3, time - 0.3), u, 1e-3, time)
+        results = {"rhs": lambda x, v: rom.rhs(x, v, time), "outputs": rom.outputs}
+    rng = np.random.default_rng(3)
+    for of, function in results.items():
+        found = rom.jacobian(state, u, by, of, time)
+        size = np.maximum(np.abs(state if by == "state" else u), 1e-2)
+        assert found.shape[1] == len(size)
+        along = size * rng.uniform(-1.0, 1.0, len(size))
+        moved = [
+            function(state + h * along, u) if by == "state" else function(state, u + h * along)
+            for h in (1e-4, -1e-4, 5e-5, -5e-5)
+        ]
+        far, near = (moved[0] - moved[1]) / 2e-4, (moved[2] - moved[3]) / 1e-4
+        difference = (4.0 * near - far) / 3.0
+        largest = np.abs(found) @ np.abs(along)
+        assert (np.abs(found @ along - difference) <= 1e-6 * largest + 1e-6).all(), of
+
+
+def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> None:
+    settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {})).model_dump()
+    training = (Scenario(pair.maneuver, pair.model.starts[0]),)
+    made = ReducedOrderModel(pair.model, pair.name, settings, training, pair.fit())
+    again = load(made.save(tmp_path / "model.nc"))
+    assert (again.method, again.settings) == (made.method, settings)
+    assert again.reduced.offline == made.reduced.offline
+    assert again.reduced.effective_rank == made.reduced.effective_rank
+    for maneuver in (pair.maneuver, pair.maneuver.perturbed(0.9, 1.3)):
+        first, second = made.simulate(maneuver), again.simulate(maneuver)
+        np.testing.assert_array_equal(second.states, first.states)
+        np.testing.assert_array_equal(second.outputs, first.outputs)
+        for name in ("counts", "status", "message", "remark", "trust"):
+            assert getattr(second, name) == getattr(first, name)
+    states = pair.model.simulate(pair.maneuver).states
+    best, nearest = (rom.reduced.best_approximation(states) for rom in (made, again))
+    assert (best is None) == (nearest is None)
+    if best is not None:
+        np.testing.assert_array_equal(nearest, best)
+    if made.states:
+        assert again.states == made.states
+        inputs = np.full(len(made.inputs), 1e-3)
+        steps = [rom.step(rom.state(inputs=inputs), inputs, 1e-2) for rom in (made, again)]
+        np.testing.assert_array_equal(steps[1], steps[0])
+        if pair.model.kind != "ae":
+            first, second = (
+                rom.jacobian(step, inputs, of="outputs")
+                for rom, step in zip((made, again), steps, strict=True)
+            )
+            np.testing.assert_array_equal(second, first)
 
 
 def test_unknown_start_is_refused(pair: Pair) -> None:

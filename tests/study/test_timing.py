@@ -14,7 +14,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
 from vehiclemor.study.scenario import Scenario, input_hash
-from vehiclemor.study.timing import called, timed_cases, timed_model
+from vehiclemor.study.timing import called, case_experiments, timed_cases, timed_model, timed_tests
 
 CASES = (
     TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
@@ -60,6 +60,24 @@ def test_what_a_model_tells_of_its_own_time_decides_nothing(suspension, monkeypa
     assert np.isnan(data["loop_speed_up"]).all()
     np.testing.assert_allclose(data["seconds"], 3e-3)
     np.testing.assert_allclose(data["speed_up"], 1.0)
+
+
+def test_no_row_is_timed_cold_whatever_ran_before_it(suspension, monkeypatch):
+    now, last, seen = [0.0], [], set()
+    honest = FullOrderModel.simulate
+
+    def simulate(self, maneuver, start):
+        # A run of a new input is long, and one after another model's finds its caches cold.
+        now[0] += 1e-4 * (1 if last == [self] else 3) + (maneuver not in seen)
+        seen.add(maneuver)
+        last[:] = [self]
+        return honest(self, maneuver, start)
+
+    monkeypatch.setattr(FullOrderModel, "simulate", simulate)
+    monkeypatch.setattr(run_timer, "clock", lambda: now[0])
+    experiments = case_experiments(suspension, CASES[1::2], sine_travel, "equilibrium")
+    data = timed_tests(experiments, np.ones((2, 1), dtype=bool), 4)
+    np.testing.assert_allclose(data["seconds"], 1e-4)
 
 
 def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(monkeypatch):

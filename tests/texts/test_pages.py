@@ -41,7 +41,7 @@ def _anchors(text: str) -> set[str]:
 @PAGES
 def test_paths_in_code_exist(path):
     text = path.read_text(encoding="utf-8")
-    folders = "src|tests|data|paper|benchmarks"
+    folders = "src|tests|data|paper|benchmarks|examples"
     for name in re.findall(rf"`((?:{folders})/[\w/.-]+)`", text):
         assert (ROOT / name).exists(), name
 
@@ -128,6 +128,16 @@ def test_the_example_study_runs(here, capsys):
     (here / "example.py").write_text(code)
     runpy.run_path("example.py")
     assert "frequency_factor" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["keep-a-model", "my-loop"])
+def test_the_code_of_a_page_runs(name, here, capsys):
+    page = ROOT / "paper" / "handbook" / f"{name}.md"
+    # Files that are quoted have tests of their own.
+    own = [b.content for b in blocks(page) if b.language == "python" and b.above[:1] != "`"]
+    (here / "page.py").write_text("\n".join(own))
+    runpy.run_path("page.py")
+    assert capsys.readouterr().out
 
 
 @PAGES

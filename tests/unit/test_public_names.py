@@ -19,7 +19,7 @@ for found in pkgutil.walk_packages(vm.__path__, "vehiclemor."):
 from vehiclemor import api
 for name in vm.__all__:
     value = getattr(vm, name)
-    if getattr(value, "__module__", None) not in ("vehiclemor.api", "vehiclemor.errors"):
+    if getattr(value, "__module__", None) != vm._DEFINED_IN[name]:
         raise SystemExit(f"vehiclemor.{name} is {value!r}")
 for name in ("models", "methods", "maneuvers", "studies"):
     assert getattr(vm, name)(), name

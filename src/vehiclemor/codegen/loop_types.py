@@ -13,6 +13,7 @@ Vector = Annotated[np.ndarray, "float64", 1]
 Matrix = Annotated[np.ndarray, "float64", 2]
 Cube = Annotated[np.ndarray, "float64", 3]
 IntVector = Annotated[np.ndarray, "int64", 1]
+IntMatrix = Annotated[np.ndarray, "int64", 2]
 Float = Annotated[float, "float64", 0]
 Int = Annotated[int, "int64", 0]
 
@@ -51,6 +52,11 @@ def call_lanes(
 
 def mixed_rows(rows: Matrix, weights: tuple[float, ...], result: Vector) -> None:
     """The first rows, each times its weight, added up; they are whole multiples of `LANES` long."""
+    raise NotImplementedError(COMPILED_ONLY)
+
+
+def call_loop(entry: int, words: IntVector) -> int:
+    """Call the loop at an address with its arguments in words, see `loops.Prepared`."""
     raise NotImplementedError(COMPILED_ONLY)
 
 

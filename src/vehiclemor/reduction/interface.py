@@ -14,7 +14,6 @@ from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
-from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -68,6 +67,10 @@ class ReducedModel(Protocol):
         ...
 
 
+# Gives the method of a name with its settings, fitted to the same training runs.
+FitOther = Callable[[str, Any], ReducedModel]
+
+
 def never_refused(model: Any) -> str:  # noqa: ARG001
     """Every model of a kind that the method has settings for can be reduced."""
     return ""
@@ -98,6 +101,8 @@ class Method(ShortRepr):
     own_limits
         Whether its runs tell themselves when they leave what the model knows, or it knows no
         bounds; else a run beyond the inputs of the training runs is not trusted.
+    fits_others
+        Whether `fit` takes a `FitOther` too, by which it fits what it is made of.
     check
         (model, settings): raises `InputError` if valid settings don't fit the model or each other.
     presets
@@ -110,11 +115,12 @@ class Method(ShortRepr):
     name: str
     summary: str
     settings: Mapping[str, type[Settings]]
-    fit: Callable[[Any, Training, Any], ReducedModel]
+    fit: Callable[..., ReducedModel]
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all
     own_limits: bool = False
+    fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -1,20 +1,37 @@
 """A dynamic model in other states than its own: encode, integrate, lift."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_inputs
-from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.kernel_derivatives import (
+    CONSTANTS,
+    INPUTS,
+    PLACES,
+    STATE,
+    Arrays,
+    By,
+    chosen,
+    parameter_names,
+    partial,
+)
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.rate_derivatives import Along
 from vehiclemor.simulation.run_plans import Run, Solver
+from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
@@ -28,6 +45,11 @@ def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
 
 def _nothing_told(_: Run, __: np.ndarray) -> None:
     return
+
+
+def _given(states: np.ndarray) -> Run:
+    """States (samples, dim) as a run, all at time zero."""
+    return Run(np.zeros(len(states)), states, np.zeros(0), 0.0, "")
 
 
 def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
@@ -59,6 +81,11 @@ class ReducedSystem(ShortRepr):
         Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     judge
         (run of the system, inputs) -> what the model tells of it; nothing by default.
+    names
+        Of the system's states; the model's by default.
+    slopes
+        (state (dim,), inputs) -> derivatives of the full state (2 n, dim) and (2 n, inputs) by
+        both, where the full state is another than the system's.
     """
 
     model: DynamicModel
@@ -72,6 +99,74 @@ class ReducedSystem(ShortRepr):
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
     project: Callable[[np.ndarray], np.ndarray] | None = None
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
+    names: tuple[str, ...] = ()
+    slopes: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
+
+    @property
+    def state_space(self) -> ReducedSystem:
+        """Itself, see `StateSpace`."""
+        return self
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states that are stepped."""
+        return self.names or tuple(self.model.definition.states)
+
+    def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """State (dim,) of a start."""
+        return self._encoded(start, inputs).copy()
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        """The system as a function of state, inputs and length of time."""
+        return Stepper(self.system, self.spaces, self.solver, self.tolerance)
+
+    def step(
+        self, state: np.ndarray, inputs: np.ndarray, ends: np.ndarray | None, dt: float, time: float
+    ) -> np.ndarray:
+        """State (dim,) after dt s, see `Stepper`."""
+        return self.stepper.step(state, inputs, dt, time, ends)
+
+    def rates(self, state: np.ndarray, inputs: np.ndarray, time: float) -> np.ndarray:
+        """Time derivative (dim,) of a state."""
+        return self.stepper.rates(state, inputs, time)
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
+    ) -> np.ndarray:
+        """Analytic derivatives of the rates or of the outputs."""
+        function, names, along = chosen(of, RESULTS), parameter_names(by), Along(CONSTANTS)
+        if not names:
+            along = Along(PLACES[str(by)])
+        elif np.array_equal(self.system.constants, self.model.constants):
+            along = Along(CONSTANTS, self.model.constants_along(names))
+        else:
+            raise InputError(
+                f"the reduced equations of {self.model.name} don't know {', '.join(names)}: "
+                f"reduce a model that is made with another value"
+            )
+        if function == "derivative":
+            return self.stepper.derivatives(state, inputs, time, along)
+        full, slopes = state, (np.eye(len(state)), np.zeros((len(state), len(inputs))))
+        if self.slopes is not None:
+            full, slopes = (
+                self.full_states(state[None], inputs[None])[0],
+                self.slopes(state, inputs),
+            )
+        by_state = self.model.derivatives(function, full, inputs, "state")
+        if along.place == STATE:
+            return by_state @ slopes[STATE]
+        found = self.model.derivatives(function, full, inputs, by)
+        return found + by_state @ slopes[INPUTS] if along.place == INPUTS else found
+
+    def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """States (samples, 2 n) of the model."""
+        run = _given(states)
+        return self.lift(run, inputs, states[0])[:, : 2 * len(self.model.coordinates)]
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
+        """What the model tells of states, if it judges itself."""
+        return self.judge(_given(states), inputs)
 
     def run(
         self,
@@ -82,7 +177,7 @@ class ReducedSystem(ShortRepr):
         begin: float = 0.0,
     ) -> Run:
         """Path of the reduced states, from a full state at a time; see `System.run`."""
-        check_inputs(maneuver, self.model.definition)
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         # Output times begin with zero.
         first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
         state = self._encoded(start, first[0])
@@ -106,6 +201,7 @@ class ReducedSystem(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
         """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         run = self.run(maneuver, start, begin=begin)
         inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
@@ -118,12 +214,21 @@ class ReducedSystem(ShortRepr):
         return None if self.project is None else self.project(states)
 
 
+def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the kernel `full_state` by state and inputs."""
+    by_state, by_inputs = (
+        partial(kernels, "full_state", arrays, size, place) for place in (STATE, INPUTS)
+    )
+    return by_state, by_inputs
+
+
 def transformed_system(
     model: DynamicModel,
     system: System,
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
     offline: Offline,
     settings: OnlineSettings,
+    names: Sequence[str],
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told,
 ) -> ReducedSystem:
     """Equations in other states than the model's.
@@ -134,14 +239,11 @@ def transformed_system(
         The equations; its kernel `full_state` gives the full state of a transformed one.
     encode
         (full state (2 n,), inputs) -> transformed state (dim,).
-    judge
+    names, judge
         See `ReducedSystem`.
     """
     dim = len(system.reference)
-
-    def lift(run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return system.along("full_state", run.path, inputs, 2 * len(model.coordinates))
-
+    full = FullStates(system, 2 * len(model.coordinates))
     return ReducedSystem(
         model,
         system,
@@ -151,6 +253,25 @@ def transformed_system(
         settings.solver,
         settings.tolerance,
         encode,
-        lift,
+        full.lift,
         judge=judge,
+        names=tuple(names),
+        slopes=full.slopes,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class FullStates(ShortRepr):
+    """Full states, so many, by the kernel `full_state` of a transformed system."""
+
+    system: System
+    size: int
+
+    def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """Full states (samples, size) of a run."""
+        return self.system.along("full_state", run.path, inputs, self.size)
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Their derivatives by state and inputs."""
+        arrays = state, inputs, self.system.constants
+        return full_state_slopes(self.system.kernels, arrays, self.size)

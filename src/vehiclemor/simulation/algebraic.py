@@ -15,17 +15,20 @@ from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import unknown
+from vehiclemor.signals import Signal
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
-    check_inputs,
     check_positive,
     checked_array,
     checked_inputs,
     output_times,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.kernel_derivatives import By
+from vehiclemor.simulation.kinematic_derivatives import kinematic_derivatives
 from vehiclemor.simulation.lane_loops import LaneKernels
 from vehiclemor.simulation.lane_runs import LaneRuns
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
@@ -86,9 +89,19 @@ class AlgebraicModel(Model):
         """Residual Phi(q; u), shape (n,)."""
         return self.evaluated("residual", q, u)
 
-    def jacobian(self, q: Any, u: Any) -> np.ndarray:
-        """Analytic Jacobian of the residual with respect to q, shape (n, n)."""
-        return self.evaluated("residual_jacobian", q, u)[:, :-1].copy()
+    def jacobian(
+        self, state: Any, u: Any, with_respect_to: By = "state", of: str = "residual"
+    ) -> np.ndarray:
+        """Derivatives at coordinates (n,) and inputs, see `Model.jacobian`.
+
+        Parameters
+        ----------
+        of
+            `residual`, `outputs`, or `coordinates`; see `kinematic_derivatives`.
+        """
+        if of == "residual" and with_respect_to == "state":
+            return self.evaluated("residual_jacobian", state, u)[:, :-1].copy()
+        return kinematic_derivatives(self, state, u, with_respect_to, of)
 
     def newton_step(self, q: Any, u: Any) -> np.ndarray:
         """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
@@ -213,8 +226,12 @@ class AlgebraicModel(Model):
         InputError
             As of `inputs_of`.
         """
-        check_inputs(maneuver, self.definition)
-        return _sampled(maneuver)
+        maneuver = checked_maneuver(maneuver, self.definition)
+        if not isinstance(maneuver, Signal):
+            return _sampled(maneuver)
+        if "sampled" not in maneuver.kept:
+            maneuver.kept["sampled"] = _ready_samples(maneuver)
+        return maneuver.kept["sampled"]
 
     def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
         """Inputs (samples, number of inputs) of a maneuver as the loops want them.
@@ -224,7 +241,7 @@ class AlgebraicModel(Model):
         InputError
             If they are not the model's, or one isn't finite.
         """
-        check_inputs(maneuver, self.definition)
+        maneuver = checked_maneuver(maneuver, self.definition)
         return checked_inputs(maneuver.at(times), times, self.inputs)
 
     def solve_path(
@@ -370,11 +387,13 @@ def _iteration(tolerance: float, shortest: float) -> Ready:
     return ready(newton_loops.Iteration(tolerance, *limits))
 
 
-@lru_cache(maxsize=64)
-def _sampled(maneuver: Maneuver) -> Sampled:
+def _ready_samples(maneuver: Maneuver) -> Sampled:
     times, inputs = recorded_inputs(maneuver)
     checked_inputs(inputs, times, maneuver.inputs)
     return times, inputs, ready(newton_loops.Samples(inputs))
+
+
+_sampled = lru_cache(maxsize=64)(_ready_samples)
 
 
 def new_counts() -> np.ndarray:

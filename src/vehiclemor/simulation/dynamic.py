@@ -14,8 +14,6 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
-    check_inputs,
-    cut_short,
     left_validity,
     lifted_wheels,
     limits_of,
@@ -23,6 +21,8 @@ from vehiclemor.simulation.checks import (
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.structures import Observer
+from vehiclemor.simulation.kernel_derivatives import By, chosen
+from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
@@ -31,6 +31,8 @@ from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory, Trust
 
+# What derivatives are of -> function of the equations.
+RESULTS = {"rhs": "derivative", "outputs": "outputs"}
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
 
@@ -123,6 +125,23 @@ class DynamicModel(Model):
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
         return self.along("derivative", states, inputs, finite=True)
+
+    def jacobian(
+        self, state: Any, u: Any, with_respect_to: By = "state", of: str = "rhs"
+    ) -> np.ndarray:
+        """Derivatives of the right-hand side or of the outputs, see `Model.jacobian`.
+
+        Parameters
+        ----------
+        of
+            `rhs` or `outputs`.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the derivatives aren't finite.
+        """
+        return self.derivatives(chosen(of, RESULTS), state, u, with_respect_to)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
@@ -222,7 +241,7 @@ class DynamicModel(Model):
         windows
             Formulation of the system and its subspaces by window.
         """
-        check_inputs(maneuver, self.definition)
+        maneuver = checked_maneuver(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         how = Solver(solver, tolerance, times, longest_step, begin)
@@ -277,7 +296,7 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """See `recorded`; a remark is added to what there is to remark."""
         states, outputs, first = self._delivered(run, inputs, states)
-        (names, *_), times = self._limits, run.times
+        (names, *_), times = self.limits, run.times
         message = run.failure
         if not message:
             of_outputs = first[: len(names)]
@@ -302,18 +321,20 @@ class DynamicModel(Model):
         return found if trust is None else found.judged(trust)
 
     @cached_property
-    def _limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+    def limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
+        """What outputs are watched for, see `limits_of`."""
         return limits_of(self.definition)
 
     @cached_property
     def _observers(self) -> dict[int, Ready]:
         return {}
 
-    def _observer(self, lanes: int) -> Ready:
+    def observer(self, lanes: int) -> Ready:
+        """How outputs follow from states, so many samples at once."""
         if lanes not in self._observers:
             kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
             states = 2 * len(self.coordinates)
-            observer = Observer(kernel, self.constants, *self._limits[1:], states)
+            observer = Observer(kernel, self.constants, *self.limits[1:], states)
             self._observers[lanes] = ready(observer)
         return self._observers[lanes]
 
@@ -325,9 +346,9 @@ class DynamicModel(Model):
         That is the number of all samples where it never is.
         """
         samples, n, m = len(run.times), 2 * len(self.coordinates), len(self.outputs)
-        held = run.kept.get("delivered")
-        if held is None or held.states is not states or held.inputs is not inputs:
-            held = run.kept["delivered"] = self._delivery(run, inputs, states)
+        held, at = run.kept.get("delivered"), run.recorded_at(inputs)[1]
+        if held is None or held.states is not states or held.inputs is not at:
+            held = run.kept["delivered"] = self._delivery(run, at, states)
         # Rows of whole vectors.
         width = -(-(n + m) // LANES) * LANES
         result, address = cache_lines(samples, width)
@@ -343,15 +364,14 @@ class DynamicModel(Model):
         return whole, outputs, found
 
     def _delivery(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> Delivery:
-        """The loop of `_delivered`, to be given a result."""
+        """The loop of `_delivered`, to be given a result; inputs are where the run is recorded."""
         n, samples = 2 * len(self.coordinates), len(run.times)
         width = -(-(n + len(self.outputs)) // LANES) * LANES
-        at = run.recorded_at(inputs)[1]
-        observer = self._observer(LANES if run.rows >= LANES else 1)
-        first = np.empty(len(self._limits[1]), dtype=np.int64)
+        observer = self.observer(LANES if run.rows >= LANES else 1)
+        first = np.empty(len(self.limits[1]), dtype=np.int64)
         scratch = cache_lines(len(states) + 1, width)[0].reshape(-1)
         loop, result = path_loops()["delivered"], np.empty((0, width))
-        call = loop.prepared(states, at, run.places, observer, scratch, result, first)
+        call = loop.prepared(states, inputs, run.places, observer, scratch, result, first)
         rows, into = call.address("states") + 1, call.address("result")
         call.words[into + 1] = samples
         return Delivery(states, inputs, first, call, rows, into)

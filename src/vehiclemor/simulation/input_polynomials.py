@@ -3,7 +3,7 @@
 Between two break points of a maneuver an input is smooth: polynomials of degree 5 through the
 Chebyshev points of equal pieces (L. N. Trefethen, Approximation Theory and Approximation Practice,
 2013, chapter 2), halved until the error half-way between these points is below `ACCURACY` times the
-input's largest value.
+input's largest value.  A signal brings its own.
 """
 
 from functools import cache, lru_cache
@@ -11,35 +11,89 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor import signals
+from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11
+SIGNAL_LOOPS = "simulation.integrators.structures", "simulation.formulations.inputs"
 MOST_PIECES = 1 << 15
 DEGREE = 5
+# Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
+KEPT = 512
+
+
+def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+    """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
+    if not isinstance(maneuver, signals.Signal):
+        return _recorded(maneuver)
+    # Kept with the signal, so not longer than it.
+    if "recorded" not in maneuver.kept:
+        ready, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
+        inputs = np.empty((len(times), ready.bundle.coefficients.shape[1]))
+        loops(SIGNAL_LOOPS, ("sampled",))["sampled"](ready, times, inputs)
+        inputs.flags.writeable = False
+        maneuver.kept["recorded"] = times, inputs
+    return maneuver.kept["recorded"]
+
+
+def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:
+    """The maneuver to which another is proportional, if it declares that it is."""
+    if not maneuver.linear_in_amplitude or maneuver.amplitude_factor == 1.0:
+        return None
+    return maneuver.perturbed(maneuver.frequency_factor)
 
 
 @lru_cache(maxsize=64)
-def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    times = maneuver.times
-    inputs = loop_array(maneuver.at(times))
+def _times(duration: float, samples: int) -> np.ndarray:
+    times = np.linspace(0.0, duration, samples)
+    times.flags.writeable = False
+    return times
+
+
+@lru_cache(maxsize=KEPT)
+def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
+    if (unit := _of_unit_amplitude(maneuver)) is not None:
+        times, inputs = _recorded(unit)
+        inputs = maneuver.amplitude_factor * inputs
+    else:
+        times = maneuver.times
+        inputs = loop_array(maneuver.at(times))
     times.flags.writeable = inputs.flags.writeable = False
     return times, inputs
 
 
-@lru_cache(maxsize=64)
 def signal_of(maneuver: Maneuver) -> Ready:
-    """Piecewise polynomial inputs of a maneuver.
+    """Piecewise polynomial inputs of a maneuver, those of a signal as they are.
 
     Raises
     ------
     InputError
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
+    if not isinstance(maneuver, signals.Signal):
+        return _found_signal(maneuver)
+    if "ready" not in maneuver.kept:
+        maneuver.kept["ready"] = ready(Signal(*maneuver.polynomials))
+    return maneuver.kept["ready"]
+
+
+@lru_cache(maxsize=KEPT)
+def _found_signal(maneuver: Maneuver) -> Ready:
+    """Polynomials of a function, searched for.
+
+    Raises
+    ------
+    InputError
+        If an input isn't finite, or isn't smooth between the break points that the maneuver names.
+    """
+    if (unit := _of_unit_amplitude(maneuver)) is not None:
+        signal: Signal = _found_signal(unit).bundle
+        coefficients = maneuver.amplitude_factor * signal.coefficients
+        return ready(signal._replace(coefficients=coefficients))
     inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
     edges = np.array([0.0, *inner, maneuver.duration])
     probe = np.linspace(0.0, maneuver.duration, 1001)
@@ -56,7 +110,7 @@ def signal_of(maneuver: Maneuver) -> Ready:
     largest = np.abs(samples).max(axis=0) + 1e-300
     parts = [_segment(maneuver, (a, b), largest, (times, samples)) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
-    return ready(Signal(edges, first.astype(np.int64), np.concatenate(parts)))
+    return ready(Signal(edges, first.astype(np.int64), np.empty(0), np.concatenate(parts)))
 
 
 def _segment(

@@ -29,7 +29,7 @@ def reduced_jacobian(
     """Jacobian of one window's reduced system at y (dim,), all inputs zero."""
     dim, n = len(y), 2 * len(model.coordinates)
     nothing = np.zeros((1, len(model.inputs), 6))
-    signal = Signal(np.array([0.0, 1.0]), np.array([0, 1]), nothing)
+    signal = Signal(np.array([0.0, 1.0]), np.array([0, 1]), np.empty(0), nothing)
     loop = catalogue.rhs_loop(windows.formulation)
     equations = model.system.called(windows.formulation, "")
     buffer = np.empty(scratch_end(n, len(model.inputs)))

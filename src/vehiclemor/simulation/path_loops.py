@@ -26,7 +26,7 @@ from vehiclemor.simulation.integrators.structures import (
 OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
 INNER = 1.0 / ((NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0))
 
-INLINED = ("read_point", "cubics_within")
+INLINED = ("read_point", "cubics_within", "point_of", "note_outside")
 
 
 def kernel_path(
@@ -74,8 +74,28 @@ def delivered(
     result
         Rows of n states, of the outputs and of what fills up to a whole number of vectors.
     """
-    n, width, samples = observer.states, result.shape[1], len(result)
-    points = matrix(scratch, 0, len(states), width)
+    samples = len(result)
+    points = matrix(scratch, 0, len(states), result.shape[1])
+    observed(states, inputs, observer, scratch, points)
+    for k in range(len(first)):
+        first[k] = samples
+    known, within = -1, False
+    for sample in range(samples):
+        row, z = point_of(places, sample)
+        read_point(points, row, z, result[sample])
+        if z < 0.0:
+            within = False
+        elif row != known:
+            within = cubics_within(points, row, observer)
+        known = row
+        if not within:
+            note_outside(result[sample], observer, sample, samples, first)
+    return 0
+
+
+def observed(states, inputs, observer, scratch, points):
+    """States and outputs side by side at the points (points, width), where the scratch begins."""
+    n, width = observer.states, points.shape[1]
     for row in range(len(states)):
         for i in range(n):
             points[row, i] = states[row, i]
@@ -87,28 +107,23 @@ def delivered(
         lane_path(states, inputs, observer.kernel, observer.constants, outputs)
     else:
         kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
+
+
+def point_of(places, sample):
+    """Row of the point of a sample, and the part of its step that has passed, see `Output`."""
+    if len(places):
+        return int(places[sample, 0]), places[sample, 1]
+    return sample, -1.0
+
+
+def note_outside(row, observer, sample, samples, first):
+    """Note which limited outputs are outside of their ranges for the first time."""
     for k in range(len(first)):
-        first[k] = samples
-    known, within = -1, False
-    for sample in range(samples):
-        row, z = sample, -1.0
-        if len(places):
-            row, z = int(places[sample, 0]), places[sample, 1]
-        read_point(points, row, z, result[sample])
-        if z < 0.0:
-            within = False
-        elif row != known:
-            within = cubics_within(points, row, observer)
-        known = row
-        if within:
-            continue
-        for k in range(len(first)):
-            value = result[sample, n + observer.limited[k]]
-            # What is no number lies outside too.
-            inside = observer.ranges[k, 0] <= value <= observer.ranges[k, 1]
-            if not inside and first[k] == samples:
-                first[k] = sample
-    return 0
+        value = row[observer.states + observer.limited[k]]
+        # What is no number lies outside too.
+        inside = observer.ranges[k, 0] <= value <= observer.ranges[k, 1]
+        if not inside and first[k] == samples:
+            first[k] = sample
 
 
 def read_point(points, row, z, into):

@@ -52,6 +52,11 @@ class Trust:
     until: float = np.inf
     reason: str = ""
 
+    @property
+    def message(self) -> str:
+        """When and by what it leaves, empty if it does not."""
+        return f"from t = {self.until:.4g} s on {self.reason}" if self.reason else ""
+
 
 @dataclass(frozen=True)
 class Trajectory(ShortRepr):
@@ -105,8 +110,7 @@ class Trajectory(ShortRepr):
         """The same with what its model tells of it; untrusted if that is that it has left."""
         if trust is None or self.status != "ok" or not trust.reason:
             return Trajectory.of(**self.__dict__ | {"trust": trust})
-        message = f"from t = {trust.until:.4g} s on {trust.reason}"
-        told = {"trust": trust, "status": "untrusted", "message": message}
+        told = {"trust": trust, "status": "untrusted", "message": trust.message}
         return Trajectory.of(**self.__dict__ | told)
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
 from vehiclemor.reduction.validation import checked_fit, checked_run
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
@@ -25,7 +25,7 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.input_range import input_range
 from vehiclemor.study.linear_algebra import one_thread
-from vehiclemor.study.method_settings import default_settings, for_method
+from vehiclemor.study.method_settings import Settings, default_settings, for_method
 from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
@@ -125,23 +125,32 @@ def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
 
 def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
-    settings = experiment.settings
+    return _shared_fit(model, experiment.method, experiment.settings, experiment.training)
+
+
+def _shared_fit(
+    model: Model, method_name: str, settings: Settings, training: tuple[Scenario, ...]
+) -> ReducedModel | Failure:
     online = {name: value for name, value in settings.items() if name in ONLINE}
-    defaults = default_settings(model, experiment.method)
-    common = _text(settings | {name: defaults[name] for name in online})
+    defaults = default_settings(model, method_name)
+    common = settings | {name: defaults[name] for name in online}
     try:
-        fitted: Any = _kept_fit(model, experiment.method, common, experiment.training)
+        fitted: Any = _kept_fit(model, method_name, _text(common), training)
+        if isinstance(fitted, Failure) or not online:
+            return fitted
+        if not all(hasattr(fitted, name) for name in online):
+            return _kept_fit(model, method_name, _text(settings), training)
     except _FitError as bug:
         return bug.args[0]
-    if isinstance(fitted, Failure) or not online:
-        return fitted
-    if not all(hasattr(fitted, name) for name in online):
-        return fresh_fit(model, experiment)
     return replace(fitted, **online)
 
 
 def _fit(
-    model: Model, method_name: str, settings: str, training: tuple[Scenario, ...]
+    model: Model,
+    method_name: str,
+    settings: str,
+    training: tuple[Scenario, ...],
+    others: FitOther | None = None,
 ) -> ReducedModel | Failure:
     """Fit a method; with the settings as text, since what is kept is found by it."""
     method: Method = component("method", method_name)
@@ -149,17 +158,27 @@ def _fit(
     def fit() -> ReducedModel:
         runs = [training_run(model, scenario) for scenario in training]
         complete = for_method(model, method_name, json.loads(settings))
-        return checked_fit(method_name, method.fit(model, runs, complete))
+        more = (others,) if others and method.fits_others else ()
+        return checked_fit(method_name, method.fit(model, runs, complete, *more))
 
     with one_thread():
         return attempt(fit)
 
 
-@lru_cache(maxsize=64)
+# More than the fits of a study of protocols, some of which take a minute.
+@lru_cache(maxsize=128)
 def _kept_fit(
     model: Model, method_name: str, settings: str, training: tuple[Scenario, ...]
 ) -> ReducedModel | Failure:
-    fitted = _fit(model, method_name, settings, training)
+    def other(name: str, given: Any) -> ReducedModel:
+        found = _shared_fit(model, name, given.model_dump(), training)
+        if isinstance(found, Failure):
+            # Fitted again it fails as it does alone.
+            method: Method = component("method", name)
+            return method.fit(model, [training_run(model, s) for s in training], given)
+        return found
+
+    fitted = _fit(model, method_name, settings, training, other)
     if isinstance(fitted, Failure) and fitted.status == "error":
         # What is raised is not kept: a bug may be mended before the next try.
         raise _FitError(fitted)
@@ -189,7 +208,7 @@ def _tested(
         start = start_of(model, scenario)
         if experiment.keep == "errors":
             trajectory = _sound(model, reduced, scenario, start)
-            trajectory = _warned(model, experiment, scenario, trajectory)
+            trajectory = warned(model, experiment.method, experiment.training, scenario, trajectory)
             return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
         # The first run loads machine code and warms caches, the second is timed.
         reduced.simulate(scenario.maneuver, start)
@@ -207,21 +226,21 @@ def _tested(
     return attempt(run)
 
 
-def _warned(
-    model: Model, experiment: Experiment, scenario: Scenario, run: Trajectory
+def warned(
+    model: Model, method: str, training: tuple[Scenario, ...], scenario: Scenario, run: Trajectory
 ) -> Trajectory:
     """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
-    if run.trust or component("method", experiment.method).own_limits:
+    if run.trust or component("method", method).own_limits:
         return run
-    return run.judged(input_range(model, experiment.training).trust(model, scenario))
+    return run.judged(input_range(model, training).trust(model, scenario))
 
 
 def _remarked(model: Model, experiment: Experiment, run: Trajectory) -> Trajectory:
     """A run with a remark where a protocol would not trust it; its status is the method's own."""
-    warned = _warned(model, experiment, experiment.test[0], run)
-    if warned.status == run.status:
+    judged = warned(model, experiment.method, experiment.training, experiment.test[0], run)
+    if judged.status == run.status:
         return run
-    told = f"not to be trusted {warned.message}"
+    told = f"not to be trusted {judged.message}"
     return replace(run, remark="; ".join(part for part in (run.remark, told) if part))
 
 

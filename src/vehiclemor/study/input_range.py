@@ -1,5 +1,6 @@
 """The range of the inputs that a method has been trained on, as its least claim to knowledge."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -46,6 +47,11 @@ class InputRange:
             names += [f"rate of {name}" for name in names]
         used = np.column_stack([used, off, times / self.longest])
         return trust_of(times, used, [*names, "initial speed", "duration"])
+
+    def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
+        """How far inputs (samples, inputs) go in the range; their rates are not looked at."""
+        used = inputs / np.maximum(self.largest[: inputs.shape[1]], 1e-12)
+        return trust_of(np.zeros(len(inputs)), used, [f"input {name}" for name in names])
 
 
 @lru_cache(maxsize=64)

@@ -12,8 +12,9 @@ import numpy as np
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import TrainingRun, policy_factors
+from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.checks import check_inputs, check_resolved
+from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 
@@ -70,8 +71,11 @@ class Scenario:
 
 @lru_cache(maxsize=1024)
 def input_hash(maneuver: Maneuver) -> str:
-    """Hash of the output times and the inputs at these times."""
+    """Hash of the output times and the inputs at these times; of a signal all there is of it."""
     times = maneuver.times
+    if isinstance(maneuver, Signal):
+        parts = (times, *maneuver.polynomials)
+        return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()[:16]
     # Adding zero makes -0 and 0 one input.
     inputs = np.ascontiguousarray(maneuver.at(times)) + 0.0
     return hashlib.sha256(times.tobytes() + inputs.tobytes()).hexdigest()[:16]
@@ -97,7 +101,8 @@ def start_of(model: Model, scenario: Scenario) -> Start:
     return _state_at(model.name, parameters, scenario.start)
 
 
-@lru_cache(maxsize=256)
+# More than the runs of a protocol, over which all rows go.
+@lru_cache(maxsize=4096)
 def _state_at(model: str, parameters: str, start: str) -> np.ndarray:
     return build(model, overrides=json.loads(parameters)).start(start)
 
@@ -125,7 +130,7 @@ def training_scenarios(
 
 def check(model: Model, scenario: Scenario) -> None:
     """Raise `InputError` if the model can't be run in the scenario."""
-    check_inputs(scenario.maneuver, model.definition)
+    checked_maneuver(scenario.maneuver, model.definition)
     check_resolved(scenario.maneuver)
     if scenario.speed is not None and own_speed(model) is None:
         raise InputError(f"{model.name} has no {SPEED}: a scenario of it has no speed")

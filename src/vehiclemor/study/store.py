@@ -120,22 +120,34 @@ def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarr
 @contextmanager
 def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Dataset]:
     """A result file that is whole and the expected one."""
+    with opened(path, "result file", "; move it away and run again") as file:
+        if getattr(file, attribute, None) != expected:
+            raise FileError(
+                f"{path}: not the result that belongs here ({attribute} is not {expected}); "
+                f"move it away and run again"
+            )
+        yield file
+
+
+@contextmanager
+def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
+    """A netCDF file that is whole.
+
+    Parameters
+    ----------
+    kind, mend
+        What an error calls it, and what it tells to do.
+    """
     import netCDF4
 
     if not path.is_file():
-        what = "is a folder, not a result file" if path.exists() else "no such result file"
+        what = f"is a folder, not a {kind}" if path.exists() else f"no such {kind}"
         raise FileError(f"{path}: {what}")
     try:
         with netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             if INTEGRITY in file.groups and file[INTEGRITY].sha256 != _digest(file):
                 raise ValueError("what it holds is not what was written")
-            found = getattr(file, attribute, None)
-            if found != expected:
-                raise FileError(
-                    f"{path}: not the result that belongs here ({attribute} is not {expected}); "
-                    f"move it away and run again"
-                )
             yield file
     except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
         if machine := machine_reason(error):
@@ -143,9 +155,7 @@ def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Datas
         reason = error.strerror if isinstance(error, OSError) else None
         detail = reason or str(error).splitlines()[0][:80]
         detail = "damaged, or no netCDF-4 file" if "NetCDF:" in detail else detail
-        raise FileError(
-            f"{path}: not a readable result file ({detail}); move it away and run again"
-        ) from None
+        raise FileError(f"{path}: not a readable {kind} ({detail}){mend}") from None
 
 
 def _digest(file: netCDF4.Dataset) -> str:

@@ -2,15 +2,17 @@
 
 What counts is a whole call of `simulate`, all states and outputs delivered, timed from outside;
 what a model tells of its own loop is recorded beside it and decides nothing.  Between two runs of a
-comparison other work throws code and data out of the caches, so short ones are repeated: a user who
-runs a model again and again finds them warm.  Seconds stored with the results of a study are
-measured while others run beside them; a speed-up is quoted from this pass only.
+comparison other work throws code and data out of the caches, so every timed call follows one of the
+same run that is not: a user who runs a model again and again finds them warm.  Seconds stored with
+the results of a study are measured while others run beside them; a speed-up is quoted from this
+pass only.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -40,11 +42,13 @@ if TYPE_CHECKING:
 
 # Rounds of a cost table, and of the test set of a protocol, which has many runs.
 CASE_ROUNDS, PROTOCOL_ROUNDS = 41, 7
-# Of each short run one after the other; the first warms the caches, as long ones do themselves.
-REPEATS, LONG_RUN = 4, 2e-3
+# Calls of a short and of a long run in a row, the first a warm-up; length (s) of a long one.
+REPEATS, REPEATS_OF_LONG, LONG_RUN = 4, 2, 2e-3
+# Rounds of a protocol in which long runs stand, which scatter less.
+PROTOCOL_ROUNDS_OF_LONG = 3
 # Fits whose median counts, as long as they take no more than these seconds together; and the length
 # (s) of a fit beside which loading machine code is nothing.
-FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 10.0
+FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 1.0
 # Variable -> case against which it is the speed-up, and what of a run; quantiles of its seconds.
 WHOLE, LOOP = 0, 1
 SPEED_UPS = {
@@ -88,7 +92,7 @@ def stored_timing(
     folder: Path, name: str, content: object, make: Callable[[], xr.Dataset]
 ) -> xr.Dataset:
     """What the file `studies/<name>.nc` holds for this content and machine, or else is made."""
-    text = json.dumps([content, machine(), REPEATS, CLOCK])
+    text = json.dumps([content, machine(), REPEATS, REPEATS_OF_LONG, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     return stored(folder / "studies" / f"{name}.nc", "timing", key, make)
 
@@ -130,7 +134,8 @@ def timed_cases(
     results = [evaluate(experiment)[kept] for experiment in experiments.values()]
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
-    seconds, offline = _rounds(list(experiments.values()), rounds or CASE_ROUNDS)
+    every = rounds or CASE_ROUNDS
+    seconds, offline = _rounds(list(experiments.values()), (every, every))
     points = f"{maneuver.samples} time points"
     times = _dataset(experiments, seconds, offline, points).isel(scenario=0, drop=True)
     dataset = dataset.merge(times)
@@ -166,7 +171,8 @@ def timed_tests(
         `seconds` with quartiles and `loop_seconds` on `case` and `scenario`, missing where a run is
         not timed; `offline_seconds` on `case`.
     """
-    seconds, offline = _rounds(list(experiments.values()), rounds or PROTOCOL_ROUNDS, finished)
+    every = rounds or PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
+    seconds, offline = _rounds(list(experiments.values()), every, finished)
     return _dataset(experiments, seconds, offline, "test set")
 
 
@@ -177,8 +183,11 @@ def _dataset(
     import xarray as xr
 
     whole, loop = seconds[..., WHOLE], seconds[..., LOOP]
-    quantiles = {name: np.quantile(whole, share, axis=0) for name, share in QUANTILES.items()}
-    quantiles["loop_seconds"] = np.median(loop, axis=0)
+    with warnings.catch_warnings():
+        # What was never timed has none.
+        warnings.filterwarnings("ignore", "All-NaN slice")
+        quantiles = {n: np.nanquantile(whole, share, axis=0) for n, share in QUANTILES.items()}
+        quantiles["loop_seconds"] = np.nanmedian(loop, axis=0)
     found = variables(quantiles, "case", "scenario")
     found |= variables({"offline_seconds": offline}, "case")
     found["seconds"] = found.pop("seconds_median")
@@ -189,11 +198,14 @@ def _dataset(
 
 
 def _rounds(
-    experiments: Sequence[Experiment], rounds: int, finished: np.ndarray | None = None
+    experiments: Sequence[Experiment],
+    rounds: tuple[int, int],
+    finished: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[float]]:
     """Seconds of runs (rounds, experiments, scenarios, 2), NaN where one fails, and of fits.
 
-    They are those of the whole call, and of the compiled loop by its own account.
+    They are those of the whole call, and of the compiled loop by its own account.  `rounds` are all
+    of them, and those of long runs, which have no seconds in the others.
 
     All runs of a round follow one another, so that load on the machine hits all alike.
     """
@@ -202,23 +214,23 @@ def _rounds(
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     work = f"rounds of times on {model.name}"
-    tell(work, 0, rounds + 1)
+    tell(work, 0, rounds[0] + 1)
     fits = [_warm_fit(model, e, wanted[index].any()) for index, e in enumerate(experiments)]
-    seconds = np.full((rounds + 1, *shape, 2), np.nan)
-    for turn in range(rounds + 1):
+    seconds = np.full((rounds[0] + 1, *shape, 2), np.nan)
+    for turn in range(rounds[0] + 1):
         for place, test in enumerate(tests):
             for index, (reduced, _) in enumerate(fits):
-                if reduced is None or not wanted[index, place]:
+                # The first round loads machine code, and tells how long a run takes.
+                long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
+                if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
                     continue
-                # The first round loads machine code, warms caches, and tells how long a run takes.
-                short = turn > 0 and seconds[0, index, place, WHOLE] < LONG_RUN
                 run = partial(reduced.simulate, *test)
-                found = attempt(partial(called, run, REPEATS if short else 1))
+                found = attempt(partial(called, run, REPEATS_OF_LONG if long else REPEATS))
                 if isinstance(found, Failure):
-                    wanted[index, place] = False
+                    wanted[index, place], seconds[:, index, place] = False, np.nan
                 else:
                     seconds[turn, index, place] = found
-        tell(work, turn + 1, rounds + 1)
+        tell(work, turn + 1, rounds[0] + 1)
     return seconds[1:], [offline for _, offline in fits]
 
 
@@ -233,7 +245,7 @@ def called(run: Callable[[], Trajectory], repeats: int) -> tuple[float, float] |
         if not trajectory.finished:
             return Failure(trajectory.status, trajectory.message)
         found.append((seconds, trajectory.seconds))
-    whole, loop = np.median(found[1:] or found, axis=0)
+    whole, loop = np.median(found[1:], axis=0)
     return float(whole), float(loop)
 
 

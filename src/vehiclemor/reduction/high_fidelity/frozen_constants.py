@@ -1,16 +1,23 @@
 """The high-fidelity vehicle with frozen inertia, from the exact kernels of a ready model."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
 from vehiclemor.multibody.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
-from vehiclemor.simulation.build import compiled, hoisted_constants
+from vehiclemor.reduction.trust import trust_of
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.build import compiled
+from vehiclemor.simulation.constants import hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.run_plans import Run
+from vehiclemor.simulation.trajectory import Trust
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -31,18 +38,19 @@ ARMS = slice(FRONT_ARM, REAR_ARM + 2)
 SPINS = slice(10, 14)
 
 
-class _Exact:
-    """Calls the exact kernels of a model."""
+@dataclass(frozen=True, eq=False)
+class ExactVehicle(ShortRepr):
+    """Kernels of the vehicle in independent coordinates, with the constants of a ready model."""
 
-    def __init__(self, model: DynamicModel) -> None:
-        self.made, self.constants = independent_kernels(model)
+    kernels: Kernels
+    constants: np.ndarray
 
     def call(self, function: str, x: np.ndarray, u: Any, shape: tuple[int, ...]) -> np.ndarray:
         """Result of a kernel at the state x (28,) and inputs u (3,)."""
         result = np.empty(shape)
         inputs = np.array(u, dtype=float)
         state = np.array(x, dtype=float)
-        self.made.kernels.call(function, state, inputs, self.constants, result)
+        self.kernels.call(function, state, inputs, self.constants, result)
         return result
 
     def suspension(self, place: int, angle: float, rack: float) -> np.ndarray:
@@ -60,13 +68,24 @@ class _Exact:
         coupling = whole[:10, SPINS]
         return whole[:10, :10] - (coupling / spins) @ coupling.T, spins
 
+    def encode(self, state: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """State (28,) of the frozen vehicle from one (52,) of the full one and inputs (3,)."""
+        x = np.concatenate([state[list(PLACES)], state[26:][list(PLACES)]])
+        return np.concatenate([x[:N], self.call("quasi_speeds", x, u, (N,))])
+
+
+def exact_vehicle(model: DynamicModel) -> ExactVehicle:
+    """The exact kernels of a ready model."""
+    made, constants = independent_kernels(model)
+    return ExactVehicle(made.kernels, constants)
+
 
 def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
     """Kernels of the vehicle with frozen inertia, and their constants of a ready model."""
     made, _ = compiled("high_fidelity_frozen_inertia", _derive)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
-    return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
+    return made, hoisted_constants(made, model.parameters.flat(), [*free_lengths(model), *fixed])
 
 
 def _derive() -> "Program":
@@ -75,20 +94,9 @@ def _derive() -> "Program":
     return frozen_inertia.derive()
 
 
-def frozen_encoder(model: DynamicModel) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """Function (state (52,) of the full vehicle, inputs (3,)) -> state (28,) of the frozen one."""
-    exact = _Exact(model)
-
-    def encode(state: np.ndarray, u: np.ndarray) -> np.ndarray:
-        x = np.concatenate([state[list(PLACES)], state[26:][list(PLACES)]])
-        return np.concatenate([x[:N], exact.call("quasi_speeds", x, u, (N,))])
-
-    return encode
-
-
 def frozen_constants(model: DynamicModel) -> dict[str, float]:
     """Constants of the frozen vehicle by name, see `frozen_quantities.CONSTANTS`."""
-    exact = _Exact(model)
+    exact = exact_vehicle(model)
     mass, _ = exact.mass()
     design = np.zeros(2 * N)
     values = _suspension_constants(exact)
@@ -115,7 +123,14 @@ def frozen_constants(model: DynamicModel) -> dict[str, float]:
     return {name: float(values[name]) for name in frozen.CONSTANTS}
 
 
-def _suspension_constants(exact: _Exact) -> dict[str, float]:
+def judge(run: Run, inputs: np.ndarray) -> Trust:
+    """How far a run goes in the ranges of the polynomials."""
+    known = np.array([*(KNOWN_ARM,) * 4, KNOWN_RACK])
+    used = np.column_stack([run.path[:, ARMS], inputs[:, 0]]) / known
+    return trust_of(run.times, used, (*("angle of an arm",) * 4, "displacement of the rack"))
+
+
+def _suspension_constants(exact: ExactVehicle) -> dict[str, float]:
     """Coefficients of the polynomials; with their slopes by the arms' angles exact at design."""
     nodes = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
     angles = ARM_RANGE * nodes

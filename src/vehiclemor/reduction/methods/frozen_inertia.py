@@ -14,13 +14,10 @@ from vehiclemor.reduction.interface import Method, Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem, transformed_system
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.mirror_image import partners
-from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
-from vehiclemor.simulation.trajectory import Trust
 
 # Magnitudes below which errors count absolutely, by name of the state; 10 otherwise.
 ERROR_SCALE = {"psi": 1.0, "r": 1.0}
@@ -31,22 +28,14 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
     # Derived symbolically where they are not on disk.
     from vehiclemor.multibody.high_fidelity import frozen_quantities as frozen
     from vehiclemor.reduction.high_fidelity.frozen_constants import (
-        ARMS,
-        KNOWN_ARM,
-        KNOWN_RACK,
-        frozen_encoder,
+        exact_vehicle,
         frozen_kernels,
+        judge,
     )
 
     began = time.process_time()
     made, constants = frozen_kernels(model)
-    encode = frozen_encoder(model)
-    known = np.array([*(KNOWN_ARM,) * 4, KNOWN_RACK])
-
-    def judge(run: Run, inputs: np.ndarray) -> Trust:
-        used = np.column_stack([run.path[:, ARMS], inputs[:, 0]]) / known
-        return trust_of(run.times, used, (*("angle of an arm",) * 4, "displacement of the rack"))
-
+    encode = exact_vehicle(model).encode
     names = [quantity.name for quantity in (*frozen.COORDINATES, *frozen.SPEEDS)]
     cyclic = {"x", "y", *(name for name in names if name.startswith("gamma"))}
     system = System(
@@ -60,7 +49,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         partners=partners(names),
     )
     cost = Offline(time.process_time() - began)
-    return transformed_system(model, system, encode, cost, settings, judge)
+    return transformed_system(model, system, encode, cost, settings, names, judge)
 
 
 METHOD = Method(

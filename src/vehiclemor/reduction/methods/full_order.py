@@ -1,6 +1,7 @@
 """The full-order model itself: the baseline of every comparison."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -9,12 +10,16 @@ from pydantic import Field
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
+from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
+from vehiclemor.reduction.state_space import KinematicStates, StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
+from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
@@ -75,6 +80,22 @@ class FullOrderModel(ShortRepr):
             if error.trajectory is None:
                 raise
             return error.trajectory
+
+    @cached_property
+    def state_space(self) -> StateSpace:
+        """The model's own states."""
+        model = self.model
+        if isinstance(model, AlgebraicModel):
+            how = self.solver, self.tolerance
+            return KinematicStates(
+                model,
+                lambda time, u, _: model.solve_path(np.array([time]), u, *how),
+                model.jacobian,
+            )
+        assert isinstance(model, DynamicModel)
+        n, whole = len(model.coordinates), whole_space(2 * len(model.coordinates))
+        how = self.solver, self.tolerance
+        return ReducedSystem(model, model.system, whole, n, self.offline, *how)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""

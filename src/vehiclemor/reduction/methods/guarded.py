@@ -14,8 +14,9 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.interface import Method, Offline, ReducedModel
+from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
+from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
@@ -89,6 +90,11 @@ class GuardedModel(ShortRepr):
             return replace(self.fast, **online)  # type: ignore[type-var]
         return self.fast
 
+    @property
+    def state_space(self) -> StateSpace:
+        """That of the fast model, which tells where it is not to be trusted any more."""
+        return self.ahead.state_space  # type: ignore[attr-defined]
+
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The fast run; from where it can't be trusted on, the safe one."""
         run = self.ahead.simulate(maneuver, start)
@@ -105,10 +111,14 @@ class GuardedModel(ShortRepr):
         else:
             begin, state = float(run.time[kept]), run.states[kept]
         later = self.safe.simulate(maneuver, state, begin)
-        why = trust.reason or run.message
-        told = f"from t = {begin:.4g} s on by {self.safe_name}: {why}"
+        told = handed_over(begin, self.safe_name, trust.reason or run.message)
         remark = "; ".join(part for part in (told, later.remark) if part)
         return replace(joined(run, later, kept), remark=remark, trust=trust)
+
+
+def handed_over(begin: float, name: str, why: str) -> str:
+    """That a method does a run from a time in s on."""
+    return f"from t = {begin:.4g} s on by {name}: {why}"
 
 
 def joined(run: Trajectory, later: Trajectory, kept: int) -> Trajectory:
@@ -129,10 +139,19 @@ def joined(run: Trajectory, later: Trajectory, kept: int) -> Trajectory:
     )
 
 
-def fit(model: DynamicModel, training: Training, settings: GuardedSettings) -> GuardedModel:
-    """Fit both."""
-    fast = component("method", settings.fast).fit(model, training, _of_fast(model, settings))
-    safe = component("method", settings.safe).fit(model, training, _of_safe(model, settings))
+def fit(
+    model: DynamicModel,
+    training: Training,
+    settings: GuardedSettings,
+    others: FitOther | None = None,
+) -> GuardedModel:
+    """Fit both, by `others` if it is given."""
+
+    def anew(name: str, given: Any) -> ReducedModel:
+        return component("method", name).fit(model, training, given)
+
+    fast = (others or anew)(settings.fast, _of_fast(model, settings))
+    safe = (others or anew)(settings.safe, _of_safe(model, settings))
     parts = fast.offline, safe.offline
     return GuardedModel(
         fast,
@@ -147,22 +166,29 @@ def fit(model: DynamicModel, training: Training, settings: GuardedSettings) -> G
 
 def check(model: DynamicModel, settings: GuardedSettings) -> None:
     """Raise `InputError` if a method or its settings don't fit the model."""
-    for name, of in ((settings.fast, _of_fast), (settings.safe, _of_safe)):
+    if settings.back and settings.resume == "start":
+        raise InputError(f"{NAME}: back is for resume = 'departure'; the whole run is done anew")
+    for setting, of in (("fast", _of_fast), ("safe", _of_safe)):
+        name = getattr(settings, setting)
         method: Method = component("method", name)
         accepted, reason = method.accepts(model)
         if not accepted or name == NAME:
-            raise InputError(f"{NAME}: {reason or f'{name} would guard itself'}")
+            told = reason or "it would guard itself"
+            raise InputError(f"{NAME}: {setting} can't be {name!r}: {told}")
         method.check(model, of(model, settings))
 
 
 def _of_fast(model: DynamicModel, settings: GuardedSettings) -> Any:
     """Settings of the fast model."""
     method: Method = component("method", settings.fast)
-    text = settings.fast_settings
+    lines = [line.strip(" ,") for line in settings.fast_settings.splitlines()]
     try:
-        given = tomllib.loads(f"given = {{ {text} }}")["given"]
+        read = tomllib.loads(f"given = {{ {', '.join(filter(None, lines))} }}")
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{NAME}: fast_settings: {error}") from None
+    given = read.pop("given")
+    if read or any(isinstance(value, dict | list) for value in given.values()):
+        raise InputError(f"{NAME}: fast_settings are names with one value each, not tables")
     known = method.names_of(model.kind)
     online = {name: getattr(settings, name) for name in ONLINE if name in known}
     for name in online:
@@ -184,4 +210,5 @@ METHOD = Method(
     refusal=no_steered_vehicle,
     check=check,
     fit=fit,
+    fits_others=True,
 )

@@ -7,6 +7,7 @@ approximated, and nothing is trained; no constraint is left to be stabilised.  S
 """
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from vehiclemor.reduction.reduced_system import ReducedSystem, transformed_syste
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.acceptance import no_closed_forms
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.system import System
@@ -31,9 +33,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
     n = len(model.coordinates)
     chosen = np.array([*PLACES, *(n + place for place in PLACES)])
     whole = list(chosen)
-
-    def encode(state: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return state[chosen].copy()
+    names = [model.definition.states[i] for i in whole]
 
     system = System(
         made.kernels,
@@ -43,10 +43,21 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         model.error_scale[chosen],
         np.array([whole.index(i) for i in model.active if i in whole]),
         np.array([whole.index(i) for i in model.rotating], dtype=np.int64),
-        partners=partners([model.definition.states[i] for i in whole]),
+        partners=partners(names),
     )
     cost = Offline(time.process_time() - began)
-    return transformed_system(model, system, encode, cost, settings)
+    return transformed_system(model, system, Chosen(chosen).encode, cost, settings, names)
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen(ShortRepr):
+    """States of the full model, by their numbers, that are those of another one."""
+
+    numbers: np.ndarray
+
+    def encode(self, state: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """These of a full state."""
+        return state[self.numbers]
 
 
 METHOD = Method(

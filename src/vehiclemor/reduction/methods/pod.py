@@ -4,18 +4,20 @@ R. Masoudi, T. Uchida, J. McPhee, Reduction of Multibody Dynamic Models in Autom
 the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (2015), section 3.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.projection.pod_settings import (
     PRESETS,
     AlgebraicPodSettings,
     ConstrainedPodSettings,
     DynamicPodSettings,
 )
+from vehiclemor.reduction.projection.restarted import RestartedProjection
 from vehiclemor.reduction.projection.subspaces import check_subspaces, fit_subspaces
 from vehiclemor.reduction.projection.windows import window_edges
 from vehiclemor.reduction.training import Training
@@ -24,6 +26,15 @@ from vehiclemor.simulation.model import Model
 # Shortest control period in s by kind of model: no motion of a vehicle happens in less.
 SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2}
 ControlPeriod = Annotated[float, Field(gt=0.0, description="length of a control period in s")]
+Restart = Annotated[
+    Literal["own", "projected", "full_model"],
+    Field(
+        description="where a control period starts: own: where the one before has ended; "
+        "projected: at the full model's state, projected onto the period's subspace (paper, step "
+        "6); full_model: at that state itself, the origin of the subspace from there on, as in a "
+        "model-predictive controller; the full model runs beside both"
+    ),
+]
 
 
 # Lengths of the control periods are the paper's.
@@ -37,12 +48,14 @@ class DynamicSettings(DynamicPodSettings):
     """Settings for ordinary differential equations."""
 
     control_period: ControlPeriod = 0.5
+    restart: Restart = "own"
 
 
 class ConstrainedSettings(ConstrainedPodSettings):
     """Settings for equations with constraints."""
 
     control_period: ControlPeriod = 0.1
+    restart: Restart = "own"
 
 
 PodSettings = AlgebraicSettings | DynamicSettings | ConstrainedSettings
@@ -59,7 +72,11 @@ def check(model: Model, settings: PodSettings) -> None:
 def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel:
     """One POD subspace for each control period of the training runs."""
     edges = window_edges(training[0].maneuver.duration, settings.control_period)
-    return fit_subspaces(model, training, edges, settings)
+    reduced = fit_subspaces(model, training, edges, settings)
+    restart = getattr(settings, "restart", "own")
+    if isinstance(reduced, DynamicProjection) and restart != "own":
+        return RestartedProjection(**vars(reduced), moved=restart == "full_model")
+    return reduced
 
 
 METHOD = Method(

@@ -29,6 +29,7 @@ from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.solved_path import solved_path
+from vehiclemor.reduction.state_space import KinematicStates
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -105,9 +106,19 @@ class PolynomialResidualModel(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the polynomial equations at the maneuver's output times."""
-        model = self.model
-        began_at = self.reduced(model.start(start)[None, :])[0]
-        times, inputs, _ = model.sampled(maneuver)
+        times, inputs, _ = self.model.sampled(maneuver)
+        return self._solved(times, inputs, self.model.start(start))
+
+    @property
+    def state_space(self) -> KinematicStates:
+        """The coordinates, all in the subspace."""
+        return KinematicStates(
+            self.model, lambda time, u, state: self._solved(np.array([time]), u, state)
+        )
+
+    def _solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+        """Solve the polynomial equations at some times, beginning at a state (n,)."""
+        model, began_at = self.model, self.reduced(state[None, :])[0]
         rank, start_at = self.basis.rank, loop_array(began_at)
         given = (inputs, start_at, self._polynomials, int(self.newton), ITERATION_LIMIT)
         loop, buffer = self._loop("reduced_path"), np.empty(6 * rank + rank * (rank + 1))

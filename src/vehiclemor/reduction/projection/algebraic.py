@@ -14,6 +14,7 @@ from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, p
 from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
 from vehiclemor.reduction.projection.windows import by_window, first_samples
 from vehiclemor.reduction.solved_path import solved_path
+from vehiclemor.reduction.state_space import KinematicStates
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -54,8 +55,19 @@ class AlgebraicProjection(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
+        times, inputs, _ = self.model.sampled(maneuver)
+        return self._solved(times, inputs, self.model.start(start))
+
+    @property
+    def state_space(self) -> KinematicStates:
+        """The coordinates, on the subspace of the window that the time is in."""
+        return KinematicStates(
+            self.model, lambda time, u, state: self._solved(np.array([time]), u, state)
+        )
+
+    def _solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+        """Solve the reduced equations at some times, beginning at a state (n,)."""
         model = self.model
-        times, inputs, _ = model.sampled(maneuver)
         n, windows = len(model.coordinates), len(self.bases)
         bases, tests = np.zeros((windows, n, n)), np.zeros((windows, n, n))
         for k, basis in enumerate(self.bases):
@@ -71,7 +83,7 @@ class AlgebraicProjection(ShortRepr):
         )
         iteration = Iteration(self.tolerance, ITERATION_LIMIT, np.inf)
         least_squares = int(self.tests is None)
-        given = (model.start(start), subspaces, least_squares, inputs, model.constants, iteration)
+        given = (state, subspaces, least_squares, inputs, model.constants, iteration)
         loop = model.loop("projected_path", "reduction.projection.algebraic_loops")
         buffer = np.empty(4 * n + len(model.inputs) + n * n + 2 * n * (n + 1))
         return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]

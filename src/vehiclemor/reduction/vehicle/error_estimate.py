@@ -50,10 +50,13 @@ def estimated_errors(
     slopes = _slopes(np.hstack([shapes, planar]), step)
     chosen = _instants(shapes, instants)
     x, u = shapes[chosen], run.inputs[chosen]
+    places = np.arange(len(shapes))
+    before = np.searchsorted(chosen[1:-1], places, "right")
+    part = ((places - chosen[before]) / np.diff(chosen)[before])[:, None]
 
     def everywhere(values: np.ndarray) -> np.ndarray:
         # What the equations leave changes slowly, unlike the run.
-        return np.array([np.interp(run.time, run.time[chosen], column) for column in values.T]).T
+        return values[before] + part * (values[before + 1] - values[before])
 
     rates, _ = shape.motion(x, u)
     residual = rates - slopes[chosen, :-3]
@@ -77,7 +80,7 @@ def estimated_errors(
 
 @dataclass(frozen=True)
 class Propagator:
-    """Solution of e' = A e + r from e = 0 by the modes of A."""
+    """Solution of e' = A e + r from e = 0, the real part of what modes of A give."""
 
     rates: np.ndarray
     left: np.ndarray
@@ -85,25 +88,30 @@ class Propagator:
 
     def driven(self, step: float, forcing: np.ndarray) -> np.ndarray:
         """Solution (samples, n) where the forcing (samples, n) is linear between the samples."""
-        from scipy.signal import lfilter
-
         modal, z = forcing @ self.left.T, self.rates * step
         small = np.abs(z) < 1e-5
         safe = np.where(small, 1.0, z)
         growth = np.exp(z)
         first = np.where(small, 1.0 + 0.5 * z, (growth - 1.0) / safe)
         second = np.where(small, 0.5 + z / 6.0, (first - 1.0) / safe)
-        pushed = np.zeros_like(modal)
-        pushed[1:] = step * ((first - second) * modal[:-1] + second * modal[1:])
-        found = [lfilter([1.0], [1.0, -g], p) for g, p in zip(growth, pushed.T, strict=True)]
-        return np.real(self.right @ np.array(found)).T
+        found = np.zeros_like(modal)
+        found[1:] = step * ((first - second) * modal[:-1] + second * modal[1:])
+        # Each pass doubles the number of steps that have been added up.
+        steps = 1
+        while steps < len(found):
+            found[steps:] += growth**steps * found[:-steps]
+            steps *= 2
+        return np.real(found @ self.right.T)
 
 
 @lru_cache(maxsize=16)
 def _prepared(model: DynamicModel) -> tuple[VehicleShape, Propagator]:
     shape = VehicleShape(model)
     rates, right = np.linalg.eig(shape.linearised.a)
-    return shape, Propagator(rates, np.linalg.inv(right), right)
+    # Of two conjugate modes one counts twice.
+    upper = np.imag(rates) >= 0.0
+    twice = np.where(np.imag(rates) > 0.0, 2.0, 1.0)
+    return shape, Propagator(rates[upper], np.linalg.inv(right)[upper], (right * twice)[:, upper])
 
 
 @lru_cache(maxsize=16)

@@ -27,6 +27,12 @@ def _column_kernels(features: Features) -> Kernels:
     return Kernels(kernel_sources(columns_text(features)))
 
 
+# A fit makes systems of the same features again and again.
+@cache
+def _kernels(features: Features, parameters: int) -> Kernels:
+    return Kernels(kernel_sources(kernel_text(features, parameters)))
+
+
 def feature_system(
     features: Features,
     parameters: np.ndarray,
@@ -54,7 +60,7 @@ def feature_system(
     dim = features.states + PLANAR
     fused = {"ros34pw2": "ros34pw2_step"} | ({"etdrk4": "etdrk4_step"} if features.diagonal else {})
     return System(
-        Kernels(kernel_sources(kernel_text(features, len(parameters)))),
+        _kernels(features, len(parameters)),
         constants,
         features.inputs,
         np.concatenate([reference, np.zeros(PLANAR)]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -13,9 +13,11 @@ from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.reduction.reduced_system import full_state_slopes
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
 from vehiclemor.reduction.vehicle.features import Features
-from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach, overstayed
+from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
+from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.run_plans import Run
@@ -25,8 +27,6 @@ from vehiclemor.simulation.trajectory import Trust
 NEGLIGIBLE = 1e-4
 # Modes are known by differences: a smaller part of a deviation than this excites none.
 ROUNDING = 1e-7
-# A time (s) that is hardly after the start.
-SOON = 1e-3
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class LiftingSpace(NamedTuple):
     states: np.ndarray
     largest: np.ndarray
     first: np.ndarray
-    told: np.ndarray
+    start: np.ndarray
     calls: tuple[tuple[Prepared, tuple[int, ...]], ...]
 
 
@@ -99,23 +99,33 @@ class Lifting(ShortRepr):
     reach: TrainingReach = NOTHING_KNOWN
 
     @cached_property
-    def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+    def _made(self) -> dict[int, tuple[Kernels, np.ndarray]]:
         return {}
 
-    def _kernel(self, modes: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
-        """Address and constants of the kernel; without modes for a start that excites none."""
-        if (modes, lanes) not in self._made:
-            right = self.transient.right[:modes]
-            pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
-            pairs = pairs.reshape(2 * modes, right.shape[1])
-            shared = [self.coefficients, self.reference[None]]
-            rows = np.vstack([*shared, pairs] if modes else shared)
-            rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-            text = lifting_text(self.features, self.layout, len(self.parameters), modes)
-            kernels = Kernels(kernel_sources(text))
-            address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
-            self._made[modes, lanes] = address, np.concatenate([self.parameters, rows.ravel()])
-        return self._made[modes, lanes]
+    def text(self, modes: int) -> tuple[str, np.ndarray]:
+        """Source and constants of the kernel; without modes for a start that excites none."""
+        right = self.transient.right[:modes]
+        pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
+        pairs = pairs.reshape(2 * modes, right.shape[1])
+        shared = [self.coefficients, self.reference[None]]
+        rows = np.vstack([*shared, pairs] if modes else shared)
+        rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
+        text = lifting_text(self.features, self.layout, len(self.parameters), modes)
+        return text, np.concatenate([self.parameters, rows.ravel()])
+
+    def _kernels(self, modes: int) -> tuple[Kernels, np.ndarray]:
+        """The kernel and its constants."""
+        if modes not in self._made:
+            text, constants = self.text(modes)
+            self._made[modes] = Kernels(kernel_sources(text)), constants
+        return self._made[modes]
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of full states by reduced ones and inputs, without a transient."""
+        kernels, constants = self._kernels(0)
+        size = self.layout.size + len(self.features.watched)
+        found = full_state_slopes(kernels, (state, inputs, constants), size)
+        return found[0][: self.layout.size], found[1][: self.layout.size]
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
         """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
@@ -147,25 +157,44 @@ class Lifting(ShortRepr):
         excited
             By the start, as `excited` gives it.
         """
-        return self._lifted(self._space((times, path, inputs), excited, len(times)), len(times))
+        recorded = times, path, inputs
+        if len(times) > 1 or excited.shape[1]:
+            return self._lifted(self.space(recorded, excited, len(times)), len(times))
+        # One sample and then another, as in a closed loop.
+        try:
+            held, own = self._single.pop()
+        except IndexError:
+            own = tuple(array.copy() for array in recorded)
+            held = self.space(own, excited, 1)
+        for array, given in zip(own, recorded, strict=True):
+            array[:] = given
+        states, trust = self._lifted(held, 1)
+        states = states.copy()
+        self._single.append((held, own))
+        return states, trust
+
+    @cached_property
+    def _single(self) -> list[tuple[LiftingSpace, tuple[np.ndarray, ...]]]:
+        return []
 
     def of_run(
-        self, run: Run, inputs: np.ndarray, excited: np.ndarray, settled: float = 0.0
+        self, run: Run, inputs: np.ndarray, excited: np.ndarray, start: Sequence[float]
     ) -> tuple[np.ndarray, Trust | None]:
         """The same of a run and its inputs at the samples; of its rows only `run.rows` count.
 
-        What its start excites is known from the time `settled` (s) on.
+        Of `start` see `lifting_loops.Known`.
         """
         held = run.kept.get("lifted")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self._space((times, run.whole, inputs), excited.copy(), run.rows)
+            held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
             run.kept["lifted"] = held
         held.excited[:] = excited
-        return self._lifted(held, run.rows, settled)
+        held.start[:] = start
+        return self._lifted(held, run.rows)
 
-    def _space(
-        self, recorded: tuple[np.ndarray, np.ndarray, np.ndarray], excited: np.ndarray, rows: int
+    def space(
+        self, recorded: tuple[np.ndarray, ...], excited: np.ndarray, rows: int
     ) -> LiftingSpace:
         """Arrays of the loops and these, packed once."""
         (times, path, inputs), calls = recorded, []
@@ -180,58 +209,62 @@ class Lifting(ShortRepr):
                 )
             )
             inputs = given
-        kernel = self._kernel(modes, LANES if rows >= LANES else 1)
+        kernels, constants = self._kernels(modes)
+        lanes = LANES if rows >= LANES else 1
+        address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(times), self.layout.size + len(watched)))
-        largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
-        lifted = _loops()["lifted"].prepared(path, inputs, *kernel, states, largest, first)
-        calls.append((lifted, ("path", "inputs", "states")))
-        lasted, told = self.reach.lasted, np.array([0.0, np.inf])
-        if len(lasted):
-            given = (times, states, self.layout.size, lasted, np.empty_like(lasted), told)
-            calls.append((_loops()["durations"].prepared(*given), ("times", "states")))
+        largest, first = np.empty(self.told), np.empty(self.told, dtype=np.int64)
+        start = np.zeros(3)
+        lasted = self.reach.lasted
+        known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
+        lifted = _loops()["lifted"].prepared(
+            path, inputs, address, constants, states, known, largest, first
+        )
+        calls.append((lifted, ("path", "inputs", "states", "known.times")))
         counted = tuple(
             (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
         )
-        return LiftingSpace(excited, times, states, largest, first, told, counted)
+        return LiftingSpace(excited, times, states, largest, first, start, counted)
 
-    def _lifted(
-        self, space: LiftingSpace, rows: int, settled: float = 0.0
-    ) -> tuple[np.ndarray, Trust | None]:
+    @property
+    def told(self) -> int:
+        """How much is told of a run: what is watched, and what is told besides."""
+        watched = len(self.features.watched)
+        return watched + BESIDES if watched else 0
+
+    def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
         for call, places in space.calls:
             for place in places:
                 call.words[place] = rows
             call()
-        return space.states, self._trust(space, rows, settled)
-
-    def _trust(self, space: LiftingSpace, rows: int, settled: float) -> Trust | None:
-        """How far a run has gone; none if nothing tells."""
         largest, first = space.largest.tolist(), space.first.tolist()
+        left = min(first, default=rows)
+        return space.states, self.trust(
+            largest, first, float(space.times[left]) if left < rows else np.inf
+        )
+
+    def trust(self, largest: list[float], first: list[int], until: float) -> Trust | None:
+        """How far a run has gone; none if nothing tells.
+
+        Parameters
+        ----------
+        largest, first
+            Largest magnitude of each watched quantity and of what is told besides, and the first
+            row at which it is above 1.
+        until
+            Time (s) of the first of these rows; infinite if there is none.
+        """
         if not largest:
             return None
-        longest, moving = space.told.tolist()
-        told, sample, times = [], min(first), space.times[:rows]
-        if sample < rows:
-            name = self.features.watched[first.index(sample)][1]
-            told.append(
-                (float(times[sample]), f"{name} leaves what the training runs have covered")
-            )
-        if longest > 1.0:
-            sizes = np.abs(space.states[:rows, self.layout.size :])
-            since, column = overstayed(times, sizes, self.reach.lasted)
-            name = self.features.watched[column][1]
-            told.append((since, f"{name} lasts longer, or is longer ago, than in any training run"))
-        early = settled / max(moving, SOON)
-        sideways = self._sideways(space) if moving == times[0] else 0.0
-        if sideways > 1.0:
-            told.append((moving, "it starts sideways, as no training run does"))
-        if early > 1.0:
-            told.append((moving, "it moves sideways before what its start excites has decayed"))
-        return Trust(max(*largest, longest, early, sideways), *min(told, default=()))
-
-    def _sideways(self, space: LiftingSpace) -> float:
-        """How far a run starts in the ranges of lateral motion, in parts of known starts."""
-        first = space.states[0, self.layout.size :][: self.features.lateral]
-        return float(np.abs(first).max(initial=0.0)) / self.reach.sideways
+        if np.isinf(until):
+            return Trust(max(largest))
+        # Of what is left at once the start tells most.
+        column = len(first) - 1 - first[::-1].index(min(first))
+        watched = self.features.watched
+        if column >= len(watched):
+            return Trust(max(largest), until, REASONS[column - len(watched)])
+        reason = f"{watched[column][1]} leaves what the training runs have covered"
+        return Trust(max(largest), until, reason)
 
 
 def decayed(excited: np.ndarray) -> float:
@@ -241,6 +274,4 @@ def decayed(excited: np.ndarray) -> float:
 
 
 def _loops() -> Mapping[str, Loop]:
-    return loops(
-        (*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted", "durations")
-    )
+    return loops((*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted"))

@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings
 from vehiclemor.reduction.vehicle.shape import VehicleShape, turned
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
@@ -24,26 +25,7 @@ def projected_vehicle(
     settings: ProjectedSettings,
 ) -> ReducedSystem:
     """The vehicle's equations with speeds in the heading frame in subspaces of `one_window`."""
-    heading = shape.model.planar[2]
-
-    def to_heading_frame(states: np.ndarray) -> np.ndarray:
-        return turned(states, shape.pairs, -states[:, heading])
-
-    def from_heading_frame(states: np.ndarray) -> np.ndarray:
-        return turned(states, shape.pairs, states[:, heading])
-
-    def encode(state: np.ndarray, _: np.ndarray) -> np.ndarray:
-        return to_heading_frame(state[None])[0]
-
-    def lift(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
-        return from_heading_frame(run.path)
-
-    def project(states: np.ndarray) -> np.ndarray:
-        # Oblique projection, along the directions that the test basis does not see.
-        mean, basis, test = spaces.means[0], spaces.trial_basis[0], spaces.test_basis[0]
-        there = to_heading_frame(states)
-        return from_heading_frame(mean + (there - mean) @ test.T @ basis)
-
+    frame = HeadingFrame(shape, spaces)
     return ReducedSystem(
         shape.model,
         heading_frame(shape),
@@ -52,10 +34,47 @@ def projected_vehicle(
         offline,
         settings.solver,
         settings.tolerance,
-        encode,
-        lift,
-        project=project,
+        frame.encode,
+        frame.lift,
+        project=frame.project,
+        slopes=frame.slopes,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class HeadingFrame(ShortRepr):
+    """The way to speeds in the heading frame and back, and the subspace there."""
+
+    shape: VehicleShape
+    spaces: ProjectionWindows
+
+    def encode(self, state: np.ndarray, _: np.ndarray) -> np.ndarray:
+        """A full state (2 n,), seen from the heading frame."""
+        return self._turned(state[None], -1.0)[0]
+
+    def lift(self, run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
+        """Full states (samples, 2 n) of a run."""
+        return self._turned(run.path, 1.0)
+
+    def project(self, states: np.ndarray) -> np.ndarray:
+        """Full states moved along the directions that the test basis does not see."""
+        spaces, there = self.spaces, self._turned(states, -1.0)
+        mean, basis, test = spaces.means[0], spaces.trial_basis[0], spaces.test_basis[0]
+        return self._turned(mean + (there - mean) @ test.T @ basis, 1.0)
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the full state by a state and the inputs."""
+        heading, (there,) = self.shape.model.planar[2], self._turned(state[None], 1.0)
+        axes = np.full(len(state), state[heading])
+        found = turned(np.eye(len(state)), self.shape.pairs, axes).T
+        for a, b in self.shape.pairs:
+            found[a, heading] -= there[b]
+            found[b, heading] += there[a]
+        return found, np.zeros((len(state), len(inputs)))
+
+    def _turned(self, states: np.ndarray, sign: float) -> np.ndarray:
+        heading = self.shape.model.planar[2]
+        return turned(states, self.shape.pairs, sign * states[:, heading])
 
 
 def one_window(

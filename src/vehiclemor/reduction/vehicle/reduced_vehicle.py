@@ -17,7 +17,9 @@ from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingR
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
@@ -31,18 +33,17 @@ class KnownStart(NamedTuple):
 
     Attributes
     ----------
-    excited, until, settled
-        What of the transient it excites, when (s) this is nothing, and when it is as in training
-        runs.
-    unlike
-        How much else it leaves, 1 at the edge of what training runs leave.
+    excited, until
+        What of the transient it excites, and when (s) this is nothing.
+    told
+        When (s) this is as in training runs; how much else it leaves, 1 at the edge of what they
+        leave; 1.
     """
 
     state: np.ndarray
     excited: np.ndarray
     until: float
-    settled: float
-    unlike: float
+    told: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +117,7 @@ class ReducedVehicle(ShortRepr):
     @cached_property
     def equations(self) -> ReducedSystem:
         """The compiled equations with the ways there and back."""
+        x, y, heading = self.model.definition.planar
         return ReducedSystem(
             self.model,
             self.system,
@@ -125,7 +127,19 @@ class ReducedVehicle(ShortRepr):
             self.solver,
             self.tolerance,
             self.encoded,
+            lambda run, inputs, _: self._lifted(run, inputs)[0],
+            judge=lambda run, inputs: self._lifted(run, inputs)[1],
+            slopes=self.lift.slopes,
+            names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
         )
+
+    @property
+    def state_space(self) -> ReducedSystem:
+        """The reduced equations: a state tells nothing of what has decayed after the start."""
+        return self.equations
+
+    def _lifted(self, run: Run, inputs: np.ndarray) -> tuple[np.ndarray, Trust | None]:
+        return self.lift.states(run.times, run.path, inputs, NOTHING_EXCITED)
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
@@ -162,13 +176,11 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         inputs = recorded_inputs(maneuver)[1]
-        known = self._known(start, inputs[0])
+        known = self.known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
-        states, trust = self.lift.of_run(run, inputs, known.excited, known.settled)
-        if known.unlike > 1.0:
-            reason = "its start leaves more than the slow motion, unlike any training run"
-            trust = Trust(max(known.unlike, trust.indicator if trust else 0.0), 0.0, reason)
+        states, trust = self.lift.of_run(run, inputs, known.excited, known.told)
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
@@ -188,7 +200,7 @@ class ReducedVehicle(ShortRepr):
         lifted, _ = self.lift.states(np.zeros(len(path)), path, inputs, excited)
         return self.shape.of(states) - self.shape.of(lifted[:, : states.shape[1]])
 
-    def _known(self, start: Start, inputs: np.ndarray) -> KnownStart:
+    def known(self, start: Start, inputs: np.ndarray) -> KnownStart:
         """A start with what it excites, at inputs; kept by its name or its numbers."""
         name = start if isinstance(start, str) else self.model.start(start).tobytes()
         key = name, inputs.tobytes()
@@ -199,8 +211,8 @@ class ReducedVehicle(ShortRepr):
             unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            until, settled = decayed(excited), self.reach.settled(excited)
-            found = self._starts[key] = KnownStart(state, excited, until, settled, unlike)
+            told = self.reach.settled(excited), unlike, 1.0
+            found = self._starts[key] = KnownStart(state, excited, decayed(excited), told)
         return found
 
     @cached_property

@@ -21,6 +21,13 @@ UNLIKE = 3.0
 BESIDE = 0.3
 # Decay (1/s) that is none.
 SLOWEST = 1e-6
+# What is told besides ranges, in the order of the loop.
+REASONS = (
+    "it moves sideways for longer, or has longer ago, than any training run",
+    "it moves sideways before what its start excites has decayed",
+    "it starts sideways, as no training run does",
+    "its start leaves more than the slow motion, unlike any training run",
+)
 BEYOND = np.array([MOVING, *np.arange(1, LEVELS) / LEVELS])
 
 
@@ -78,13 +85,3 @@ def durations(times: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     spans = np.diff(times, prepend=times[:1])[:, None, None]
     spent = np.cumsum(spans * (sizes[:, :, None] > BEYOND), axis=0)
     return np.concatenate([spent, np.cumsum(spans * spent, axis=0)], axis=1)
-
-
-def overstayed(times: np.ndarray, sizes: np.ndarray, lasted: np.ndarray) -> tuple[float, int]:
-    """When a run has first lasted too long, and in which column."""
-    columns = len(lasted) // 2
-    beyond = np.max(durations(times, sizes[:, :columns]) / lasted, axis=2)
-    first = np.flatnonzero(np.max(beyond, axis=1) > 1.0)
-    # Rounding may see the edge elsewhere than the compiled loop.
-    sample = int(first[0]) if len(first) else len(times) - 1
-    return float(times[sample]), int(np.argmax(beyond[sample])) % columns

@@ -283,6 +283,7 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
         own.keep_least,
         own.keep_most,
         float(own.halve_last),
+        0.0,
     )
     return ready(control)
 

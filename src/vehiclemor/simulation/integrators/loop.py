@@ -73,7 +73,7 @@ def integrate(
     for i in range(n):
         x[i] = start[i]
     samples, path, counts = output.samples, output.path, output.counts
-    sample, window, segment, h = 0, -1, -1, 0.0
+    sample, window, segment, h = 0, -1, -1, control.first
     dim = subspaces.ranks[0]
     t = spans.edges[0]
     for span in range(len(spans.segments)):

@@ -21,13 +21,16 @@ class Signal(NamedTuple):
         Ends of the smooth segments (segments + 1,) in s.
     first
         Number of the first piece of each segment (segments + 1,).
+    starts
+        Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
     coefficients
-        Polynomials (pieces, inputs, 6) in the part of the piece that has passed, lowest power
-        first.
+        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
+        power first.
     """
 
     edges: Vector
     first: IntVector
+    starts: Vector
     coefficients: Cube
 
 
@@ -140,6 +143,8 @@ class Control(NamedTuple):
         Factors between which the step size stays.
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
+    first
+        First step to try in s; 0 if it is to be guessed.
     """
 
     tolerance: Float
@@ -159,6 +164,7 @@ class Control(NamedTuple):
     keep_least: Float
     keep_most: Float
     halve_last: Float
+    first: Float
 
 
 # Points of a step: the Chebyshev points of a cubic.

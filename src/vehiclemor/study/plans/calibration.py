@@ -36,8 +36,11 @@ def calibrate(raw: np.ndarray, errors: np.ndarray, level: float = LEVEL) -> np.n
 
 
 def estimated(raw: np.ndarray, factors: np.ndarray) -> np.ndarray:
-    """Estimated errors (runs, outputs) that cover the true ones at the level of the factors."""
-    return raw * factors
+    """Estimated errors (runs, outputs) that cover the true ones at the level of the factors.
+
+    Where a factor is infinite there are none.
+    """
+    return raw * np.where(np.isfinite(factors), factors, np.nan)
 
 
 def covered(estimates: np.ndarray, errors: np.ndarray) -> np.ndarray:

@@ -37,7 +37,8 @@ class Validation:
         Largest error of a bounded output in any validation scenario as a multiple of its bound;
         infinite if a run has failed.
     evaluations
-        Evaluations of the equations, mean of the validation scenarios.
+        Evaluations of the equations, mean of the validation scenarios, by the method's own count:
+        it decides among candidates of one method alone.
     factors
         Bounded output -> factor that makes an honest estimate of the error that the model tells,
         see `calibration`; infinite if it tells none, or validation is too small.

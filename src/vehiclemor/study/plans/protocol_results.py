@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.study.plans.calibration import estimated
 from vehiclemor.study.plans.choice import Row, Validation, outcomes
 from vehiclemor.study.plans.ledger import Drawn, Shown
 from vehiclemor.study.plans.protocol import FULL_ORDER, Protocol
@@ -99,12 +100,11 @@ def _estimates(protocol: Protocol, rows: Sequence[Row], dataset: xr.Dataset) -> 
     sizes = [dataset.sizes[name] for name in ("row", "scenario", "output")]
     found = np.full(sizes, np.nan)
     outputs = dataset["output"].values.tolist()
+    factors = [row.validation[row.candidate].factors for row in rows]
     for output, bound in protocol.definition.bounds.items():
         raw = dataset[f"estimated_{bound.measure}_error"].sel(output=output).values
-        for index, row in enumerate(rows):
-            factor = row.validation[row.candidate].factors.get(output, np.inf)
-            if np.isfinite(factor):
-                found[index, :, outputs.index(output)] = raw[index] * factor
+        of_output = np.array([known.get(output, np.inf) for known in factors])
+        found[:, :, outputs.index(output)] = estimated(raw.T, of_output).T
     return variables({"error_estimate": found}, "row", "scenario")["error_estimate"]
 
 

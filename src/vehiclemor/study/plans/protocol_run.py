@@ -100,7 +100,8 @@ def validate(
     experiments = [
         [c.experiment(model, i, validation) for i in range(len(c.candidates))] for c in contestants
     ]
-    workers([[experiment] for candidates in experiments for experiment in candidates])
+    # Most candidates of a contestant share a fit.
+    workers(experiments)
     rows: list[Row] = []
     for contestant, candidates in zip(contestants, experiments, strict=True):
         results = tuple(

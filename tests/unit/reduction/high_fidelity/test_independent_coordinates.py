@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vehiclemor.multibody.high_fidelity.quantities import PLACES
-from vehiclemor.reduction.high_fidelity.frozen_constants import frozen_encoder, frozen_kernels
+from vehiclemor.reduction.high_fidelity.frozen_constants import exact_vehicle, frozen_kernels
 from vehiclemor.reduction.high_fidelity.independent_kernels import independent_kernels
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -127,13 +127,13 @@ def test_mass_and_speeds_give_the_energy_of_motion(vehicle, exact, driven):
 def test_states_with_spins_in_space_go_there_and_back(vehicle, exact, frozen, driven):
     for x, u in driven[::20]:
         lifted = exact("full_state", x, u, FULL)
-        there = frozen_encoder(vehicle)(lifted, u)
+        there = exact_vehicle(vehicle).encode(lifted, u)
         back = frozen("full_state", there, u, FULL)
         np.testing.assert_allclose(back, lifted, rtol=0, atol=1e-12 * np.abs(lifted).max())
 
 
 def test_the_equilibrium_is_kept(vehicle, frozen):
-    start = frozen_encoder(vehicle)(vehicle.start(), STRAIGHT)
+    start = exact_vehicle(vehicle).encode(vehicle.start(), STRAIGHT)
     assert np.abs(frozen("derivative", start, STRAIGHT, DERIVATIVE)[14:]).max() < 1e-8
 
 
@@ -141,7 +141,7 @@ def test_frozen_inertia_is_exact_to_first_order_at_the_design_position(vehicle, 
     """Twice the distance makes four times the error."""
     rng = np.random.default_rng(3)
     # No rates about the straight run: the tires' friction has a kink there.
-    start = frozen_encoder(vehicle)(vehicle.start(), STRAIGHT)
+    start = exact_vehicle(vehicle).encode(vehicle.start(), STRAIGHT)
     for place in (2, 4, 5, 6, 7, 8, 9):
         step = np.zeros(28)
         step[place] = rng.choice([-1.0, 1.0])
@@ -166,7 +166,7 @@ def test_a_lane_change_is_predicted(vehicle, frozen):
     def slope(t, x):
         return frozen("derivative", x, maneuver.at(np.array([t]))[0], DERIVATIVE)
 
-    start = frozen_encoder(vehicle)(vehicle.start(), STRAIGHT)
+    start = exact_vehicle(vehicle).encode(vehicle.start(), STRAIGHT)
     run = solve_ivp(
         slope, (0.0, 10.0), start, "LSODA", maneuver.times, rtol=1e-7, atol=1e-7, max_step=0.02
     )

@@ -102,12 +102,24 @@ def test_what_the_safe_model_tells_of_itself_is_kept():
         ({"fast_settings": "terms = 1.5"}, "terms"),
         ({"fast_settings": "no_such = 1"}, "no_such"),
         ({"fast_settings": "tolerance = 1e-3"}, "setting of its own"),
-        ({"safe": "frozen_inertia"}, "reduces kind dae"),
+        ({"fast_settings": "terms.high = 3"}, "not tables"),
+        ({"safe": "frozen_inertia"}, "safe can't be 'frozen_inertia': .* reduces kind dae"),
+        ({"back": 0.3}, "back is for"),
     ],
 )
 def test_wrong_settings_are_named(given, words):
     with pytest.raises(InputError, match=words):
         METHOD.check(model(), validated(METHOD, "ode", given))
+
+
+@pytest.mark.parametrize("text", ["rank = 2, snapshots = 9", "rank = 2\n\nsnapshots = 9,\n"])
+def test_settings_of_the_fast_model_stand_in_one_line_or_several(text):
+    given = {"fast": "global_pod", "solver": "dopri5", "fast_settings": text}
+    METHOD.check(model(), validated(METHOD, "ode", given))
+    with pytest.raises(InputError, match="snapshots"):
+        METHOD.check(
+            model(), validated(METHOD, "ode", given | {"fast_settings": text.replace("9", "1")})
+        )
 
 
 def test_settings_reach_both_models():

@@ -8,37 +8,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.reducing import CARS
-from vehiclemor.codegen.loops import loops
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
-from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations, overstayed
-from vehiclemor.simulation.paths import PATH_LOOPS
+from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
+from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations
 
 
-@settings(max_examples=30)
-@given(seed=st.integers(0, 2**32 - 1), samples=st.integers(1, 60), reach=st.floats(0.01, 3.0))
-def test_durations_of_the_compiled_loop_are_those_of_numpy(seed, samples, reach):
-    rng = np.random.default_rng(seed)
-    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.01, 0.2, samples - 1))])
-    states = rng.normal(size=(samples, 5)) * reach
-    spent, told = np.full((4, LEVELS), np.nan), np.empty(2)
-    lasted = rng.uniform(0.1, 2.0, (4, LEVELS))
-    loop = loops((*PATH_LOOPS, "reduction.vehicle.lifting_loops"), LOOPS)["durations"]
-    loop(times, states, 2, lasted, spent, told)
-    sizes = np.abs(states[:, 2:4])
+def test_durations_of_the_compiled_loop_are_those_of_numpy(reduced):
+    model, maneuver = reduced.model, CARS[reduced.model.name]
+    times, lift = maneuver.times, reduced.lift
+    path, inputs = reduced.path(maneuver, "equilibrium"), maneuver.at(times)
+    columns, size = reduced.features.lateral, 2 * len(model.coordinates)
+    rng = np.random.default_rng(5)
+    sizes = np.abs(lift.states(times, path, inputs, NOTHING_EXCITED)[0][:, size : size + columns])
     beyond = durations(times, sizes)
-    assert told[0] == pytest.approx((beyond[-1] / lasted).max(), rel=1e-12)
-    moving = np.flatnonzero((sizes > 0.02).any(axis=1))
-    assert told[1] == (times[moving[0]] if len(moving) else np.inf)
-    if told[0] > 1.0 + 1e-9:
-        since, column = overstayed(times, sizes, lasted)
-        sample = np.searchsorted(times, since)
-        assert (beyond[sample, column::2] > lasted[column::2]).any()
-        assert (beyond[:sample] <= lasted).all()
-
-
-LOOPS = ("with_decay", "lifted", "durations")
+    for lasted in (beyond[-1] * 0.7 + 1e-3, *rng.uniform(0.5, 60.0, (4, 2 * columns, LEVELS))):
+        known = replace(reduced, reach=replace(reduced.reach, lasted=lasted))
+        _, trust = known.lift.states(times, path, inputs, NOTHING_EXCITED)
+        part = (beyond[-1] / lasted).max()
+        assert trust.indicator == pytest.approx(max(part, sizes.max()), rel=1e-9)
+        if part > 1.0 and not (sizes > 1.0).any():
+            first = times[(beyond > lasted).any(axis=(1, 2))][0]
+            assert trust.until == pytest.approx(first, abs=0.021)
+            assert "longer" in trust.reason
 
 
 def held(reduced: ReducedVehicle, seconds: float, begin: float = 1.0) -> Maneuver:
@@ -102,7 +94,7 @@ def test_a_start_has_settled_when_its_transient_is_as_in_training_runs(first, se
 
 def test_a_wheel_out_of_place_is_told(reduced):
     model, state = reduced.model, np.array(reduced.model.start("equilibrium"))
-    assert reduced._known(state, np.zeros(len(model.inputs))).unlike < 0.1
+    assert reduced.known(state, np.zeros(len(model.inputs))).told[1] < 0.1
     state[model.coordinates.index("z_RL" if "z_RL" in model.coordinates else "xi_FL")] += 0.05
     run = reduced.simulate(CARS[model.name].perturbed(1.0, 0.5), state)
     assert run.status == "untrusted"
@@ -112,12 +104,11 @@ def test_a_wheel_out_of_place_is_told(reduced):
 
 def test_a_start_that_turns_is_told(reduced):
     model, maneuver = reduced.model, CARS[reduced.model.name].perturbed(1.1, 0.6)
-    turning = np.array(model.start("equilibrium"))
-    turning[
-        len(model.coordinates) + model.speeds.index("r" if "r" in model.speeds else "psi_dot")
-    ] += 0.1
+    turning = np.array([model.start(name) for name in model.starts])
+    yaw_rate = model.speeds.index("r" if "r" in model.speeds else "psi_dot")
+    turning[:, len(model.coordinates) + yaw_rate] += 0.1
     amid = reduced.simulate(maneuver, "equilibrium").states[100]
-    for start in (turning, amid):
+    for start in (*turning, amid):
         run = reduced.simulate(maneuver, start)
         assert run.status == "untrusted"
         assert run.trust.until == 0.0

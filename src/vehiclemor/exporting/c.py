@@ -1,0 +1,157 @@
+"""C99 source of a system: no allocation, no state between calls, arrays of the caller."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vehiclemor.exporting.straight_line import StraightLine
+from vehiclemor.exporting.system import SIGNATURES, TANGENTS, TOOL, ExportedSystem
+
+SOURCES = Path(__file__).parent / "c_sources"
+SELECT = """\
+static double select(int test, double then, double otherwise)
+{
+    return test ? then : otherwise;
+}"""
+ENTRY = """\
+static double entry(double row, int place)
+{
+    return vehiclemor_table[(long)row + place];
+}"""
+HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
+STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
+
+
+def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
+    """Name -> text of the files of a system.
+
+    Parameters
+    ----------
+    step
+        Step size in s that the header names.
+    """
+    shipped = {name: (SOURCES / name).read_text(encoding="utf-8") for name in (STEPPER, DRIVER)}
+    values = [
+        _array("parameters", system.values),
+        *(_array(_start(name), state) for name, state in system.starts.items()),
+    ]
+    return {
+        HEADER: _header(system, step),
+        MODEL: _source(system, "its functions", values, system.functions),
+        TANGENT: _source(system, "derivatives of its functions", [], system.tangents()),
+    } | shipped
+
+
+def _header(system: ExportedSystem, step: float) -> str:
+    def listed(title: str, quantities: Sequence) -> list[str]:
+        rows = [
+            f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)
+        ]
+        return [f"   {title}:", *rows]
+
+    sizes = system.sizes
+    counts = {
+        "STATES": sizes["x"],
+        "INPUTS": sizes["u"],
+        "OUTPUTS": len(system.outputs),
+        "PARAMETERS": sizes["p"],
+        "CONSTANTS": sizes["c"],
+    }
+    starts = list(system.starts)
+    states = [_declared(_start(name), sizes["x"]) for name in starts]
+    lines = [
+        f"/* {system.name}: {system.summary}.",
+        f"   Written by {TOOL}.",
+        "",
+        *listed("States x", system.states),
+        *listed("Inputs u", system.inputs),
+        *listed("Outputs y", system.outputs),
+        *listed("Parameters p", system.parameters),
+        f"   Starts: {', '.join(starts)} */",
+        "",
+        "#ifndef VEHICLEMOR_MODEL_H",
+        "#define VEHICLEMOR_MODEL_H",
+        "",
+        "/* Sizes; an array in C holds one number at least. */",
+        *(f"#define VEHICLEMOR_{name} {count}" for name, count in counts.items()),
+        "#define VEHICLEMOR_FLOATS(count) ((count) > 0 ? (count) : 1)",
+        "",
+        "/* Step size in s at which vehiclemor_step is stable and accurate. */",
+        f"#define VEHICLEMOR_STEP {step!r}",
+        "",
+        *(f"extern {declared};" for declared in (_declared("parameters", sizes["p"]), *states)),
+        f"#define vehiclemor_start vehiclemor_{_start(starts[0])}",
+        "",
+        "/* Constants c follow from the parameters p: needed once, and whenever p changes. */",
+        *(f"{_signature(name)};" for name in SIGNATURES),
+        "",
+        "/* What their results change by where the arguments change by seeds. */",
+        *(f"{_signature(name)};" for name in TANGENTS),
+        "",
+        "/* Take x over a step of h seconds; inputs are linear from u to u_end, which may be u. */",
+        "void vehiclemor_step(double *x, const double *u, const double *u_end, const double *c,",
+        "                     double h);",
+        "",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _declared(name: str, size: int) -> str:
+    return f"const double vehiclemor_{name}[{max(size, 1)}]"
+
+
+def _start(name: str) -> str:
+    return f"start_{name}"
+
+
+def _signature(name: str) -> str:
+    *given, result = (SIGNATURES | TANGENTS)[name]
+    arguments = ", ".join(f"const double *{argument}" for argument in given)
+    return f"void vehiclemor_{name}({arguments}, double *{result})"
+
+
+def _source(
+    system: ExportedSystem,
+    what: str,
+    parts: Sequence[str],
+    functions: Mapping[str, StraightLine],
+) -> str:
+    """Text of a file of functions, after other parts."""
+    texts = [_function(name, function) for name, function in functions.items()]
+    called = "\n".join(texts)
+    helpers = [SELECT] if "select(" in called else []
+    if "entry(" in called:
+        helpers += [f"static {_array('table', system.table)}", ENTRY]
+    head = f"/* {system.name}: {what}, written by {TOOL}. */"
+    included = f'#include <math.h>\n\n#include "{HEADER}"'
+    return "\n\n".join([head, included, *parts, *helpers, *texts]) + "\n"
+
+
+def _array(name: str, values: np.ndarray) -> str:
+    numbers = [repr(value) for value in values.tolist()] or ["0.0"]
+    rows = [", ".join(numbers[i : i + 4]) for i in range(0, len(numbers), 4)]
+    body = ",\n    ".join(rows)
+    return f"{_declared(name, len(values))} = {{\n    {body}\n}};"
+
+
+def _function(name: str, function: StraightLine) -> str:
+    """Definition of a function; arithmetic is written alike in C and Python."""
+    *given, result = (SIGNATURES | TANGENTS)[name]
+    lines = [_signature(name), "{"]
+    lines += [
+        f"    const double {local} = {ast.unparse(expression)};"
+        for local, expression in function.assignments.items()
+    ]
+    lines += [
+        f"    {result}[{i}] = {ast.unparse(expression)};"
+        for i, expression in enumerate(function.results)
+    ]
+    text = "\n".join(lines)
+    # What is not read is said so, for compilers that ask.
+    unread = [a for a in (*given, result) if f" {a}[" not in text and f"({a}[" not in text]
+    return "\n".join([text, *(f"    (void){argument};" for argument in unread), "}"])

@@ -1,0 +1,179 @@
+"""`modelDescription.xml` of an FMU, by the schemas of FMI 2.0 and 3.0.
+
+Value references count time, states, their derivatives, inputs, outputs and parameters, as
+`vehiclemor_fmu.h` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+from vehiclemor.exporting.c import MODEL, STEPPER, TANGENT
+from vehiclemor.exporting.system import TOOL, ExportedSystem
+from vehiclemor.exporting.units import base_units
+from vehiclemor.multibody.quantities import Quantity
+
+CAPABILITIES = {
+    2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"),
+    3: ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"),
+}
+# What an importer proposes, in s.
+STOP, COMMUNICATION = 10.0, 0.01
+
+
+class Variable(NamedTuple):
+    """A variable of an FMU; `derivative_of` is the value reference of a derivative's state."""
+
+    name: str
+    unit: str
+    description: str
+    causality: str
+    variability: str
+    initial: str = ""
+    start: float | None = None
+    derivative_of: int | None = None
+
+
+def variables(system: ExportedSystem) -> list[Variable]:
+    """All variables, at the places of their value references."""
+    start = next(iter(system.starts.values()))
+    found = [Variable("time", "s", "time", "independent", "continuous")]
+    for quantity, value in zip(system.states, start.tolist(), strict=True):
+        found.append(_local(f"state.{quantity.name}", quantity, "exact", value))
+    for reference, q in enumerate(system.states, 1):
+        rate = _local(f"der(state.{q.name})", q, "calculated")
+        described = f"rate of: {q.long_name}"
+        unit = f"{q.unit}/s"
+        found.append(rate._replace(unit=unit, description=described, derivative_of=reference))
+    found += [
+        Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0) for q in system.inputs
+    ]
+    found += [
+        Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated")
+        for q in system.outputs
+    ]
+    for q, value in zip(system.parameters, system.values.tolist(), strict=True):
+        name = f"parameter.{q.name}"
+        found.append(Variable(name, q.unit, q.long_name, "parameter", "tunable", "exact", value))
+    return found
+
+
+def _local(name: str, quantity: Quantity, initial: str, start: float | None = None) -> Variable:
+    return Variable(name, quantity.unit, quantity.long_name, "local", "continuous", initial, start)
+
+
+def model_description(system: ExportedSystem, token: str, step: float, fmi: int) -> bytes:
+    """The file.
+
+    Parameters
+    ----------
+    token
+        By which an importer's file and binary know one another.
+    step
+        Of the integrator inside, in s.
+    fmi
+        2 or 3.
+    """
+    every = variables(system)
+    root = ElementTree.Element(
+        "fmiModelDescription",
+        fmiVersion=f"{fmi}.0",
+        modelName=system.name,
+        description=system.summary,
+        generationTool=TOOL,
+        variableNamingConvention="structured",
+    )
+    root.set("guid" if fmi == 2 else "instantiationToken", token)
+    if fmi == 2:
+        root.set("numberOfEventIndicators", "0")
+    common = {"modelIdentifier": identifier(system), **dict.fromkeys(CAPABILITIES[fmi], "true")}
+    exchange = ElementTree.SubElement(root, "ModelExchange", common)
+    simulation = ElementTree.SubElement(
+        root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"}
+    )
+    if fmi == 3:
+        simulation.set("fixedInternalStepSize", repr(step))
+    else:
+        for kind in (exchange, simulation):
+            files = ElementTree.SubElement(kind, "SourceFiles")
+            for name in sources(fmi):
+                ElementTree.SubElement(files, "File", name=name)
+    _units(root, (v.unit for v in every))
+    ElementTree.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0.0",
+        stopTime=repr(STOP),
+        stepSize=repr(COMMUNICATION),
+    )
+    listed = ElementTree.SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(every):
+        _variable(listed, variable, reference, fmi)
+    _structure(ElementTree.SubElement(root, "ModelStructure"), every, fmi)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+
+
+def identifier(system: ExportedSystem) -> str:
+    """Name of the binary."""
+    return system.name
+
+
+def sources(fmi: int) -> tuple[str, ...]:
+    """Files that a binary is compiled of."""
+    return f"vehiclemor_fmi{fmi}.c", MODEL, TANGENT, STEPPER
+
+
+def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
+    listed = ElementTree.SubElement(root, "UnitDefinitions")
+    for name in dict.fromkeys(names):
+        if name == "1":
+            continue
+        unit = ElementTree.SubElement(listed, "Unit", name=name)
+        powers = base_units(name)
+        if powers is not None:
+            given = {base: str(power) for base, power in powers.items() if power}
+            ElementTree.SubElement(unit, "BaseUnit", given)
+
+
+def _variable(listed: ElementTree.Element, variable: Variable, reference: int, fmi: int) -> None:
+    own = {
+        "name": variable.name,
+        "valueReference": str(reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
+    if variable.initial:
+        own["initial"] = variable.initial
+    typed = {} if variable.unit == "1" else {"unit": variable.unit}
+    if variable.start is not None:
+        typed["start"] = repr(variable.start)
+    if variable.derivative_of is not None:
+        # Version 2 counts variables from one, and time is the first.
+        typed["derivative"] = str(variable.derivative_of + (fmi == 2))
+    if fmi == 3:
+        ElementTree.SubElement(listed, "Float64", own | typed)
+    else:
+        scalar = ElementTree.SubElement(listed, "ScalarVariable", own)
+        ElementTree.SubElement(scalar, "Real", typed)
+
+
+def _structure(structure: ElementTree.Element, every: list[Variable], fmi: int) -> None:
+    outputs = [i for i, v in enumerate(every) if v.causality == "output"]
+    rates = [i for i, v in enumerate(every) if v.derivative_of is not None]
+    kinds = (
+        ("Outputs", "Output", outputs),
+        ("Derivatives", "ContinuousStateDerivative", rates),
+        ("InitialUnknowns", "InitialUnknown", sorted(outputs + rates)),
+    )
+    for plural, single, places in kinds:
+        if fmi == 3:
+            for place in places:
+                ElementTree.SubElement(structure, single, valueReference=str(place))
+        elif places:
+            listed = ElementTree.SubElement(structure, plural)
+            for place in places:
+                ElementTree.SubElement(listed, "Unknown", index=str(place + 1))

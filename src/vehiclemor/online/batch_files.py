@@ -1,0 +1,78 @@
+"""Datasets of runs that grow along `run`: netCDF files and Zarr stores, moved when complete."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.files import make_folder, temporary_path, write_whole
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NETCDF, ZARR = ".nc", ".zarr"
+
+
+def checked_target(path: Path) -> Path:
+    """A path that batches can be written to; `InputError` or `FileError` if it is none."""
+    if path.suffix not in (NETCDF, ZARR):
+        raise InputError(f"path: {path} ends neither in {NETCDF} nor in {ZARR}")
+    if path.suffix == ZARR:
+        if path.exists():
+            raise FileError(f"{path}: exists already; move it away")
+        try:
+            import zarr  # noqa: F401
+        except ImportError:
+            raise InputError(
+                f"path: {path} needs the package zarr: pip install 'vehiclemor[zarr]'"
+            ) from None
+    elif path.is_dir():
+        raise FileError(f"{path}: is a folder, not a file")
+    make_folder(path.parent)
+    return path
+
+
+def written(path: Path, parts: Iterator[xr.Dataset]) -> None:
+    """Write datasets of consecutive runs as they come; nothing is left of them if one fails."""
+    if path.suffix == ZARR:
+        _write_zarr(path, parts)
+    else:
+        write_whole(path, lambda temporary: _write_netcdf(temporary, parts))
+
+
+def opened(path: Path) -> xr.Dataset:
+    """The whole dataset, read where it is asked for."""
+    import xarray as xr
+
+    engine = "zarr" if path.suffix == ZARR else "netcdf4"
+    return xr.open_dataset(path, engine=engine, chunks=None)
+
+
+def _write_netcdf(path: Path, parts: Iterator[xr.Dataset]) -> None:
+    import netCDF4
+
+    first = next(parts)
+    first.to_netcdf(path, engine="netcdf4", unlimited_dims=["run"])
+    with netCDF4.Dataset(path, "a") as file:
+        growing = [name for name in first.variables if "run" in first[name].dims]
+        for part in parts:
+            end = file.dimensions["run"].size
+            for name in growing:
+                values = part[name].values
+                values = values.astype(object) if values.dtype.kind == "U" else values
+                file.variables[name][end : end + len(values)] = values
+
+
+def _write_zarr(path: Path, parts: Iterator[xr.Dataset]) -> None:
+    temporary = temporary_path(path)
+    try:
+        for number, part in enumerate(parts):
+            further = {"append_dim": "run"} if number else {"mode": "w"}
+            part.to_zarr(temporary, consolidated=False, **further)  # type: ignore[call-overload]
+        os.replace(temporary, path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

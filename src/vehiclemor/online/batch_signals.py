@@ -1,0 +1,198 @@
+"""Inputs of many runs: signals of one array of samples, and any maneuvers as loops take them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, overload
+
+import numpy as np
+
+from vehiclemor.arguments import real_array
+from vehiclemor.codegen.loops import address_of_array, ready
+from vehiclemor.errors import InputError, one_line
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.piecewise import CONTINUOUS, bent, evaluated, joined
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.signals import OUTPUT_STEP, Signal
+from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
+from vehiclemor.simulation.integrators import structures
+from vehiclemor.simulation.maneuver_checks import cut_short
+
+
+class Given(NamedTuple):
+    """Inputs of runs with the same output times.
+
+    Attributes
+    ----------
+    words
+        Words (runs, words) of their signals, see `structures.Signal` and `loops.Ready`.
+    edges
+        Ends of the smooth segments of each, in s.
+    inputs
+        At the times at which the runs are recorded (runs, samples, inputs).
+    remarks
+        That a maneuver is longer than its run.
+    kept
+        What the words are addresses of.
+    """
+
+    words: np.ndarray
+    edges: Sequence[np.ndarray]
+    inputs: np.ndarray
+    remarks: Sequence[str]
+    kept: Any
+
+    def part(self, runs: Sequence[int]) -> Given:
+        """Those of some of the runs."""
+        edges, remarks = [self.edges[run] for run in runs], [self.remarks[run] for run in runs]
+        return Given(self.words[runs], edges, self.inputs[runs], remarks, self.kept)
+
+
+class Signals(Sequence[Signal], ShortRepr):
+    """Signals through samples at the same times: one array instead of as many objects.
+
+    Parameters
+    ----------
+    t
+        Increasing times (n,) in s.
+    u
+        Inputs (runs, n) or (runs, n, inputs) at these times, SI units.
+    hold, inputs, output_step
+        See `Signal.from_samples`.
+
+    Raises
+    ------
+    InputError
+        If the samples are none of signals.
+    """
+
+    repr_fields = ("runs", "duration", "hold", "inputs")
+
+    def __init__(
+        self,
+        t: Any,
+        u: Any,
+        hold: str = "linear",
+        *,
+        inputs: Sequence[str] = (),
+        output_step: float = OUTPUT_STEP,
+    ) -> None:
+        try:
+            times, values = real_array(t), real_array(u)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"samples of signals: {one_line(error)}") from None
+        if values.ndim not in (2, 3) or not len(values) or values.shape[1:2] != times.shape:
+            raise InputError(
+                f"samples of signals: t has shape {times.shape} and u {values.shape}, "
+                f"not (n,) and (runs, n) or (runs, n, inputs)"
+            )
+        self.u, self.hold = values.reshape(*values.shape[:2], -1), hold
+        self._given = {"inputs": inputs, "output_step": output_step}
+        # One of them is checked with all that they share.
+        self.t = times
+        self.first = self[0]
+        finite = np.isfinite(self.u).all(axis=(1, 2))
+        if not finite.all():
+            raise InputError(f"samples of signals: run {finite.argmin()} holds what is not finite")
+
+    @property
+    def runs(self) -> int:
+        """Number of signals."""
+        return len(self.u)
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return self.first.duration
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that are given, see `Signal`."""
+        return self.first.inputs
+
+    def __len__(self) -> int:
+        return len(self.u)
+
+    @overload
+    def __getitem__(self, run: int) -> Signal: ...
+    @overload
+    def __getitem__(self, run: slice) -> Signals: ...
+    def __getitem__(self, run: Any) -> Any:
+        if isinstance(run, int | np.integer):
+            return Signal.from_samples(self.t, self.u[run], self.hold, **self._given)
+        part = object.__new__(Signals)
+        part.__dict__.update(self.__dict__ | {"u": self.u[run]})
+        return part
+
+    def given(self, names: tuple[str, ...], times: np.ndarray | None) -> Given:
+        """The inputs of a model with these names, as loops take them; see `given_of`."""
+        whole = self.inputs == names or (not self.inputs and self.u.shape[2] == len(names))
+        if self.hold not in CONTINUOUS:
+            return given_of([self[run].for_inputs(names) for run in range(len(self))], times)
+        coefficients = self._coefficients()
+        own_times = self.t - self.t[0]
+        patterns: dict[bytes, list[int]] = {}
+        bends = [bent(own_times, u) for u in self.u]
+        for run, pattern in enumerate(bends):
+            patterns.setdefault(pattern.tobytes(), []).append(run)
+        pieces = [
+            (runs, joined(own_times, bends[runs[0]], coefficients[runs[0]]))
+            for runs in patterns.values()
+        ]
+        if not whole:
+            signals: list[Any] = [None] * len(self)
+            for runs, first in pieces:
+                for run in runs:
+                    own = first._replace(coefficients=coefficients[run])
+                    signals[run] = replace(self.first, pieces=own, kept={}).for_inputs(names)
+            return given_of(signals, times)
+        at = self.first.times if times is None else times
+        inputs = np.empty((len(self), len(at), len(names)))
+        edges: list[Any] = [None] * len(self)
+        words, kept = [], []
+        for runs, first in pieces:
+            inputs[runs] = evaluated(coefficients[runs], *first.located(at))
+            for run in runs:
+                edges[run] = first.edges
+            kept.append(ready(structures.Signal(*first)))
+            words.append(np.frombuffer(kept[-1].words, dtype=np.int64))
+        table = np.empty((len(self), len(words[0])), dtype=np.int64)
+        for (runs, _), row in zip(pieces, words, strict=True):
+            table[runs] = row
+        # The address of the coefficients comes before their shape, which is last.
+        table[:, -4] = addresses(coefficients)
+        return Given(table, edges, inputs, [""] * len(self), (coefficients, kept))
+
+    def _coefficients(self) -> np.ndarray:
+        """Polynomials (runs, intervals, inputs, degree + 1)."""
+        runs, n, columns = self.u.shape
+        side_by_side = self.u.swapaxes(0, 1).reshape(n, runs * columns)
+        found = CONTINUOUS[self.hold](self.t - self.t[0], side_by_side)
+        found = found.reshape(n - 1, runs, columns, -1)
+        return np.ascontiguousarray(found.swapaxes(0, 1))
+
+
+def given_of(signals: Sequence[Maneuver], times: np.ndarray | None) -> Given:
+    """Inputs of maneuvers, which have all inputs of the model.
+
+    Parameters
+    ----------
+    times
+        At which the runs are recorded (samples,) in s; the output times of all if none.
+    """
+    held = [signal_of(signal) for signal in signals]
+    inputs = [recorded_inputs(s)[1] if times is None else s.at(times) for s in signals]
+    words = np.frombuffer(b"".join([signal.words for signal in held]), dtype=np.int64)
+    return Given(
+        words.reshape(len(signals), -1),
+        [signal.bundle.edges for signal in held],
+        np.stack(inputs),
+        [cut_short(signal) for signal in signals],
+        held,
+    )
+
+
+def addresses(arrays: np.ndarray) -> np.ndarray:
+    """Addresses (runs,) of the parts of an array along its first dimension."""
+    return address_of_array(arrays) + np.arange(len(arrays)) * arrays[0].nbytes

@@ -1,0 +1,189 @@
+"""Reduced models as files: one netCDF-4 file with all that they are made of, and nothing to run.
+
+Numbers are variables by the names of the fields that they stand in; their order, texts of features
+and of kernels are JSON.  Machine code is made of these texts, or comes from the cache.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.arguments import file_path, quoted
+from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
+from vehiclemor.online.parts import Reader, Writer
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.validation import checked_fit
+from vehiclemor.registry import component
+from vehiclemor.short_repr import ShortRepr, shortened
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.input_range import InputRange
+from vehiclemor.study.method_settings import Settings, for_method
+from vehiclemor.study.provenance import attributes, code_digest
+from vehiclemor.study.scenario import parameters_of
+from vehiclemor.study.store import INTEGRITY, opened, write_dataset
+
+# Of the layout of these files.
+SCHEMA = 1
+# Texts beside the arrays.
+TEXTS = ("parts", "settings", "training", "parameters")
+# What is taken apart.
+PARTS = ("reduced", "known")
+# Differences of what a model's equations give that rounding explains: relative, and as part of the
+# largest number.
+SAME, ROUNDING = 1e-8, 1e-12
+
+
+@dataclass(frozen=True)
+class Saved(ShortRepr):
+    """What a file holds.
+
+    Attributes
+    ----------
+    model
+        The full-order model.
+    method, settings
+        Name of the method and its complete settings.
+    training
+        What it was trained on: the content of each scenario.
+    reduced
+        What the method's `fit` gave.
+    known
+        Range of the inputs of its training.
+    """
+
+    model: Model
+    method: str
+    settings: Settings
+    training: tuple[Mapping[str, Any], ...]
+    reduced: Any
+    known: InputRange
+
+
+def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
+    """Write a reduced model into a new file.
+
+    Parameters
+    ----------
+    overwrite
+        Whether a file that is there is replaced.
+
+    Raises
+    ------
+    InputError
+        If the path is taken, or the model has a part that can't be written.
+    VehiclemorError
+        If the file can't be written; then there is none, or the old one.
+    """
+    import xarray as xr
+
+    path = file_path("path", path)
+    if path.is_dir() or (path.exists() and not overwrite):
+        raise InputError(f"{path} is there already; overwrite=True replaces a file")
+    model, writer = saved.model, Writer(saved.model)
+    try:
+        parts = {name: writer.part(getattr(saved, name), name) for name in PARTS}
+    except InputError as error:
+        raise InputError(f"{saved.method} of {model.name}: {error}") from None
+    texts = parts, dict(saved.settings), list(saved.training), parameters_of(model)
+    variables: dict[str, Any] = {
+        name: ((), json.dumps(text)) for name, text in zip(TEXTS, texts, strict=True)
+    }
+    for name, array in (writer.arrays | {"fingerprint": fingerprint(model)}).items():
+        dimensions = [f"{name}_{axis}" for axis in range(array.ndim)]
+        variables[name] = dimensions, array, {}, {"zlib": True, "_FillValue": None}
+    described = attributes(
+        f"{saved.method} of {model.name}",
+        model.kernel_hash,
+        saved_model=SCHEMA,
+        model=model.name,
+        method=saved.method,
+        vehiclemor=version("vehiclemor"),
+        code=code_digest(model.name, saved.method),
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+    write_dataset(xr.Dataset(variables, attrs=described), path)
+    return path
+
+
+def read(path: Any) -> Saved:
+    """The reduced model of a file, with its model.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, damaged, something else, or of another version or another model.
+    """
+    path = file_path("path", path)
+    stored, attrs = content(path)
+    try:
+        method, name = str(attrs["method"]), str(attrs["model"])
+        parts, settings, training, parameters = (json.loads(stored.pop(key)) for key in TEXTS)
+        model = _model(name, parameters)
+        reduces: Method = component("method", method)
+        reduces.check(model, for_method(model, method, settings))
+        if not _alike(stored.pop("fingerprint"), fingerprint(model)):
+            raise FileError(f"the equations of {name} have changed since")
+        reader = Reader(model, stored)
+        made = {name: reader.value(parts[name], name) for name in PARTS}
+        checked_fit(method, made["reduced"])
+        if not isinstance(made["known"], InputRange):
+            raise TypeError(f"known is {quoted(made['known'])}, no InputRange")
+        return Saved(model, method, settings, tuple(training), **made)
+    except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
+        raise _unfit(path, one_line(error)) from None
+    except (SyntaxError, ValueError, VehiclemorError) as error:
+        raise _unfit(path, " ".join(str(error).split())) from None
+
+
+def fingerprint(model: Model) -> np.ndarray:
+    """What a model's equations and outputs give at one state: equal for equal models."""
+    state, u = model.start(), 1e-2 * np.cos(np.arange(len(model.inputs)))
+    state += 1e-3 * np.cos(np.arange(len(state)))
+    equations = "residual" if model.kind == "ae" else "derivative"
+    parts = [model.evaluated(name, state, u) for name in (equations, "outputs")]
+    return np.concatenate(parts)
+
+
+def _alike(then: np.ndarray, now: np.ndarray) -> bool:
+    rounding = ROUNDING * np.abs(now).max()
+    return then.shape == now.shape and np.allclose(then, now, SAME, rounding)
+
+
+def _model(name: str, parameters: Mapping[str, Any]) -> Model:
+    """The model with these parameters; those that are its file's own keep their sources."""
+    model = build(name)
+    own = parameters_of(model)
+    changed = {key: value for key, value in parameters.items() if own.get(key) != value}
+    return build(name, overrides=changed) if changed else model
+
+
+def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables and attributes of a file that is whole and of this version.
+
+    Raises
+    ------
+    FileError
+        If there is none.
+    """
+    with opened(path, "saved model") as file:
+        attrs = {name: file.getncattr(name) for name in file.ncattrs()}
+        if "saved_model" not in attrs or INTEGRITY not in file.groups:
+            raise FileError(f"{path}: not a saved model")
+        for name, here in (("saved_model", SCHEMA), ("vehiclemor", version("vehiclemor"))):
+            if attrs.get(name) != here:
+                was = f"{name} {shortened(str(attrs.get(name)))} where this is {here}"
+                raise FileError(f"{path}: saved by another version, {was}; reduce the model again")
+        return {name: variable[...] for name, variable in file.variables.items()}, attrs
+
+
+def _unfit(path: Path, why: str) -> FileError:
+    return FileError(f"{path}: does not fit what is installed ({why}); reduce the model again")

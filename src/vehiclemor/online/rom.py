@@ -1,0 +1,344 @@
+"""A model in use, reduced or full: an object that is made once, then run, stepped and asked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.arguments import number
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.online.training import training_set
+from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.state_space import StateSpace
+from vehiclemor.registry import component
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.checks import check_positive, checked_array, checked_path, limits_of
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.stepping import SHORTEST
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.study.input_range import InputRange, input_range
+from vehiclemor.study.method_settings import Settings
+from vehiclemor.study.scenario import Scenario
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedOrderModel(ShortRepr):
+    """A model that a method has reduced, or the full one behind the same names.
+
+    Attributes
+    ----------
+    model
+        The full model.
+    method
+        Registered name of the method.
+    settings
+        All of its settings.
+    training
+        What it has been trained on; of a loaded model the content of each scenario.
+    reduced
+        What the method's fit gave.
+    known
+        Range of the inputs of its training, where the runs themselves are not at hand.
+    """
+
+    repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
+
+    model: Model
+    method: str
+    settings: Settings
+    training: tuple[Scenario | Mapping[str, Any], ...]
+    reduced: ReducedModel
+    known: InputRange | None = None
+
+    @cached_property
+    def state_space(self) -> StateSpace:
+        """The state and its steps.
+
+        Raises
+        ------
+        InputError
+            If the method gives none.
+        """
+        found = getattr(self.reduced, "state_space", None)
+        if found is None:
+            raise InputError(f"{self.method} has no state: it gives whole runs alone")
+        return found
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states; empty for a method that gives whole runs alone."""
+        found = getattr(self.reduced, "state_space", None)
+        return () if found is None else tuple(found.states)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.model.inputs
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return self.model.outputs
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Name -> value of the model's parameters, SI units."""
+        return self.model.parameters.values()
+
+    def simulate(
+        self, maneuver: str | Maneuver | None = None, start: Start | None = None
+    ) -> Trajectory:
+        """A whole run at the maneuver's output times.
+
+        Parameters
+        ----------
+        maneuver
+            A maneuver or its registered name; the model's own by default.
+        start
+            Initial condition of the full model, by name or as a state (n,); its first by default.
+        """
+        chosen = self.model.definition.maneuver if maneuver is None else maneuver
+        if isinstance(chosen, str):
+            chosen = component("maneuver", chosen)
+        begun = self.model.starts[0] if start is None else start
+        run = self.reduced.simulate(chosen, begun)
+        if run.trust or self._range is None:
+            return run
+        own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
+        return run.judged(self._range.trust(self.model, Scenario(chosen, own)))
+
+    @cached_property
+    def _range(self) -> InputRange | None:
+        """Inputs of the training, if the model does not judge itself."""
+        return None if component("method", self.method).own_limits else self.input_range
+
+    @cached_property
+    def input_range(self) -> InputRange:
+        """Range of the inputs of the training."""
+        runs = tuple(run for run in self.training if isinstance(run, Scenario))
+        return self.known or input_range(self.model, runs)
+
+    def dataset(self, run: Trajectory) -> xr.Dataset:
+        """A run as a labelled dataset, with units."""
+        from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+
+        return trajectory_dataset(self.model, run)
+
+    def state(self, start: Start | None = None, inputs: Any = None) -> np.ndarray:
+        """State (dim,) of a start of the full model.
+
+        Parameters
+        ----------
+        start
+            By name or as a state (n,) of the full model; its first by default.
+        inputs
+            At that time (inputs,); zero by default.
+        """
+        chosen = self.model.starts[0] if start is None else start
+        u = np.zeros(len(self.inputs)) if inputs is None else self._inputs(inputs)
+        return self.state_space.begin(chosen, u)
+
+    def step(
+        self, state: Any, inputs: Any, dt: float, time: float = 0.0, next_inputs: Any = None
+    ) -> np.ndarray:
+        """State (dim,) after dt s: one compiled call.
+
+        Parameters
+        ----------
+        state
+            As `state` or a step gives it (dim,).
+        inputs
+            Held for all of the step (inputs,), or at its beginning.
+        dt
+            Length of the step in s.
+        time
+            At the beginning in s: models with control periods have another basis in each.
+        next_inputs
+            At the end of the step; the inputs go there linearly.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong.
+        ConvergenceError
+            If the equations can't be solved.
+        """
+        check_positive("dt", dt, SHORTEST)
+        number("time", time)
+        ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
+        return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
+
+    def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
+        """Time derivative (dim,) of a state."""
+        return self.state_space.rates(self._state(state), self._inputs(inputs), time)
+
+    def jacobian(
+        self,
+        state: Any,
+        inputs: Any,
+        with_respect_to: str | Sequence[str] = "state",
+        of: str = "rhs",
+        time: float = 0.0,
+    ) -> np.ndarray:
+        """Analytic derivatives (results, columns) at a state and inputs.
+
+        Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
+
+        Parameters
+        ----------
+        with_respect_to
+            `state`, `inputs`, or names of the model's parameters, of which each component has a
+            column; a reduced model has them only where it holds the model's own equations.
+        of
+            `rhs` or `outputs`; of a kinematic model `outputs` or `coordinates`.
+        time
+            In s: models with control periods have another basis in each.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the model has no such derivatives.
+        """
+        u = self._inputs(inputs)
+        return self.state_space.derivatives(self._state(state), u, time, with_respect_to, of)
+
+    def full_state(self, state: Any, inputs: Any) -> np.ndarray:
+        """State (n,) of the full model, or states (samples, n) of as many."""
+        states, u, single = self._samples(state, inputs)
+        found = self.state_space.full_states(states, u)
+        return found[0] if single else found
+
+    def outputs(self, state: Any, inputs: Any) -> np.ndarray:
+        """Outputs (outputs,) at a state, or (samples, outputs) along states (samples, dim)."""
+        states, u, single = self._samples(state, inputs)
+        full = self.state_space.full_states(states, u)
+        if not single:
+            return self.model.along("outputs", full, u)
+        found = np.empty(len(self.model.outputs))
+        self.model.kernels.call("outputs", full[0], u[0], self.model.constants, found)
+        return found
+
+    def trust(self, state: Any, inputs: Any) -> Trust:
+        """How far a state, or states (samples, dim), go in what the model knows.
+
+        A model that does not judge itself knows the inputs that it was trained on, and the full
+        one the ranges of validity that it declares.  Where a run came from is not in a state.
+        """
+        states, u, _ = self._samples(state, inputs)
+        found = self.state_space.trust(states, u)
+        if found is None and self._range is not None:
+            found = self._range.trust_of_inputs(self.inputs, u)
+        left = self._left_validity(states, u)
+        return Trust(np.inf, 0.0, left) if left else found or Trust(0.0)
+
+    def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
+        """Which output is beyond what the full model declares, if one is."""
+        names, places, ranges = limits_of(self.model.definition)
+        if not names:
+            return ""
+        outputs = self.outputs(states, inputs)
+        for name, place, (low, high) in zip(names, places, ranges, strict=False):
+            values = outputs[:, place]
+            wrong = values[~((values >= low) & (values <= high))]
+            if len(wrong):
+                return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
+        return ""
+
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write it into one netCDF file, which `load` reads.
+
+        Parameters
+        ----------
+        overwrite
+            Whether a file that is there is replaced.
+
+        Raises
+        ------
+        InputError
+            If the path is taken, or the method makes something that can't be written.
+        VehiclemorError
+            If the file can't be written; then there is none, or the old one.
+        """
+        from vehiclemor.online.model_file import Saved, write
+
+        training = [run.content if isinstance(run, Scenario) else run for run in self.training]
+        how = self.method, self.settings, tuple(training)
+        return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
+
+    def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
+        """States and inputs by sample, and whether it is but one."""
+        if np.ndim(state) < 2:
+            return self._state(state)[None], self._inputs(inputs)[None], True
+        states = checked_path(state, self._dim, "states")
+        return states, checked_path(inputs, len(self.inputs), "inputs", len(states)), False
+
+    def _state(self, state: Any) -> np.ndarray:
+        return checked_array(state, self._dim, "state", self._name)
+
+    def _inputs(self, inputs: Any, name: str = "inputs") -> np.ndarray:
+        return checked_array(inputs, len(self.model.inputs), name, self._name)
+
+    @cached_property
+    def _dim(self) -> int:
+        return len(self.state_space.states)
+
+    @cached_property
+    def _name(self) -> str:
+        return f"{self.model.name} by {self.method}"
+
+
+def reduce(
+    model: str | Model,
+    method: str,
+    *,
+    training: str | Sequence[Scenario | Maneuver] | None = None,
+    preset: str = "recommended",
+    **settings: object,
+) -> ReducedOrderModel:
+    """Reduce a model: fit a method to training runs of the full model.
+
+    Parameters
+    ----------
+    model
+        Registered name, or a model made by `model()`.
+    method
+        Registered name, see `methods()`; `full_order` gives the full model with the same names.
+    training
+        `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
+        the model's own protocol, which is the default of the methods that compete there.  Or a
+        list of maneuvers, or of scenarios.
+    preset, **settings
+        Of the method; see `describe()`.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name or value is wrong, or the method can't reduce the model.
+    """
+    from vehiclemor.progress import first_use
+    from vehiclemor.reduction.validation import checked_fit, validated
+    from vehiclemor.simulation.build import build
+    from vehiclemor.study.linear_algebra import one_thread
+    from vehiclemor.study.scenario import training_run
+
+    ready = model if isinstance(model, Model) else build(model)
+    definition: Method = component("method", method)
+    accepted, reason = definition.accepts(ready)
+    if not accepted:
+        raise InputError(reason)
+    complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
+    definition.check(ready, complete)
+    scenarios = training_set(ready, method, training)
+    with first_use(f"{ready.name} with {method}"), one_thread():
+        runs = [training_run(ready, scenario) for scenario in scenarios]
+        fitted = checked_fit(method, definition.fit(ready, runs, complete))
+    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, fitted)

@@ -1,0 +1,396 @@
+"""Signals: inputs from samples, wherever a maneuver is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.arguments import file_path, number, quoted, real_array, within
+from vehiclemor.errors import FileError, InputError, blamed, one_line
+from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
+from vehiclemor.piecewise import HOLDS, Pieces, through
+from vehiclemor.registry import unknown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Time (s) between output times, as of the registered maneuvers of vehicles.
+OUTPUT_STEP = 0.02
+# Time (s) between the samples that are taken of a function.
+FUNCTION_STEP = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Signal(Maneuver):
+    """Inputs through samples; made by `from_samples` and its kin.
+
+    It begins with the first sample and ends with the last.  `perturbed` scales its time, so its
+    duration, and its values.
+
+    Attributes
+    ----------
+    inputs
+        Names of the inputs that are given; empty if they are all of a model's, in its order.
+    hold
+        What lies between samples.
+    pieces
+        Polynomials for factors of 1.
+    kept
+        What is made of it when it is first run.
+    """
+
+    hold: str = "linear"
+    pieces: Pieces = None  # type: ignore[assignment]
+    kept: dict[Any, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """The constructors have checked."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Signal) and self._identity == other._identity
+
+    def __hash__(self) -> int:
+        return hash(self._identity)
+
+    @property
+    def _identity(self) -> tuple[Any, ...]:
+        factors = self.frequency_factor, self.amplitude_factor
+        return id(self.pieces), self.inputs, self.samples, factors
+
+    @classmethod
+    def from_samples(
+        cls,
+        t: Any,
+        u: Any,
+        hold: str = "linear",
+        *,
+        inputs: Sequence[str] = (),
+        output_step: float = OUTPUT_STEP,
+        name: str = "signal",
+    ) -> Signal:
+        """A signal through samples.
+
+        Parameters
+        ----------
+        t
+            Increasing times (n,) in s; the run begins with the first of them.
+        u
+            Inputs (n,) or (n, inputs) at these times, SI units.
+        hold
+            Between samples: `linear`; `zero`, each sample until the next, so that the last only
+            ends the run; `cubic`, the spline with continuous second derivatives.
+        inputs
+            Names of the columns; by default they are all inputs of a model, in its order.  Inputs
+            that a model has besides are 0, but where they are derivatives of one that is given
+            (`s_dot` and `s_ddot` of `s`) these.
+        output_step
+            About the time in s between output times.
+
+        Raises
+        ------
+        InputError
+            If times don't increase, a value isn't finite, or shapes don't fit.
+        """
+        if hold not in HOLDS:
+            raise unknown("hold", hold, HOLDS)
+        times, values = _samples(t, u)
+        names = _names(inputs, values.shape[1])
+        duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
+        samples = _output_samples(duration, output_step)
+        pieces = through(times, values, hold)
+        return cls(
+            name,
+            f"{len(times)} samples, {hold} hold",
+            _no_function,
+            names,
+            duration,
+            samples,
+            _no_corners,
+            hold=hold,
+            pieces=pieces,
+        )
+
+    @property
+    def polynomials(self) -> Pieces:
+        """Polynomials with the factors."""
+        frequency, amplitude = self.frequency_factor, self.amplitude_factor
+        if frequency == amplitude == 1.0:
+            return self.pieces
+        if "polynomials" not in self.kept:
+            inputs = self.pieces.coefficients.shape[1]
+            orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
+            scaled = self.pieces.scaled(frequency, amplitude * frequency**orders)
+            self.kept["polynomials"] = scaled
+        return self.kept["polynomials"]
+
+    def _with(self, **changes: Any) -> Signal:
+        """The signal with other attributes, in a third of the time that `replace` takes."""
+        found = object.__new__(type(self))
+        found.__dict__.update(self.__dict__ | {"kept": {}} | changes)
+        return found
+
+    @property
+    def break_points(self) -> tuple[float, ...]:
+        """Times in s inside the run at which a time loop begins anew."""
+        return tuple(self.polynomials.edges[1:-1].tolist())
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Inputs (n, number of inputs) at the given times (n,) in s."""
+        return self.polynomials.at(np.asarray(times, dtype=float))
+
+    def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
+        """The signal with its factors set: so much faster and shorter, so many times as large."""
+        if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
+            return self
+        frequency = checked_factor("frequency", frequency)
+        return self._with(
+            frequency_factor=frequency,
+            amplitude_factor=checked_factor("amplitude", amplitude),
+            duration=float(self.pieces.edges[-1]) / frequency,
+        )
+
+    def for_inputs(self, names: tuple[str, ...]) -> Signal:
+        """The signal with all inputs of a model, in its order.
+
+        Raises
+        ------
+        InputError
+            If it gives an input that the model doesn't have, or unnamed columns, but not as many.
+        """
+        if self.inputs == names:
+            return self
+        if names not in self.kept:
+            self.kept[names] = self._completed(names)
+        return self.kept[names]
+
+    def _completed(self, names: tuple[str, ...]) -> Signal:
+        columns, needed = self.pieces.coefficients.shape[1], ", ".join(names)
+        if not self.inputs and columns != len(names):
+            raise InputError(
+                f"{self} has {columns} columns without names, the model needs {needed}: "
+                f"name those that are given by inputs=[...]"
+            )
+        for name in self.inputs:
+            if name not in names:
+                raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
+        if not self.inputs:
+            return self._with(inputs=names)
+        coefficients = np.stack([self._column(name) for name in names], axis=1)
+        pieces = self.pieces._replace(coefficients=coefficients)
+        return self._with(inputs=names, pieces=pieces)
+
+    def _column(self, name: str) -> np.ndarray:
+        """Polynomials (pieces, 6) of an input, at factors of 1."""
+        pieces, order = self.pieces, 0
+        while name not in self.inputs:
+            lower = _integral(name)
+            if not lower:
+                return np.zeros_like(pieces.coefficients[:, 0])
+            name, order = lower, order + 1
+        if order and self.hold != "cubic":
+            raise InputError(f"{self}: derivatives of {name} follow from a cubic hold alone")
+        for _ in range(order):
+            pieces = pieces.derivative()
+        return pieces.coefficients[:, self.inputs.index(name)]
+
+    @classmethod
+    def from_function(
+        cls,
+        function: Callable[[np.ndarray], Any],
+        duration: float,
+        hold: str = "cubic",
+        *,
+        inputs: Sequence[str] = (),
+        step: float = FUNCTION_STEP,
+        **further: Any,
+    ) -> Signal:
+        """A signal through samples of a function; what lies between these is not seen.
+
+        Parameters
+        ----------
+        function
+            Times (n,) in s -> inputs (n,) or (n, inputs).
+        duration
+            In s.
+        step
+            About the time in s between samples.
+        **further
+            As of `from_samples`, which tells the rest.
+        """
+        within("duration of a signal", number("duration", duration), (0.0, LONGEST_DURATION), " s")
+        times = np.linspace(0.0, duration, _output_samples(duration, step))
+        with blamed("function of a signal"):
+            values = function(times)
+        return cls.from_samples(times, values, hold, inputs=inputs, **further)
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | Path,
+        hold: str = "linear",
+        *,
+        time: str = "time",
+        inputs: Sequence[str] | Mapping[str, str] = (),
+        **further: Any,
+    ) -> Signal:
+        """A signal through the rows of a CSV file, whose first line names its columns.
+
+        Parameters
+        ----------
+        time
+            Column of the times in s.
+        inputs
+            Columns to take, or input -> column where they have other names; all by default.
+        **further
+            As of `from_samples`, which tells the rest.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or it is none.
+        """
+        import pandas as pd
+
+        file = file_path("path", path)
+        try:
+            table = pd.read_csv(file, skipinitialspace=True)
+        except FileNotFoundError:
+            raise FileError(f"{file}: no such file") from None
+        except OSError as error:
+            raise FileError(f"{file}: can't be read ({error.strerror})") from None
+        except ValueError as error:
+            raise FileError(f"{file}: no CSV file: {one_line(error)}") from None
+        columns = {str(name): table[name].to_numpy() for name in table.columns}
+        return cls._of_columns(str(file), columns, time, inputs, hold, further)
+
+    @classmethod
+    def from_xarray(
+        cls,
+        data: xr.DataArray | xr.Dataset,
+        hold: str = "linear",
+        *,
+        time: str = "time",
+        inputs: Sequence[str] | Mapping[str, str] = (),
+        **further: Any,
+    ) -> Signal:
+        """A signal through labelled data.
+
+        Parameters
+        ----------
+        data
+            Dataset with one variable an input, array of one input, or array of several whose second
+            dimension names them, as the `inputs` of a result.
+        time
+            Dimension of the times in s.
+        inputs
+            As of `from_csv`.
+        **further
+            As of `from_samples`, which tells the rest.
+        """
+        import xarray as xr
+
+        if not isinstance(data, xr.DataArray | xr.Dataset):
+            raise InputError(f"data is {quoted(data)}, neither a DataArray nor a Dataset of xarray")
+        if time not in data.coords or data[time].dims != (time,):
+            raise InputError(f"the data have no times: a coordinate {time!r} is needed")
+        if isinstance(data, xr.DataArray):
+            others = [name for name in data.dims if name != time]
+            data = data.to_dataset(dim=others[0]) if others else data.to_dataset(name=data.name)
+        own = {name: array for name, array in data.data_vars.items() if array.dims == (time,)}
+        columns = {str(name): array.to_numpy() for name, array in own.items()}
+        columns[time] = data[time].to_numpy()
+        return cls._of_columns("the data", columns, time, inputs, hold, further)
+
+    @classmethod
+    def _of_columns(
+        cls,
+        where: str,
+        columns: Mapping[str, np.ndarray],
+        time: str,
+        inputs: Sequence[str] | Mapping[str, str],
+        hold: str,
+        further: Mapping[str, Any],
+    ) -> Signal:
+        """A signal of named columns, one of which holds the times."""
+        chosen = inputs or [name for name in columns if name != time]
+        chosen = chosen if isinstance(chosen, Mapping) else dict(zip(chosen, chosen, strict=True))
+        for name in (time, *chosen.values()):
+            if name not in columns:
+                known = ", ".join(columns)
+                raise InputError(f"{where}: there is no column {quoted(name)} among {known}")
+        values = np.column_stack([columns[name] for name in chosen.values()] or [np.empty(0)])
+        return cls.from_samples(columns[time], values, hold, inputs=[*chosen], **further)
+
+
+def _no_function(*_: Any) -> np.ndarray:
+    raise NotImplementedError("a signal is evaluated by its polynomials")
+
+
+def _no_corners(_: float) -> tuple[float, ...]:
+    raise NotImplementedError("the corners of a signal are in its polynomials")
+
+
+def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) in s from zero on and inputs (n, inputs) of a signal, checked."""
+    try:
+        times, values = real_array(t), real_array(u)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"samples of a signal: {one_line(error)}") from None
+    if times.ndim != 1 or values.ndim not in (1, 2) or len(values) != len(times):
+        raise InputError(
+            f"samples of a signal: t has shape {times.shape} and u {values.shape}, "
+            f"not (n,) and (n,) or (n, inputs)"
+        )
+    if len(times) < 2:
+        raise InputError(f"a signal needs two samples at least, not {len(times)}")
+    values = values.reshape(len(times), -1)
+    within("number of samples", len(times), (2, MOST_SAMPLES))
+    for name, array in (("t", times), ("u", values)):
+        if not np.isfinite(array).all():
+            row = int(np.argwhere(~np.isfinite(array))[0, 0])
+            raise InputError(f"samples of a signal: {name}[{row}] is not finite")
+    falls = (times[1:] <= times[:-1]).nonzero()[0]
+    if len(falls):
+        row = int(falls[0])
+        raise InputError(
+            f"samples of a signal: times must increase, t[{row + 1}] = {times[row + 1]:.6g} s "
+            f"follows {times[row]:.6g} s"
+        )
+    return times - times[0], values
+
+
+def _names(inputs: Any, columns: int) -> tuple[str, ...]:
+    """Names of the columns, or none."""
+    whole = isinstance(inputs, Sequence) and not isinstance(inputs, str)
+    if not whole or not all(isinstance(name, str) for name in inputs):
+        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
+    names = tuple(inputs)
+    if len(set(names)) < len(names) or len(names) not in (0, columns):
+        raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
+    return names
+
+
+def _output_samples(duration: float, step: Any) -> int:
+    """Number of times about so many seconds apart."""
+    if number("step", step) <= 0.0:
+        raise InputError(f"step: {step:g} s is not positive")
+    samples = max(round(duration / step), 1) + 1
+    return int(within("number of samples", samples, (2, MOST_SAMPLES)))
+
+
+def _integral(name: str) -> str:
+    """Name of the input whose derivative an input is by its own name, if it is one."""
+    base, dot, order = name.rpartition("_")
+    if order == "ddot":
+        return f"{base}_dot"
+    return base if dot and order == "dot" else ""
+
+
+def _order(name: str, inputs: Sequence[str]) -> int:
+    """How often one of the inputs has been derived from the lowest of them."""
+    lower = _integral(name)
+    return 1 + _order(lower, inputs) if lower in inputs else 0

@@ -1,0 +1,210 @@
+"""Steps of a system from one time to another, each of them one call of the compiled time loop.
+
+What the loop reads lies in arrays that are overwritten from step to step: nothing is packed anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from ctypes import c_double
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from vehiclemor.codegen.loops import Prepared, ready
+from vehiclemor.errors import ConvergenceError
+from vehiclemor.simulation.integrators.structures import Output, Signal, Spans
+from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
+from vehiclemor.simulation.run_plans import NO_POINTS, Solver
+from vehiclemor.simulation.system import REASONS, System
+from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
+
+# Shortest step in s: the time loop takes times that differ by less for one.
+SHORTEST = 1e-9
+
+
+class StepSpace(NamedTuple):
+    """Arrays of one step at a time, and the loop that reads them.
+
+    Attributes
+    ----------
+    state, end, counts, buffer
+        At the beginning (n,), at the end (1, n); counts and scratch space of the loop.
+    times
+        What is overwritten with the length of the step, wherever it stands last.
+    window
+        Number (1,) of the projection window.
+    coefficients
+        Of the inputs (1, inputs, 6).
+    means
+        Origins (windows, n) of the subspaces.
+    first
+        The word of the first step to try, as a number.
+    """
+
+    call: Prepared
+    state: np.ndarray
+    end: np.ndarray
+    counts: np.ndarray
+    buffer: np.ndarray
+    times: tuple[np.ndarray, ...]
+    window: np.ndarray
+    coefficients: np.ndarray
+    means: np.ndarray
+    first: c_double
+
+
+class Stepper:
+    """A system as a function of a state, the inputs and a length of time.
+
+    Steps are independent of one another: the same arguments give the same state, in any thread.
+
+    Parameters
+    ----------
+    windows
+        Formulation of the system and its subspaces; in more windows than one the time tells which.
+    solver, tolerance
+        Integrator and its tolerance.
+    moved
+        Whether the state at the beginning is the origin of the window's subspace.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        windows: ProjectionWindows,
+        solver: str,
+        tolerance: float,
+        moved: bool = False,
+    ) -> None:
+        self.system, self.windows, self.moved = system, windows, moved
+        self.solver = Solver(solver, tolerance)
+        self._spare: list[StepSpace] = []
+
+    def step(
+        self,
+        state: np.ndarray,
+        inputs: np.ndarray,
+        dt: float,
+        time: float = 0.0,
+        next_inputs: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """State (n,) after dt s; inputs are held, or go straight to those at the end.
+
+        Raises
+        ------
+        ConvergenceError
+            If the integration fails.
+        """
+        try:
+            space = self._spare.pop()
+        except IndexError:
+            space = self._space()
+        space.state[:] = state
+        slope = None if next_inputs is None else (next_inputs - inputs) / dt
+        for begin, length, window in self._parts(time, dt):
+            space.coefficients[0, :, 0] = inputs
+            space.coefficients[0, :, 1] = 0.0
+            if slope is not None:
+                space.coefficients[0, :, 0] += begin * slope
+                space.coefficients[0, :, 1] = length * slope
+            for array in space.times:
+                array[-1] = length
+            space.first.value = length
+            space.window[0] = window
+            if self.moved:
+                space.means[window] = space.state
+            space.counts.fill(0)
+            status = space.call()
+            if status:
+                reached = time + begin + space.buffer[0]
+                raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
+            space.state[:] = space.end[0]
+        found = space.state.copy()
+        self._spare.append(space)
+        return found
+
+    def _parts(self, time: float, dt: float) -> Iterator[tuple[float, float, int]]:
+        """Parts of a step in one window each: beginning after `time`, length, window."""
+        edges = self.windows.edges
+        if len(edges) == 2:
+            yield 0.0, dt, 0
+            return
+        slack = 1e-9 * max(float(edges[-1]), 1.0)
+        first, last = np.searchsorted(edges[1:-1], (time + slack, time + dt - slack)).tolist()
+        cuts = [0.0, *(edges[first + 1 : last + 1] - time).tolist(), dt]
+        for window, (begin, end) in enumerate(pairwise(cuts), start=first):
+            yield begin, end - begin, window
+
+    def _space(self) -> StepSpace:
+        edges, coefficients = np.zeros(2), np.zeros((1, self.system.inputs, 6))
+        span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
+        counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
+        signal = ready(Signal(edges, one, np.empty(0), coefficients))
+        spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
+        n = len(self.system.error_scale)
+        output = Output(sample, np.empty((1, n)), counts, *NO_POINTS, np.inf)
+        windows = self.windows
+        if self.moved:
+            windows = replace(windows, means=windows.means.copy())
+        loop, given, (n, floats, integers) = self.system.loop(
+            windows, self.solver, signal, spans, output
+        )
+        arguments = given._replace(
+            start=np.empty(n), buffer=np.empty(floats), integers=np.empty(integers, dtype=np.int64)
+        )
+        call = loop.prepared(*arguments)
+        first = c_double.from_buffer(call.words, 8 * call.address("control.first"))
+        return StepSpace(
+            call,
+            arguments.start,
+            output.path,
+            counts,
+            arguments.buffer,
+            (edges, span, sample),
+            window,
+            coefficients,
+            windows.means,
+            first,
+        )
+
+    def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
+        """Time derivative (n,) of a state; of a projected one where its subspace is nearest."""
+        spaces, n = self.windows, len(state)
+        rates = self._evaluated("derivative", state, inputs, n)
+        if spaces.formulation == "full":
+            return rates
+        window = next(self._parts(time, 2.0 * SHORTEST))[2]
+        rank, mean = int(spaces.ranks[window]), state if self.moved else spaces.means[window]
+        trial, test = spaces.trial_basis[window, :rank], spaces.test_basis[window, :rank]
+        if spaces.formulation == "state":
+            place = mean + test @ (state - mean) @ trial
+            return test @ self._evaluated("derivative", place, inputs, n) @ trial
+        half = n // 2
+        trial, test = trial[: rank // 2, :half], test[: rank // 2, :half]
+        q = mean[:half] + test @ (state[:half] - mean[:half]) @ trial
+        moved = test @ rates[:half] @ trial
+        speeds = self._evaluated("speeds", np.concatenate([q, moved]), inputs, half)
+        place = np.concatenate([q, speeds])
+        table = self._evaluated("second_order", place, inputs, half * (half + 1))
+        mass, force = np.split(table.reshape(half, half + 1), [half], axis=1)
+        projected = np.linalg.solve(trial @ mass @ trial.T, trial @ force)[:, 0] @ trial
+        # Speeds are linear in the rates, so their change is too in what projection takes away.
+        change = np.concatenate([q, projected - np.linalg.solve(mass, force)[:, 0]])
+        free = self._evaluated("derivative", place, inputs, n)[half:]
+        return np.concatenate([moved, free + self._evaluated("speeds", change, inputs, half)])
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: Along
+    ) -> np.ndarray:
+        """Analytic derivatives (n, columns) of the rates."""
+        window = next(self._parts(time, 2.0 * SHORTEST))[2]
+        return rate_derivatives(self.system, self.windows, window, state, inputs, by)
+
+    def _evaluated(
+        self, kernel: str, state: np.ndarray, inputs: np.ndarray, size: int
+    ) -> np.ndarray:
+        return self.system.along(kernel, state[None], inputs[None], size)[0]

@@ -1,0 +1,212 @@
+"""A model in use: what it is made of, what it gives, and what it refuses with one clear line."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.maneuver import Maneuver, smooth
+from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.registry import component
+from vehiclemor.simulation.integrators.catalogue import MOST_CALLS
+from vehiclemor.study.scenario import Scenario
+
+CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
+
+
+@pytest.fixture(scope="module")
+def full() -> ReducedOrderModel:
+    return vm.reduce(CAR, "full_order")
+
+
+@pytest.fixture(scope="module")
+def linear(full) -> ReducedOrderModel:
+    return vm.reduce(full.model, "linear_single_track", training="nominal")
+
+
+@pytest.fixture(scope="module")
+def wishbone() -> ReducedOrderModel:
+    return vm.reduce(WISHBONE, "path_map", cells=8, degree=2)
+
+
+def test_it_tells_what_it_is(full, linear, wishbone):
+    assert full.states == full.model.coordinates + full.model.speeds
+    assert (full.inputs, full.output_names) == (full.model.inputs, full.model.outputs)
+    assert full.parameters["sprung_mass"] == full.model.parameters["sprung_mass"]
+    assert linear.states == ("z0", "z1", "z2", "psi", "X", "Y")
+    assert len(linear.state()) == len(linear.states)
+    assert wishbone.states == wishbone.model.coordinates
+    assert linear.settings["solver"] == "ros34pw2"
+    assert len(repr(linear)) < 500
+
+
+def test_the_full_model_answers_as_the_model_itself(full):
+    x, u = full.state("dropped"), [0.02]
+    np.testing.assert_array_equal(x, full.model.start("dropped"))
+    np.testing.assert_array_equal(full.rhs(x, u), full.model.derivative(x, u))
+    np.testing.assert_array_equal(full.full_state(x, u), x)
+    expected = full.model.outputs_at(x[None], np.array([u]))[0]
+    np.testing.assert_array_equal(full.outputs(x, u), expected)
+    path, inputs = np.stack([x, 1.01 * x]), np.array([u, [0.01]])
+    rows = [full.outputs(*pair) for pair in zip(path, inputs, strict=True)]
+    np.testing.assert_array_equal(full.outputs(path, inputs), rows)
+
+
+def test_a_run_is_a_dataset_when_asked(linear):
+    run = linear.simulate("step_steer", start="dropped")
+    dataset = linear.dataset(run)
+    assert dataset["outputs"].shape == run.outputs.shape
+    assert dataset["time"].attrs["units"] == "s"
+    np.testing.assert_array_equal(linear.simulate().inputs, linear.simulate("lane_change").inputs)
+
+
+def test_a_step_is_a_function_of_its_arguments_alone(linear):
+    states = [linear.state(start) for start in linear.model.starts]
+    inputs = [[0.0], [0.01], [-0.02]]
+    ways = [(u, dt, ends) for u in inputs for dt in (0.001, 0.02, 1.0) for ends in (None, [0.01])]
+    cases = 20 * [(x, u, dt, 0.0, ends) for x in states for u, dt, ends in ways]
+    known = [linear.step(*case) for case in cases]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda case: linear.step(*case), reversed(cases)))
+    np.testing.assert_array_equal(found[::-1], known)
+
+
+def test_a_loop_may_go_on_for_ever(linear):
+    state, u = linear.state(), np.zeros(1)
+    for _ in range(MOST_CALLS // 3):
+        state = linear.step(state, u, 1e-3)
+    assert state[linear.states.index("X")] == pytest.approx(MOST_CALLS // 3 * 20e-3, rel=1e-6)
+
+
+def test_two_short_steps_are_a_long_one(full):
+    x = full.state("dropped")
+    long = full.step(x, [0.0], 0.2, next_inputs=[0.03])
+    half = full.step(x, [0.0], 0.1, next_inputs=[0.015])
+    found = full.step(half, [0.015], 0.1, next_inputs=[0.03])
+    np.testing.assert_allclose(found, long, rtol=1e-5, atol=1e-5)
+
+
+def test_methods_that_do_not_judge_themselves_know_their_inputs(linear):
+    x, largest = linear.state(), 0.0300768 * 1.2990381
+    assert linear.trust(x, [0.9 * largest]).indicator == pytest.approx(0.9, rel=1e-3)
+    assert linear.trust(x, [0.9 * largest]).reason == ""
+    assert "input delta" in linear.trust(x, [1.1 * largest]).reason
+    run = linear.simulate(component("maneuver", "lane_change").perturbed(1.0, 1.3))
+    assert run.status == "untrusted"
+
+
+def test_nothing_is_trusted_where_the_full_model_means_nothing(full):
+    upright, lying = full.state(), full.state()
+    lying[full.states.index("phi")] = 1.4
+    assert full.trust(upright, [0.0]).reason == ""
+    assert "the model holds" in full.trust(lying, [0.0]).reason
+
+
+def test_outside_of_its_training_a_path_map_tells_so(wishbone):
+    q = wishbone.state(inputs=[0.05, 0.01])
+    solved = wishbone.model.solve([0.05, 0.01])
+    np.testing.assert_allclose(q, solved, atol=1e-5)
+    assert wishbone.trust(q, [0.05, 0.01]).reason == ""
+    assert "outside of the training" in wishbone.trust(q, [0.125, 0.01]).reason
+
+
+def lifted_wheel() -> Maneuver:
+    def signal(times: np.ndarray, _: float, __: float) -> np.ndarray:
+        return np.stack([0.1 * times, 0.0 * times], axis=1)
+
+    return Maneuver("lift", "", signal, ("z", "s0"), 1.0, 11, smooth)
+
+
+def test_training_is_a_name_or_what_is_handed_in(full, wishbone):
+    car, own = full.model, Scenario(component("maneuver", "lane_change"), "equilibrium")
+    assert len(wishbone.training) == 1
+    assert wishbone.training[0].maneuver.name == "travel_and_rack"
+    # A method that does not compete in the protocol.
+    assert vm.reduce(car, "pod").training == (own,)
+    assert vm.reduce(car, "pod", training=[own.maneuver]).training == (own,)
+    dropped = Scenario(own.maneuver, "dropped", 21.0)
+    assert vm.reduce(car, "pod", training=[dropped]).training == (dropped,)
+    assert vm.reduce(wishbone.model, "path_map", training=[lifted_wheel()], cells=2).training
+
+
+WRONG = {
+    "kind of training": (
+        lambda: vm.reduce(WISHBONE, "pod", training="matched"),
+        "unknown training",
+    ),
+    "no training": (lambda: vm.reduce(WISHBONE, "pod", training=[]), "training is \\[\\]"),
+    "training of another model": (
+        lambda: vm.reduce(WISHBONE, "pod", training=[component("maneuver", "lane_change")]),
+        "gives inputs delta",
+    ),
+    "no maneuver": (lambda: vm.reduce(WISHBONE, "pod", training=[3]), "3 is not a maneuver"),
+    "method": (lambda: vm.reduce(WISHBONE, "podd"), "did you mean"),
+    "setting": (lambda: vm.reduce(WISHBONE, "pod", ranc=3), "did you mean"),
+    "refused": (lambda: vm.reduce(WISHBONE, "two_track"), "reduces kind"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_cannot_be_reduced_is_refused(case):
+    call, said = WRONG[case]
+    with pytest.raises(InputError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+BAD_STEPS = {
+    "long state": ({"state": np.zeros(7)}, r"state has shape \(7,\), .* needs \(6,\)"),
+    "full state": ({"state": np.zeros(28)}, r"state has shape \(28,\)"),
+    "states": ({"state": np.zeros((2, 6))}, r"state has shape \(2, 6\)"),
+    "text": ({"state": "dropped"}, "state is 'dropped', .* needs 6 numbers"),
+    "not finite": ({"state": [0, 0, np.nan, 0, 0, 0]}, r"state\[2\] is not finite"),
+    "inputs": ({"inputs": [0.0, 0.0]}, r"inputs has shape \(2,\), .* needs \(1,\)"),
+    "input": ({"inputs": [np.inf]}, r"inputs\[0\] is not finite"),
+    "next inputs": ({"next_inputs": []}, r"next_inputs has shape \(0,\)"),
+    "zero": ({"dt": 0.0}, "dt is 0.0; it must be a finite number"),
+    "backwards": ({"dt": -0.1}, "dt is -0.1"),
+    "nan": ({"dt": np.nan}, "dt is nan"),
+    "text as step": ({"dt": "0.1"}, "dt is '0.1'"),
+    "too short": ({"dt": 1e-12}, "dt is 1e-12"),
+    "time": ({"time": np.inf}, "time: inf is not finite"),
+    "no time": ({"time": None}, "time: None is not a number"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_STEPS)
+def test_wrong_steps_are_refused(linear, case):
+    changed, said = BAD_STEPS[case]
+    with pytest.raises(InputError, match=said) as error:
+        linear.step(**{"state": linear.state(), "inputs": [0.0], "dt": 0.01} | changed)
+    assert "\n" not in str(error.value)
+
+
+def test_a_wrong_sample_is_refused(linear):
+    states = np.zeros((3, 6))
+    with pytest.raises(InputError, match=r"inputs have shape \(2, 1\), not \(3, 1\)"):
+        linear.outputs(states, np.zeros((2, 1)))
+    with pytest.raises(InputError, match=r"states have shape \(3, 5\)"):
+        linear.outputs(states[:, :5], np.zeros((3, 1)))
+
+
+def test_methods_without_a_state_say_so(wishbone):
+    replay = vm.reduce(wishbone.model, "replay")
+    assert replay.states == ()
+    assert replay.simulate().status == "ok"
+    with pytest.raises(InputError, match="replay has no state: it gives whole runs alone"):
+        replay.state()
+    with pytest.raises(InputError, match="kinematic: its equations have no rates"):
+        wishbone.rhs(wishbone.state(), [0.0, 0.0])
+
+
+def test_a_step_that_fails_says_when(full):
+    # Upside down on a tire that is pressed by more than it can bear.
+    x = full.state()
+    x[full.states.index("Z")] = -40.0
+    with pytest.raises(ConvergenceError, match="at t = 3"):
+        full.step(x, [0.0], 0.5, time=3.0)
+    # Nothing of it is left in the next step.
+    good = full.state()
+    np.testing.assert_allclose(full.step(good, [0.0], 1e-3)[:2], [20e-3, 0.0], atol=1e-6)

@@ -1,0 +1,77 @@
+"""Control periods that start from the full model: its limits, and what that is good for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.projection.restarted import RestartedProjection
+from vehiclemor.registry import component
+from vehiclemor.simulation.projection_windows import ProjectionWindows
+
+CAR = "independent_suspension_vehicle"
+
+
+@pytest.fixture(scope="module")
+def car():
+    return vm.model(CAR)
+
+
+@pytest.fixture(scope="module")
+def maneuver():
+    # Of a few seconds, with more steering than the training has.
+    return replace(component("maneuver", "lane_change"), duration=4.0, samples=201).perturbed(
+        1.0, 1.2
+    )
+
+
+def errors(car, maneuver, restart: str, **settings: object) -> np.ndarray:
+    """Distances (samples,) of the place and heading from the full model's, in their scales."""
+    rom = vm.reduce(car, "pod", restart=restart, **settings)
+    run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
+    apart = (run.states - full.states)[:, car.planar] / car.error_scale[car.planar]
+    return np.abs(apart).max(axis=1)
+
+
+def test_with_all_directions_it_is_the_full_model(car, maneuver):
+    windows, states = 4, len(car.definition.states)
+    eye = np.tile(np.eye(states), (windows, 1, 1))
+    means = np.random.default_rng(1).normal(size=(windows, states))
+    ranks, edges = np.full(windows, states), np.linspace(0.0, 4.0, windows + 1)
+    spaces = ProjectionWindows("state", edges, means, eye, eye, ranks)
+    full = car.simulate(maneuver)
+    for moved in (True, False):
+        reduced = RestartedProjection(
+            car, car.system, spaces, states, Offline(), "dopri5", 1e-9, moved=moved
+        )
+        run = reduced.simulate(maneuver, "equilibrium")
+        np.testing.assert_allclose(run.states, full.states, rtol=1e-6, atol=1e-6)
+        assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
+
+
+@pytest.mark.parametrize("formulation", ["coordinates", "state"])
+def test_errors_grow_within_a_period_alone(car, maneuver, formulation):
+    own, projected, restarted = (
+        errors(car, maneuver, restart, formulation=formulation)
+        for restart in ("own", "projected", "full_model")
+    )
+    assert own[-1] > 0.1
+    # Projected onto the training's subspace, a state is one of the training run again.
+    assert projected.max() > 0.3 * own.max()
+    # Nothing is carried on from one period to the next.
+    assert restarted[-1] < 0.01 * own[-1]
+    # A period is 25 samples: what follows an edge is better than what comes before it.
+    assert np.all(restarted[76::25] < 0.2 * restarted[75::25].max())
+
+
+def test_steps_begin_at_the_state_that_they_are_given(car, maneuver):
+    rom = vm.reduce(car, "pod", restart="full_model", formulation="state")
+    run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
+    state = full.states[75]
+    for sample in range(75, 100):
+        u, ends = maneuver.at(run.time[[sample, sample + 1]])
+        state = rom.step(state, u, 0.02, run.time[sample], ends)
+        # Straight lines between the samples stand for the steering.
+        np.testing.assert_allclose(state, run.states[sample + 1], rtol=1e-3, atol=1e-3)
