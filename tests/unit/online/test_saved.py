@@ -270,7 +270,7 @@ FEATURES = "reduced.fields.features.fields"
         (f"{FEATURES}.lines.tuple", [{"tuple": ["a = 1.0\n    _x", "z0"]}]),
         (f"{FEATURES}.diagonal.tuple", [9, 9]),
         (
-            "fields.error_scale",
+            "reduced.fields.error_scale",
             {"array": "reduced.parameters", "kind": "f", "shape": [1], "turned": False},
         ),
     ],
