@@ -271,7 +271,7 @@ FEATURES = "reduced.fields.features.fields"
         (f"{FEATURES}.diagonal.tuple", [9, 9]),
         (
             "reduced.fields.error_scale",
-            {"array": "reduced.parameters", "kind": "f", "shape": [1], "turned": False},
+            {"array": "reduced.parameters", "type": "float64", "shape": [1], "turned": False},
         ),
     ],
 )
