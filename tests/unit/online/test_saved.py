@@ -282,6 +282,26 @@ def test_parts_that_would_do_harm_are_refused(saved, place, value, monkeypatch, 
 
 
 @pytest.mark.parametrize(
+    "name",
+    [
+        "os:system",
+        "subprocess:run",
+        "builtins:eval",
+        "vehiclemor.files:write_text",
+        "vehiclemor.cli.app:main",
+        "vehiclemor.reduction.no_such_room:thing",
+        "vehiclemor.reduction.vehicle.features:Features.blocks",
+        "vehiclemor.reduction.vehicle.features:PLANAR",
+        # Defined elsewhere.
+        "vehiclemor.reduction.vehicle.shape:dataclass",
+    ],
+)
+def test_names_of_other_things_are_refused(name):
+    with pytest.raises(ValueError, match="there is no"):
+        parts.named(name)
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "_result[99999] = _x[0]",
