@@ -166,7 +166,7 @@ def simulate(
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.maneuver import Maneuver
-    from vehiclemor.simulation.checks import checked_maneuver
+    from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment

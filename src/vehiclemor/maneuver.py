@@ -37,6 +37,9 @@ class Maneuver(ShortRepr):
         Frequency factor -> times (s) at which the inputs are not smooth.
     frequency_factor, amplitude_factor
         Perturbation; 1 is the nominal maneuver.
+    linear_in_amplitude
+        Whether all inputs are proportional to the amplitude factor: then runs that differ in it
+        alone share what is made of the signal.
 
     Raises
     ------
@@ -55,6 +58,7 @@ class Maneuver(ShortRepr):
     corners: Callable[[float], tuple[float, ...]]
     frequency_factor: float = 1.0
     amplitude_factor: float = 1.0
+    linear_in_amplitude: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no maneuver, so that its author reads one clear line."""
@@ -86,11 +90,6 @@ class Maneuver(ShortRepr):
     def times(self) -> np.ndarray:
         """Equidistant output times (samples,) in s."""
         return np.linspace(0.0, self.duration, self.samples)
-
-    @property
-    def recorded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Output times (samples,) in s, and the inputs (samples, number of inputs) at them."""
-        return (times := self.times), self.at(times)
 
     @property
     def break_points(self) -> tuple[float, ...]:
@@ -173,6 +172,7 @@ sine_travel = Maneuver(
     duration=10.0,
     samples=1001,
     corners=smooth,
+    linear_in_amplitude=True,
 )
 chirp_travel = replace(
     sine_travel,

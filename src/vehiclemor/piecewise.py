@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-DEGREE = 5
-# Samples whose spacing differs by less, relative to it, are equidistant.
-EQUIDISTANT = 1e-9
+# Times that differ by so little, relative to what they are, are one.
+ROUNDING = 1e-12
+# Samples whose spacings differ by less, relative to them, are equidistant.
+EQUIDISTANT = 1e-8
+# Change of slope beside that of the neighbouring samples, times the spacing or `FINE` (s), relative
+# to the largest value: from here on a sample is a break point.  Measured on the 14-DOF vehicle, ten
+# seconds at 100 Hz, tolerance 2e-3: noise of 0.03 % or a triangle of 10 s, run through, move it to
+# the side by 0.12 and 1.4 m, else by less than 0.01 m.
+KINK, FINE = 1e-3, 0.01
 # A stretch of equal samples is quiet from so long (s) on: a run at rest could step over its end.
 QUIET = 0.1
 
@@ -26,8 +31,8 @@ class Pieces(NamedTuple):
     starts
         Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
     coefficients
-        Polynomials (pieces, inputs, 6) in the part of the piece that has passed, lowest power
-        first.
+        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
+        power first.
     """
 
     edges: np.ndarray
@@ -51,7 +56,7 @@ class Pieces(NamedTuple):
     def derivative(self) -> Pieces:
         """By time; jumps have none."""
         rates = np.zeros_like(self.coefficients)
-        rates[:, :, :-1] = self.coefficients[:, :, 1:] * np.arange(1.0, DEGREE + 1)
+        rates[:, :, :-1] = self.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
         return self._replace(coefficients=rates / self.lengths[:, None, None])
 
     def at(self, times: np.ndarray) -> np.ndarray:
@@ -67,7 +72,8 @@ class Pieces(NamedTuple):
             return rows, (times - starts[rows]) / self.lengths[rows]
         segments: Any = 0
         if len(edges) > 2:
-            segments = np.searchsorted(edges, times, side="right") - 1
+            reached = times + ROUNDING * (1.0 + times)
+            segments = np.searchsorted(edges, reached, side="right") - 1
             segments = np.clip(segments, 0, len(edges) - 2)
         pieces, begin = first[segments + 1] - first[segments], edges[segments]
         places = (times - begin) / (edges[segments + 1] - begin) * pieces
@@ -76,10 +82,10 @@ class Pieces(NamedTuple):
 
 
 def evaluated(coefficients: np.ndarray, rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """Values (..., n, inputs) of polynomials (..., pieces, inputs, 6), see `Pieces.located`."""
+    """Values (..., n, inputs) of polynomials (..., pieces, inputs, :), see `Pieces.located`."""
     own, parts = coefficients[..., rows, :, :], parts[:, None]
-    values = own[..., DEGREE]
-    for power in range(DEGREE - 1, -1, -1):
+    values = own[..., -1]
+    for power in range(own.shape[-1] - 2, -1, -1):
         values = own[..., power] + parts * values
     return values
 
@@ -88,16 +94,16 @@ def held(times: np.ndarray, values: np.ndarray) -> Pieces:
     """Each sample until the next; jumps are break points, the last sample only ends the run."""
     jumps = (values[1:-1] != values[:-2]).any(axis=1).nonzero()[0] + 1
     rows = np.concatenate([[0], jumps])
-    coefficients = _constant(values[rows])
     edges = np.concatenate([times[rows], times[-1:]])
-    return Pieces(edges, np.arange(len(edges)), np.empty(0), coefficients)
+    return Pieces(edges, np.arange(len(edges)), np.empty(0), values[rows, :, None])
 
 
 def linear(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Coefficients of straight lines between samples."""
     del times
-    coefficients = _constant(values[:-1])
-    coefficients[:, :, 1] = np.diff(values, axis=0)
+    coefficients = np.empty((len(values) - 1, values.shape[1], 2))
+    coefficients[:, :, 0] = values[:-1]
+    np.subtract(values[1:], values[:-1], out=coefficients[:, :, 1])
     return coefficients
 
 
@@ -106,14 +112,14 @@ def cubic(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(times, values)
-    coefficients = np.zeros((*spline.c.shape[1:], DEGREE + 1))
+    coefficients = np.empty((*spline.c.shape[1:], len(spline.c)))
     lengths = np.diff(times)[:, None]
     for power in range(len(spline.c)):
         coefficients[:, :, power] = spline.c[-1 - power] * lengths**power
     return coefficients
 
 
-# Coefficients (intervals, inputs, 6) that don't depend on what other columns hold.
+# Coefficients (intervals, inputs, degree + 1) that don't depend on what other columns hold.
 CONTINUOUS = {"linear": linear, "cubic": cubic}
 HOLDS = ("linear", "zero", "cubic")
 
@@ -122,36 +128,45 @@ def through(times: np.ndarray, values: np.ndarray, hold: str) -> Pieces:
     """Polynomials through samples (n, inputs) by one of `HOLDS`."""
     if hold == "zero":
         return held(times, values)
-    return joined(times, values, CONTINUOUS[hold](times, values))
+    return joined(times, bent(times, values), CONTINUOUS[hold](times, values))
 
 
-def _constant(values: np.ndarray) -> np.ndarray:
-    coefficients = np.zeros((*values.shape, DEGREE + 1))
-    coefficients[:, :, 0] = values
-    return coefficients
+def joined(times: np.ndarray, bends: np.ndarray, coefficients: np.ndarray) -> Pieces:
+    """One piece for each interval; segments end where samples are `bent`."""
+    lengths, ends = np.diff(times), [[0], bends.nonzero()[0] + 1, [len(times) - 1]]
+    first = np.concatenate(ends) if bends.any() else np.array([0, len(lengths)])
+    even = lengths.max() - lengths.min() <= EQUIDISTANT * lengths[0]
+    return Pieces(times[first], first, np.empty(0) if even else times[:-1].copy(), coefficients)
 
 
-def joined(times: np.ndarray, values: np.ndarray, coefficients: np.ndarray) -> Pieces:
-    """One piece for each interval; segments end where a quiet stretch begins or ends."""
-    first = _quiet_ends(times, values)
-    edges, starts = times[first], np.empty(0)
-    for a, b in pairwise(first):
-        step = (times[b] - times[a]) / (b - a)
-        off = times[a : b + 1] - (times[a] + step * np.arange(b - a + 1))
-        if np.abs(off).max() > EQUIDISTANT * step:
-            starts = times[:-1].copy()
-            break
-    return Pieces(edges, first, starts, coefficients)
+def bent(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Which of the inner samples (n - 2,) are break points: kinks, and ends of quiet."""
+    return _kinks(np.diff(times), values) | _quiet_ends(times, values)
+
+
+def _kinks(lengths: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """At which of the inner samples (n - 2,) the slope changes otherwise than beside it.
+
+    A curve that is sampled finely bends by as much from sample to sample; what is left of noise,
+    corners and coarse samples is what an integrator must not step over.
+    """
+    lengths = lengths[:, None]
+    spacing = 0.5 * (lengths[1:] + lengths[:-1])
+    slopes = (values[1:] - values[:-1]) / lengths
+    bends = np.zeros((len(values), values.shape[1]))
+    np.divide(slopes[1:] - slopes[:-1], spacing, out=bends[1:-1])
+    off = np.abs(bends[1:-1] - 0.5 * (bends[:-2] + bends[2:]))
+    largest = np.maximum(values.max(axis=0), -values.min(axis=0))
+    return (off * spacing * np.maximum(spacing, FINE) > KINK * largest).any(axis=1)
 
 
 def _quiet_ends(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Numbers of the samples at which segments begin and end."""
-    last = len(times) - 1
+    """At which of the inner samples (n - 2,) a stretch of equal samples begins or ends."""
     moves = (values[1:] != values[:-1]).any(axis=1)
-    changes = (moves[1:] != moves[:-1]).nonzero()[0] + 1
-    ends = np.concatenate([[0], changes, [last]])
-    if len(changes):
-        quiet = ~moves[ends[:-1]] & (np.diff(times[ends]) >= QUIET)
-        # A change is one of segments if what lies on one of its sides is quiet.
-        ends = ends[np.concatenate([[True], quiet[1:] | quiet[:-1], [True]])]
-    return ends.astype(np.int64)
+    inner = moves[1:] != moves[:-1]
+    if inner.any():
+        changes = np.concatenate([[0], inner.nonzero()[0] + 1, [len(times) - 1]])
+        quiet = ~moves[changes[:-1]] & (np.diff(times[changes]) >= QUIET)
+        # A change counts if what lies on one of its sides is quiet.
+        inner[changes[1:-1] - 1] = quiet[1:] | quiet[:-1]
+    return inner

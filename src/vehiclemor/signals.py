@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -115,24 +114,24 @@ class Signal(Maneuver):
             pieces=pieces,
         )
 
-    @cached_property
+    @property
     def polynomials(self) -> Pieces:
         """Polynomials with the factors."""
         frequency, amplitude = self.frequency_factor, self.amplitude_factor
         if frequency == amplitude == 1.0:
             return self.pieces
-        inputs = self.pieces.coefficients.shape[1]
-        orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
-        return self.pieces.scaled(frequency, amplitude * frequency**orders)
+        if "polynomials" not in self.kept:
+            inputs = self.pieces.coefficients.shape[1]
+            orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
+            scaled = self.pieces.scaled(frequency, amplitude * frequency**orders)
+            self.kept["polynomials"] = scaled
+        return self.kept["polynomials"]
 
-    @property
-    def recorded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Output times (samples,) in s, and the inputs (samples, number of inputs) at them."""
-        if "recorded" not in self.kept:
-            inputs = np.ascontiguousarray(self.at(times := _times(self.duration, self.samples)))
-            inputs.flags.writeable = False
-            self.kept["recorded"] = times, inputs
-        return self.kept["recorded"]
+    def _with(self, **changes: Any) -> Signal:
+        """The signal with other attributes, in a third of the time that `replace` takes."""
+        found = object.__new__(type(self))
+        found.__dict__.update(self.__dict__ | {"kept": {}} | changes)
+        return found
 
     @property
     def break_points(self) -> tuple[float, ...]:
@@ -148,12 +147,10 @@ class Signal(Maneuver):
         if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
             return self
         frequency = checked_factor("frequency", frequency)
-        return replace(
-            self,
+        return self._with(
             frequency_factor=frequency,
             amplitude_factor=checked_factor("amplitude", amplitude),
             duration=float(self.pieces.edges[-1]) / frequency,
-            kept={},
         )
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
@@ -181,10 +178,10 @@ class Signal(Maneuver):
             if name not in names:
                 raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
         if not self.inputs:
-            return replace(self, inputs=names, kept={})
+            return self._with(inputs=names)
         coefficients = np.stack([self._column(name) for name in names], axis=1)
         pieces = self.pieces._replace(coefficients=coefficients)
-        return replace(self, inputs=names, pieces=pieces, kept={})
+        return self._with(inputs=names, pieces=pieces)
 
     def _column(self, name: str) -> np.ndarray:
         """Polynomials (pieces, 6) of an input, at factors of 1."""
@@ -335,14 +332,6 @@ def _no_function(*_: Any) -> np.ndarray:
 
 def _no_corners(_: float) -> tuple[float, ...]:
     raise NotImplementedError("the corners of a signal are in its polynomials")
-
-
-@lru_cache(maxsize=64)
-def _times(duration: float, samples: int) -> np.ndarray:
-    """Equidistant times, shared by all signals of that length."""
-    times = np.linspace(0.0, duration, samples)
-    times.flags.writeable = False
-    return times
 
 
 def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:

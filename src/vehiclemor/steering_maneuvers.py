@@ -132,7 +132,8 @@ def _steered(
         return amplitude * LANE_CHANGE_AMPLITUDE * shape(times, frequency)[:, :1]
 
     samples = round(duration * RATE) + 1
-    return Maneuver(name, summary, signal, ("delta",), duration, samples, corners)
+    maneuver = Maneuver(name, summary, signal, ("delta",), duration, samples, corners)
+    return replace(maneuver, linear_in_amplitude=True)
 
 
 def _racked(steered: Maneuver, shape: Shape, summary: str = "") -> Maneuver:

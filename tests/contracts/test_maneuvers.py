@@ -36,6 +36,7 @@ def test_inputs_are_finite_and_of_the_right_shape(
 
 
 def test_amplitude_scales_the_inputs(maneuver: Maneuver) -> None:
+    assert maneuver.linear_in_amplitude
     times = maneuver.times
     inputs = maneuver.at(times)
     scaled = maneuver.perturbed(amplitude=-1.5).at(times)

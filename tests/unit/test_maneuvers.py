@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation.checks import check_resolved
+from vehiclemor.simulation.maneuver_checks import check_resolved
 
 factors = st.floats(0.1, 4.0)
 

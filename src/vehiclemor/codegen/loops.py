@@ -8,6 +8,7 @@ import inspect
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from types import ModuleType
 from typing import Any, get_args
@@ -62,7 +63,7 @@ class Prepared:
         See `compiler.compiled_loops`.
     """
 
-    __slots__ = ("_entry", "_kept", "_places", "words")
+    __slots__ = ("_entry", "_given", "_kept", "_places", "words")
 
     def __init__(
         self,
@@ -72,11 +73,18 @@ class Prepared:
         arguments: tuple[Any, ...],
     ) -> None:
         self._entry, self._places, self._kept = entry, places, arguments
+        self._given: dict[str, Ready] = {}
         self.words = (ctypes.c_int64 * (len(packed) // 8)).from_buffer_copy(packed)
 
     def __call__(self) -> int:
         """Run the loop; the lock of the interpreter is released meanwhile."""
         return self._entry(self.words)
+
+    def give(self, name: str, bundle: Ready) -> None:
+        """Replace an argument that is a bundle."""
+        place = ctypes.addressof(self.words) + LONG.size * self._places[name]
+        ctypes.memmove(place, bundle.words, len(bundle.words))
+        self._given[name] = bundle
 
     @property
     def entry(self) -> int:
@@ -106,9 +114,11 @@ class Loop:
         self._kinds = [_kinds(kind, argument) for argument, kind in declared.items()]
         self._entry, self._code = _ENTRY(code.address(name)), code
         self._places, place = {}, 0
-        for part, _, dimensions in (kind for kinds in self._kinds for kind in kinds):
-            self._places[part] = place
-            place += dimensions + 1
+        for argument, kinds in zip(declared, self._kinds, strict=True):
+            self._places[argument] = place
+            for part, _, dimensions in kinds:
+                self._places[part] = place
+                place += dimensions + 1
 
     def __call__(self, *arguments: Any) -> int:
         """Run the loop; the lock of the interpreter is released meanwhile."""
@@ -243,7 +253,8 @@ def _entry(modules: Sequence[ModuleType], name: str) -> Any:
     return next(found for m in reversed(modules) if inspect.isfunction(found := vars(m).get(name)))
 
 
-def _kinds(declared: Any, name: str = "") -> list[Kind]:
+@cache
+def _kinds(declared: Any, name: str = "") -> Sequence[Kind]:
     """Name, type code and dimensions of the parts of a declared type."""
     if not hasattr(declared, "_fields"):
         _, number, dimensions = get_args(declared)

@@ -20,9 +20,10 @@ from vehiclemor.online.batch_result import Found, Selection
 from vehiclemor.online.batch_signals import Given, Signals, addresses, given_of
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.simulation.checks import checked_maneuver, lifted_wheels, out_of_validity
+from vehiclemor.simulation.checks import lifted_wheels, out_of_validity
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.paths import PATH_LOOPS
 from vehiclemor.simulation.projection_windows import smooth_spans, whole_space
 from vehiclemor.simulation.run_plans import Solver

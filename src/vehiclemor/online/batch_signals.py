@@ -12,12 +12,12 @@ from vehiclemor.arguments import real_array
 from vehiclemor.codegen.loops import address_of_array, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.piecewise import CONTINUOUS, DEGREE, evaluated, joined
+from vehiclemor.piecewise import CONTINUOUS, bent, evaluated, joined
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
-from vehiclemor.simulation.checks import cut_short
 from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import structures
+from vehiclemor.simulation.maneuver_checks import cut_short
 
 
 class Given(NamedTuple):
@@ -131,12 +131,13 @@ class Signals(Sequence[Signal], ShortRepr):
         if self.hold not in CONTINUOUS:
             return given_of([self[run].for_inputs(names) for run in range(len(self))], times)
         coefficients = self._coefficients()
+        own_times = self.t - self.t[0]
         patterns: dict[bytes, list[int]] = {}
-        moves = (self.u[:, 1:] != self.u[:, :-1]).any(axis=2)
-        for run, pattern in enumerate(moves):
+        bends = [bent(own_times, u) for u in self.u]
+        for run, pattern in enumerate(bends):
             patterns.setdefault(pattern.tobytes(), []).append(run)
         pieces = [
-            (runs, joined(self.t - self.t[0], self.u[runs[0]], coefficients[runs[0]]))
+            (runs, joined(own_times, bends[runs[0]], coefficients[runs[0]]))
             for runs in patterns.values()
         ]
         if not whole:
@@ -164,11 +165,11 @@ class Signals(Sequence[Signal], ShortRepr):
         return Given(table, edges, inputs, [""] * len(self), (coefficients, kept))
 
     def _coefficients(self) -> np.ndarray:
-        """Polynomials (runs, intervals, inputs, 6)."""
+        """Polynomials (runs, intervals, inputs, degree + 1)."""
         runs, n, columns = self.u.shape
         side_by_side = self.u.swapaxes(0, 1).reshape(n, runs * columns)
         found = CONTINUOUS[self.hold](self.t - self.t[0], side_by_side)
-        found = found.reshape(n - 1, runs, columns, DEGREE + 1)
+        found = found.reshape(n - 1, runs, columns, -1)
         return np.ascontiguousarray(found.swapaxes(0, 1))
 
 

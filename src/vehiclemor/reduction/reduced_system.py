@@ -14,7 +14,6 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import checked_maneuver
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.kernel_derivatives import (
@@ -28,6 +27,7 @@ from vehiclemor.simulation.kernel_derivatives import (
     parameter_names,
     partial,
 )
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.rate_derivatives import Along
 from vehiclemor.simulation.run_plans import Run, Solver
@@ -201,6 +201,7 @@ class ReducedSystem(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
         """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         run = self.run(maneuver, start, begin=begin)
         inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))

@@ -21,7 +21,6 @@ from vehiclemor.simulation.checks import (
     check_positive,
     checked_array,
     checked_inputs,
-    checked_maneuver,
     output_times,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
@@ -29,6 +28,7 @@ from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.kinematic_derivatives import kinematic_derivatives
 from vehiclemor.simulation.lane_loops import LaneKernels
 from vehiclemor.simulation.lane_runs import LaneRuns
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,6 @@ from vehiclemor.arguments import number, quoted, real_array, within
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.signals import Signal
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -78,86 +76,6 @@ def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.nd
     return inputs
 
 
-def checked_maneuver(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
-    """A maneuver, a signal with all inputs that a model has.
-
-    Raises
-    ------
-    InputError
-        If it is none, gives other inputs than the model has, or one that leaves the bounds in which
-        the model declares that it means anything.
-    """
-    if not isinstance(maneuver, Maneuver):
-        wrong = quoted(maneuver)
-        raise InputError(f"{wrong} is not a maneuver: get one by its name from the registry")
-    if not isinstance(maneuver, Signal):
-        _check_inputs(maneuver, definition)
-        return maneuver
-    if definition not in maneuver.kept:
-        complete = maneuver.for_inputs(tuple(quantity.name for quantity in definition.inputs))
-        _check_bounds(complete, definition)
-        maneuver.kept[definition] = complete
-    return maneuver.kept[definition]
-
-
-# A maneuver is checked once for all its runs.
-@lru_cache(maxsize=64)
-def _check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
-    names = tuple(quantity.name for quantity in definition.inputs)
-    if maneuver.inputs != names:
-        raise InputError(
-            f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
-            f"{definition.name} needs {', '.join(names)}"
-        )
-    _check_bounds(maneuver, definition)
-
-
-def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
-    units = {quantity.name: quantity.unit for quantity in definition.inputs}
-    bounded = {name: b for name, b in definition.validity.items() if name in units}
-    if not bounded:
-        return
-    times, values = maneuver.recorded
-    for name, (low, high) in bounded.items():
-        column = values[:, maneuver.inputs.index(name)]
-        outside = np.flatnonzero(np.isfinite(column) & ((column < low) | (column > high)))
-        if len(outside):
-            sample, unit = outside[0], units[name]
-            raise InputError(
-                f"{maneuver}: input {name} is {column[sample]:.4g} {unit} at t = "
-                f"{times[sample]:.6g} s; {definition.name} holds from {low:g} to {high:g} {unit}"
-            )
-
-
-def check_resolved(maneuver: Maneuver) -> None:
-    """Raise `InputError` if the output times are too far apart to show the inputs.
-
-    Between two output times without a corner an input stays within a quarter of its range of the
-    straight line, as a sine of three samples a period does; it may leave it once.  A signal is
-    known between them.
-    """
-    times, between = maneuver.times, 0.38
-    if len(times) == 1 or isinstance(maneuver, Signal):
-        return
-    step = times[1]
-    values = maneuver.at(times)
-    inside = maneuver.at(times[:-1] + between * step)
-    # What is not finite is found, with its time, by whoever solves it.
-    if not (np.isfinite(values).all() and np.isfinite(inside).all()):
-        return
-    off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])
-    everywhere = np.concatenate([values, inside])
-    wrong = off > 0.25 * (everywhere.max(axis=0) - everywhere.min(axis=0))
-    corners = np.searchsorted(times, maneuver.break_points, side="right") - 1
-    wrong[corners[(corners >= 0) & (corners < len(wrong))]] = False
-    column = int(wrong.sum(axis=0).argmax())
-    if wrong[:, column].sum() > 1:
-        raise InputError(
-            f"{maneuver}: at a frequency factor of {maneuver.frequency_factor:g} input "
-            f"{maneuver.inputs[column]} changes faster than output times {step:g} s apart can show"
-        )
-
-
 def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     """Raise `InputError` if a value is no finite positive number, or is below the smallest."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
@@ -166,15 +84,6 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     if not (number and 0.0 < float(value) < np.inf and float(value) >= smallest):  # type: ignore[arg-type]
         bound = f"at least {smallest:g}" if smallest else "positive"
         raise InputError(f"{name} is {quoted(value)}; it must be a finite number, {bound}")
-
-
-@lru_cache(maxsize=64)
-def cut_short(maneuver: Maneuver) -> str:
-    """That a maneuver goes on after the end of its run, if it does."""
-    last = max(maneuver.break_points, default=0.0)
-    if last <= maneuver.duration:
-        return ""
-    return f"the maneuver would end at {last:.4g} s, after the run"
 
 
 def output_times(

@@ -14,8 +14,6 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
-    checked_maneuver,
-    cut_short,
     left_validity,
     lifted_wheels,
     limits_of,
@@ -24,6 +22,7 @@ from vehiclemor.simulation.checks import (
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.kernel_derivatives import By, chosen
+from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
@@ -347,9 +346,9 @@ class DynamicModel(Model):
         That is the number of all samples where it never is.
         """
         samples, n, m = len(run.times), 2 * len(self.coordinates), len(self.outputs)
-        held = run.kept.get("delivered")
-        if held is None or held.states is not states or held.inputs is not inputs:
-            held = run.kept["delivered"] = self._delivery(run, inputs, states)
+        held, at = run.kept.get("delivered"), run.recorded_at(inputs)[1]
+        if held is None or held.states is not states or held.inputs is not at:
+            held = run.kept["delivered"] = self._delivery(run, at, states)
         # Rows of whole vectors.
         width = -(-(n + m) // LANES) * LANES
         result, address = cache_lines(samples, width)
@@ -365,15 +364,14 @@ class DynamicModel(Model):
         return whole, outputs, found
 
     def _delivery(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> Delivery:
-        """The loop of `_delivered`, to be given a result."""
+        """The loop of `_delivered`, to be given a result; inputs are where the run is recorded."""
         n, samples = 2 * len(self.coordinates), len(run.times)
         width = -(-(n + len(self.outputs)) // LANES) * LANES
-        at = run.recorded_at(inputs)[1]
         observer = self.observer(LANES if run.rows >= LANES else 1)
         first = np.empty(len(self.limits[1]), dtype=np.int64)
         scratch = cache_lines(len(states) + 1, width)[0].reshape(-1)
         loop, result = path_loops()["delivered"], np.empty((0, width))
-        call = loop.prepared(states, at, run.places, observer, scratch, result, first)
+        call = loop.prepared(states, inputs, run.places, observer, scratch, result, first)
         rows, into = call.address("states") + 1, call.address("result")
         call.words[into + 1] = samples
         return Delivery(states, inputs, first, call, rows, into)

@@ -11,14 +11,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor import signals
+from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.signals import Signal as GivenSignal
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11
+SIGNAL_LOOPS = "simulation.integrators.structures", "simulation.formulations.inputs"
 MOST_PIECES = 1 << 15
 DEGREE = 5
 # Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
@@ -27,13 +28,40 @@ KEPT = 512
 
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    return maneuver.recorded if isinstance(maneuver, GivenSignal) else _recorded(maneuver)
+    if not isinstance(maneuver, signals.Signal):
+        return _recorded(maneuver)
+    # Kept with the signal, so not longer than it.
+    if "recorded" not in maneuver.kept:
+        ready, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
+        inputs = np.empty((len(times), ready.bundle.coefficients.shape[1]))
+        loops(SIGNAL_LOOPS, ("sampled",))["sampled"](ready, times, inputs)
+        inputs.flags.writeable = False
+        maneuver.kept["recorded"] = times, inputs
+    return maneuver.kept["recorded"]
+
+
+def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:
+    """The maneuver to which another is proportional, if it declares that it is."""
+    if not maneuver.linear_in_amplitude or maneuver.amplitude_factor == 1.0:
+        return None
+    return maneuver.perturbed(maneuver.frequency_factor)
+
+
+@lru_cache(maxsize=64)
+def _times(duration: float, samples: int) -> np.ndarray:
+    times = np.linspace(0.0, duration, samples)
+    times.flags.writeable = False
+    return times
 
 
 @lru_cache(maxsize=KEPT)
 def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    times, inputs = maneuver.recorded
-    inputs = loop_array(inputs)
+    if (unit := _of_unit_amplitude(maneuver)) is not None:
+        times, inputs = _recorded(unit)
+        inputs = maneuver.amplitude_factor * inputs
+    else:
+        times = maneuver.times
+        inputs = loop_array(maneuver.at(times))
     times.flags.writeable = inputs.flags.writeable = False
     return times, inputs
 
@@ -46,7 +74,7 @@ def signal_of(maneuver: Maneuver) -> Ready:
     InputError
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
-    if not isinstance(maneuver, GivenSignal):
+    if not isinstance(maneuver, signals.Signal):
         return _found_signal(maneuver)
     if "ready" not in maneuver.kept:
         maneuver.kept["ready"] = ready(Signal(*maneuver.polynomials))
@@ -62,6 +90,10 @@ def _found_signal(maneuver: Maneuver) -> Ready:
     InputError
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
+    if (unit := _of_unit_amplitude(maneuver)) is not None:
+        signal: Signal = _found_signal(unit).bundle
+        coefficients = maneuver.amplitude_factor * signal.coefficients
+        return ready(signal._replace(coefficients=coefficients))
     inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
     edges = np.array([0.0, *inner, maneuver.duration])
     probe = np.linspace(0.0, maneuver.duration, 1001)

@@ -11,6 +11,8 @@ from vehiclemor.simulation.integrators.structures import Spans, Subspaces
 
 # Of the equations that are integrated; see the modules of these names in `formulations`.
 FORMULATIONS = ("full", "state", "coordinates")
+# Lists of spans that are kept.
+MOST_SPANS = 64
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class ProjectionWindows(ShortRepr):
             return ready(smooth_spans(breaks, self.edges, end, begin))
         key = breaks.tobytes(), end
         if key not in self._spans:
+            if len(self._spans) >= MOST_SPANS:
+                self._spans.clear()
             self._spans[key] = ready(smooth_spans(breaks, self.edges, end))
         return self._spans[key]
 

@@ -12,6 +12,7 @@ from vehiclemor.simulation.integrators.structures import NODES, Output
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
+NO_BUNDLE = Ready(None, b"")
 # Of a run that is recorded at the samples: no inputs, points and places.
 NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
 
@@ -71,28 +72,57 @@ class RunArguments(NamedTuple):
     integers: np.ndarray
 
 
+class Drive(NamedTuple):
+    """What of a maneuver goes into a run.
+
+    Attributes
+    ----------
+    signal, spans
+        Piecewise polynomials, and the parts of the run.
+    inputs
+        At the output times (samples, inputs).
+    """
+
+    signal: Ready
+    spans: Ready
+    inputs: np.ndarray
+
+
 class Space:
     """Arrays of one run at a time and, packed once, the loop that writes them.
 
     Attributes
     ----------
     arguments
-        Of the loop.
+        Of the loop; those of a maneuver may have been replaced.
     call
         The loop with these.
+    signal
+        Of the last run.
+    given
+        Inputs at the samples (samples, inputs); none if its plan is not kept.
     kept
         What other loops have made of the run; their spaces last as long.
     """
 
-    __slots__ = ("arguments", "call", "kept")
+    __slots__ = ("arguments", "call", "given", "kept", "signal")
 
-    def __init__(self, loop: Loop, arguments: RunArguments) -> None:
-        self.arguments, self.call = arguments, loop.prepared(*arguments)
+    def __init__(self, plan: Plan, drive: Drive) -> None:
+        self.arguments, self.given = plan.fresh(drive)
+        self.call, self.signal = plan.loop.prepared(*self.arguments), drive.signal
         self.kept: dict[str, Any] = {}
+
+    def take(self, drive: Drive) -> None:
+        """Have the next run driven by another maneuver of the same output times."""
+        self.call.give("signal", drive.signal)
+        self.call.give("spans", drive.spans)
+        self.signal = drive.signal
+        if self.given is not None:
+            self.given[:] = drive.inputs
 
 
 class Plan(NamedTuple):
-    """What runs of a system over the same maneuver share.
+    """What runs of a system over the same output times share.
 
     Attributes
     ----------
@@ -100,8 +130,10 @@ class Plan(NamedTuple):
         Those that are not shared are empty.
     sizes
         Numbers of states, of floats of scratch space and of integers.
-    given
-        Inputs (samples, inputs) at the samples, for a run that is recorded at points, else none.
+    whole
+        Whether it is over whole maneuvers, and kept.
+    points
+        Whether its runs are recorded at points.
     windows
         Kept alive: a plan is found by the object.
     spare
@@ -111,34 +143,38 @@ class Plan(NamedTuple):
     loop: Loop
     arguments: RunArguments
     sizes: tuple[int, int, int]
-    given: np.ndarray | None
+    whole: bool
+    points: bool
     windows: ProjectionWindows
     spare: list[Space]
 
-    def fresh(self) -> RunArguments:
-        """Arguments with arrays of their own; the start is still to be written."""
+    def fresh(self, drive: Drive) -> tuple[RunArguments, np.ndarray | None]:
+        """Arguments with arrays of their own, the start still to be written; inputs of a space."""
         (n, floats, integers), output = self.sizes, self.arguments.output
-        size, given = len(output.samples), self.given
+        size, given = len(output.samples), drive.inputs.copy() if self.whole else None
         counts = np.empty(len(DYNAMIC_COUNTS), dtype=np.int64)
         output = output._replace(path=np.empty((size, n)), counts=counts)
-        if given is not None:
+        if self.points and given is not None:
             moments, places = np.empty(size), np.empty((size, 2))
             output = output._replace(
                 given=given, inputs=np.empty(given.shape), moments=moments, places=places
             )
-        return self.arguments._replace(
+        arguments = self.arguments._replace(
             start=np.empty(n),
+            signal=drive.signal,
+            spans=drive.spans,
             output=output,
             buffer=np.empty(floats),
             integers=np.empty(integers, dtype=np.int64),
         )
+        return arguments, given
 
-    def space(self) -> Space:
-        """A space that no other run holds, in whichever thread."""
+    def spare_space(self) -> Space | None:
+        """A space that no other run holds, in whichever thread; none if there is none left."""
         try:
             return self.spare.pop()
         except IndexError:
-            return Space(self.loop, self.fresh())
+            return None
 
 
 class Run:
@@ -202,9 +238,15 @@ class Run:
         return Points(inputs[: self.rows], moments[: self.rows], self.places)
 
     def recorded_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Times (s) and inputs of its rows, or of more; those at the samples are given."""
-        if self.space is None or not len(self.places):
+        """Times (s) and inputs of its rows, or of more; those at the samples are given.
+
+        Of a space that is used again they always stand in the same place.
+        """
+        if self.space is None:
             return self.times, inputs
+        if not len(self.places):
+            own = self.space.given
+            return self.times, inputs if own is None else own
         output = self.space.arguments.output
         return output.moments, output.inputs
 

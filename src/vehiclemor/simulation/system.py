@@ -31,17 +31,20 @@ from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_plans import (
+    NO_BUNDLE,
     NO_POINTS,
+    Drive,
     Plan,
     Run,
     RunArguments,
     Solver,
+    Space,
 )
 from vehiclemor.simulation.run_timer import timed
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
-# Maneuvers whose plans are kept.
+# Plans that are kept.
 MOST_PLANS = 64
 REASONS = {
     TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side",
@@ -245,7 +248,11 @@ class System(ShortRepr):
             If a value is out of bounds or a name is unknown.
         """
         plan = self._found(maneuver, windows, solver, direct_until)
-        space = plan.space()
+        signal, space = signal_of(maneuver), plan.spare_space()
+        if space is None:
+            space = Space(plan, self._drive(maneuver, plan, solver))
+        elif space.signal is not signal:
+            space.take(self._drive(maneuver, plan, solver))
         start, output = space.arguments.start, space.arguments.output
         assert len(state) == len(start), f"{len(state)} states, not {len(start)}"
         start[:] = state
@@ -266,7 +273,7 @@ class System(ShortRepr):
     ) -> tuple[Loop, RunArguments]:
         """The compiled loop of a run and its arguments; see `run`."""
         plan = self._found(maneuver, windows, solver, direct_until)
-        arguments = plan.fresh()
+        arguments, _ = plan.fresh(self._drive(maneuver, plan, solver))
         arguments.start[:] = state
         arguments.output.counts.fill(0)
         return plan.loop, arguments
@@ -278,14 +285,15 @@ class System(ShortRepr):
         solver: Solver,
         direct_until: float,
     ) -> Plan:
-        """Plan of a run; kept if it is over the whole maneuver."""
+        """Plan of a run; kept if it is over a whole maneuver, for all with its output times."""
         name, tolerance, times, longest, begin = solver
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
         if longest is not None:
             check_positive("longest_step", longest)
         if times is not None or begin:
             return self._plan(maneuver, windows, solver, direct_until)
-        key = maneuver, id(windows), name, tolerance, longest, direct_until
+        length = maneuver.duration, maneuver.samples
+        key = length, id(windows), name, tolerance, longest, direct_until
         plan = self._plans.get(key)
         if plan is None:
             plan = self._plan(maneuver, windows, solver, direct_until)
@@ -293,6 +301,13 @@ class System(ShortRepr):
                 self._plans.clear()
             self._plans[key] = plan
         return plan
+
+    def _drive(self, maneuver: Maneuver, plan: Plan, solver: Solver) -> Drive:
+        """What of a maneuver goes into a run of a plan."""
+        signal, times = signal_of(maneuver), plan.arguments.output.samples
+        end = float(times[-1]) if len(times) else maneuver.duration
+        spans = plan.windows.spans(signal.bundle.edges, end, solver.begin)
+        return Drive(signal, spans, recorded_inputs(maneuver)[1])
 
     @cached_property
     def _plans(self) -> dict[tuple, Plan]:
@@ -305,19 +320,15 @@ class System(ShortRepr):
         solver: Solver,
         direct_until: float,
     ) -> Plan:
-        """What runs of a maneuver share."""
-        times = output_times(solver.times, maneuver, begin=solver.begin)
-        signal = signal_of(maneuver)
-        end = float(times[-1]) if len(times) else maneuver.duration
-        spans = windows.spans(signal.bundle.edges, end, solver.begin)
-        nothing = np.empty(0)
+        """What runs over the output times of a maneuver share."""
+        times, nothing = output_times(solver.times, maneuver, begin=solver.begin), np.empty(0)
         output = Output(times, nothing, nothing, *NO_POINTS, direct_until)
-        loop, arguments, sizes = self.loop(windows, solver, signal, spans, output)
+        loop, arguments, sizes = self.loop(windows, solver, NO_BUNDLE, NO_BUNDLE, output)
         modules = catalogue.integrator(solver.name).modules
-        cubic = solver.times is None and not solver.begin and "cubic" in modules
-        cubic = cubic and len(times) >= LANES and direct_until < times[-1]
-        given = recorded_inputs(maneuver)[1] if cubic else None
-        return Plan(loop, arguments, sizes, given, windows, [])
+        whole = solver.times is None and not solver.begin
+        points = whole and "cubic" in modules
+        points = points and len(times) >= LANES and direct_until < times[-1]
+        return Plan(loop, arguments, sizes, whole, points, windows, [])
 
     def loop(
         self,

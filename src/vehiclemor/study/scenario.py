@@ -14,7 +14,7 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import TrainingRun, policy_factors
 from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.checks import check_resolved, checked_maneuver
+from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 

@@ -1,5 +1,7 @@
 """Inputs as piecewise polynomials equal the maneuvers that they are made from."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,8 @@ from hypothesis import strategies as st
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.maneuver import Maneuver, smooth
+from vehiclemor.piecewise import Pieces
 from vehiclemor.registry import component
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
 from vehiclemor.simulation.integrators.structures import Signal
@@ -178,3 +181,25 @@ def test_a_single_value_that_is_no_number_is_found_between_the_probes():
     # Not at one of the thousand equidistant times, but where the polynomials are made.
     with pytest.raises(InputError, match="not finite"):
         signal_of(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), np.nan, np.cos(t))))
+
+
+def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
+    calls = []
+
+    def inputs(times, frequency, amplitude):
+        calls.append(amplitude)
+        return (amplitude * np.sin(frequency * times))[:, None]
+
+    linear = Maneuver("mine", "", inputs, ("u",), 3.0, 11, smooth, linear_in_amplitude=True)
+    general = dataclasses.replace(linear, linear_in_amplitude=False)
+    for frequency in (1.0, 2.0):
+        signal_of(linear.perturbed(frequency, 3.0))
+        calls.clear()
+        scaled = signal_of(linear.perturbed(frequency, -0.7))
+        assert not calls
+        searched = signal_of(general.perturbed(frequency, -0.7))
+        assert set(calls) == {-0.7}
+        np.testing.assert_array_equal(scaled.edges, searched.edges)
+        times = np.linspace(0.0, 3.0, 997)
+        found, wanted = (Pieces(*signal).at(times) for signal in (scaled, searched))
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-15)

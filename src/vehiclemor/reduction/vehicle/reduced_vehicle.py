@@ -16,6 +16,7 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
@@ -150,6 +151,7 @@ class ReducedVehicle(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
+        maneuver = checked_maneuver(maneuver, self.model.definition)
         known, inputs = self.known(start), recorded_inputs(maneuver)[1]
         run = self.equations.run(maneuver, start, direct_until=known.until)
         states, trust = self.lift.of_run(run, inputs, known.excited)

@@ -24,8 +24,8 @@ class Signal(NamedTuple):
     starts
         Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
     coefficients
-        Polynomials (pieces, inputs, 6) in the part of the piece that has passed, lowest power
-        first.
+        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
+        power first.
     """
 
     edges: Vector

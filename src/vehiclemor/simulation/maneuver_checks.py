@@ -1,0 +1,107 @@
+"""Checks of maneuvers at the border of a model that is ready to run."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from vehiclemor.arguments import quoted
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.signals import Signal
+from vehiclemor.simulation.input_polynomials import recorded_inputs
+
+
+def checked_maneuver(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
+    """A maneuver, a signal with all inputs that a model has.
+
+    Raises
+    ------
+    InputError
+        If it is none, gives other inputs than the model has, or one that leaves the bounds in which
+        the model declares that it means anything.
+    """
+    if not isinstance(maneuver, Maneuver):
+        wrong = quoted(maneuver)
+        raise InputError(f"{wrong} is not a maneuver: get one by its name from the registry")
+    if not isinstance(maneuver, Signal):
+        _check_inputs(maneuver, definition)
+        return maneuver
+    if definition not in maneuver.kept:
+        complete = maneuver.for_inputs(tuple(quantity.name for quantity in definition.inputs))
+        _check_bounds(complete, definition)
+        maneuver.kept[definition] = complete.kept[definition] = complete
+    return maneuver.kept[definition]
+
+
+# A maneuver is checked once for all its runs.
+@lru_cache(maxsize=64)
+def _check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
+    names = tuple(quantity.name for quantity in definition.inputs)
+    if maneuver.inputs != names:
+        raise InputError(
+            f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
+            f"{definition.name} needs {', '.join(names)}"
+        )
+    _check_bounds(maneuver, definition)
+
+
+def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
+    for j, quantity in enumerate(definition.inputs):
+        name, unit = quantity.name, quantity.unit
+        if name not in definition.validity:
+            continue
+        low, high = definition.validity[name]
+        times, values = recorded_inputs(maneuver)
+        column = values[:, j]
+        if low <= np.minimum.reduce(column) and np.maximum.reduce(column) <= high:
+            continue
+        outside = np.flatnonzero(np.isfinite(column) & ((column < low) | (column > high)))
+        if len(outside):
+            sample = outside[0]
+            raise InputError(
+                f"{maneuver}: input {name} is {column[sample]:.4g} {unit} at t = "
+                f"{times[sample]:.6g} s; {definition.name} holds from {low:g} to {high:g} {unit}"
+            )
+
+
+def check_resolved(maneuver: Maneuver) -> None:
+    """Raise `InputError` if the output times are too far apart to show the inputs.
+
+    Between two output times without a corner an input stays within a quarter of its range of the
+    straight line, as a sine of three samples a period does; it may leave it once.  A signal is
+    known between them.
+    """
+    times, between = maneuver.times, 0.38
+    if len(times) == 1 or isinstance(maneuver, Signal):
+        return
+    step = times[1]
+    values = maneuver.at(times)
+    inside = maneuver.at(times[:-1] + between * step)
+    # What is not finite is found, with its time, by whoever solves it.
+    if not (np.isfinite(values).all() and np.isfinite(inside).all()):
+        return
+    off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])
+    everywhere = np.concatenate([values, inside])
+    wrong = off > 0.25 * (everywhere.max(axis=0) - everywhere.min(axis=0))
+    corners = np.searchsorted(times, maneuver.break_points, side="right") - 1
+    wrong[corners[(corners >= 0) & (corners < len(wrong))]] = False
+    column = int(wrong.sum(axis=0).argmax())
+    if wrong[:, column].sum() > 1:
+        raise InputError(
+            f"{maneuver}: at a frequency factor of {maneuver.frequency_factor:g} input "
+            f"{maneuver.inputs[column]} changes faster than output times {step:g} s apart can show"
+        )
+
+
+def cut_short(maneuver: Maneuver) -> str:
+    """That a maneuver goes on after the end of its run, if it does."""
+    return "" if isinstance(maneuver, Signal) else _cut_short(maneuver)
+
+
+@lru_cache(maxsize=64)
+def _cut_short(maneuver: Maneuver) -> str:
+    last = max(maneuver.break_points, default=0.0)
+    if last <= maneuver.duration:
+        return ""
+    return f"the maneuver would end at {last:.4g} s, after the run"
