@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
     from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
@@ -38,6 +39,7 @@ _DEFINED_IN = {
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "export": "vehiclemor.exporting.export",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     "simulate_many": "vehiclemor.online.batches",
@@ -48,6 +50,7 @@ __all__ = [
     "VehiclemorError",
     "compare",
     "describe",
+    "export",
     "figures",
     "load",
     "maneuvers",

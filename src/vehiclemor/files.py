@@ -25,7 +25,7 @@ def make_folder(folder: Path) -> None:
     except (FileExistsError, NotADirectoryError):
         raise FileError(f"{folder}: not a folder") from None
     except OSError as error:
-        raise _not_written(folder, error) from None
+        raise not_written(folder, error) from None
 
 
 def probe_folder(folder: Path) -> None:
@@ -34,10 +34,11 @@ def probe_folder(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise _not_written(folder, error) from None
+        raise not_written(folder, error) from None
 
 
-def _not_written(path: Path, error: Exception) -> FileError | MachineError:
+def not_written(path: Path, error: Exception) -> FileError | MachineError:
+    """The error that tells why a path can't be written."""
     machine = machine_reason(error)
     reason = machine or getattr(error, "strerror", None) or error
     return (MachineError if machine else FileError)(f"{path}: can't be written ({reason})")
@@ -65,7 +66,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
         write(temporary)
         os.replace(temporary, path)
     except OSError as error:
-        raise _not_written(path, error) from None
+        raise not_written(path, error) from None
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from vehiclemor.cli.compare import compare
 from vehiclemor.cli.conversion import strict
 from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
+from vehiclemor.cli.export import export
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.plot import plot
@@ -37,6 +38,7 @@ COMMANDS = {
     "run": run,
     "compare": compare,
     "figures": figures,
+    "export": export,
     "cite": cite,
 }
 for name, command in COMMANDS.items():

@@ -4,6 +4,9 @@ import ast
 
 from vehiclemor.codegen import weighted_sums
 
+# Before the name of an argument: the argument's direction, see `tangent`.
+SEED = "_seed"
+
 
 class KernelText:
     """Text of a kernel as statements that know what they need and what they define.
@@ -50,6 +53,15 @@ class KernelText:
     def flat(self, place: tuple[int, ...]) -> int:
         """Place of an entry in memory, counted in floats."""
         return place[0] if len(place) == 1 else place[0] * self.columns + place[1]
+
+    @property
+    def laned(self) -> list[str]:
+        """Arguments that differ from lane to lane: seeds if there are some, else all but constants.
+
+        In the lanes of a tangent are directions, in those of other kernels samples.
+        """
+        seeds = [name for name in self.arguments if name.startswith(SEED)]
+        return [*seeds, "_result"] if seeds else [n for n in self.pointers if n != "_constants"]
 
     @property
     def pointers(self) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 
 from vehiclemor.codegen import vector_statements, weighted_sums
-from vehiclemor.codegen.kernel_statements import KernelText, places
+from vehiclemor.codegen.kernel_statements import SEED, KernelText, places
 from vehiclemor.codegen.llvm_expressions import LANE, Expressions
 from vehiclemor.codegen.vector_lanes import LANES, RESULTS, WIDTH
 from vehiclemor.codegen.weighted_sums import DOUBLE, VECTOR
@@ -33,11 +33,12 @@ def kernel_module(kernels: Sequence[KernelText], lanes: int = 1) -> ir.Module:
     lanes
         Of how many samples a kernel computes the results at once.  If several, its arguments but
         the constants are rows of matrices, and further arguments say how many floats from one row
-        to the next, in order.
+        to the next, in order.  Of a tangent it is how many directions: only seeds and results are
+        rows, and what does not depend on the direction is computed once.
     """
     module = ir.Module("kernels")
     for kernel in kernels:
-        strided = [name for name in kernel.pointers if name != "_constants"] if lanes > 1 else []
+        strided = kernel.laned if lanes > 1 else []
         kinds = [POINTER] * len(kernel.pointers) + [ir.IntType(64)] * len(strided)
         function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
         function.attributes.add("nounwind")
@@ -86,6 +87,10 @@ class _Writer:
         self._expressions = Expressions(builder)
         self._values: dict[Key, Any] = {}
         self._kind = DOUBLE if lanes == 1 else ir.VectorType(DOUBLE, lanes)
+        laned = kernel.laned
+        self._single = [name for name in kernel.arguments if name not in laned]
+        # In other kernels than tangents every value has lanes.
+        self._mixed = lanes > 1 and any(name.startswith(SEED) for name in laned)
 
     def write(self, statement: ast.stmt) -> None:
         values, value = self._values, self._value
@@ -113,8 +118,9 @@ class _Writer:
                 ),
             ):
                 # One by one, each used at once: registers are few.
-                factors = (value(term) for term in terms)
-                single = self._lanes == 1
+                kind = self._kind_of(ast.Tuple(terms))
+                factors = (value(term, kind) for term in terms)
+                single = kind == DOUBLE
                 sums = weighted_sums.weighted_sums if single else weighted_sums.sums_of_lanes
                 results = sums(self._builder, self._address(array, first), factors, len(elements))
                 values |= zip((ast.unparse(e) for e in elements), results, strict=True)
@@ -133,8 +139,26 @@ class _Writer:
                     f"{ast.unparse(statement)}: {type(statement).__name__} is not straight-line"
                 )
 
-    def _value(self, node: ast.expr) -> Any:
-        return self._expressions.value(node, self._read, self._kind)
+    def _value(self, node: ast.expr, kind: ir.Type | None = None) -> Any:
+        kind = kind or self._kind_of(node)
+        return self._expressions.value(
+            node, lambda part: self._spread(self._read(part), kind), kind
+        )
+
+    def _kind_of(self, node: ast.expr) -> ir.Type:
+        """Whether an expression is a float or has lanes."""
+        if not self._mixed:
+            return self._kind
+        names = [part.id for part in ast.walk(node) if isinstance(part, ast.Name)]
+        return next((self._kind for name in names if self._has_lanes(name)), DOUBLE)
+
+    def _has_lanes(self, name: str) -> bool:
+        return name.startswith(SEED) or (name in self._values and self._values[name].type != DOUBLE)
+
+    def _spread(self, value: Any, kind: Any) -> Any:
+        if value.type == kind:
+            return value
+        return weighted_sums.spread(self._builder, value, kind.count)
 
     def _read(self, node: ast.expr) -> Any:
         # Loads come where they are needed first: registers are few.
@@ -152,10 +176,8 @@ class _Writer:
     def _load(self, name: str, place: int) -> Any:
         builder = self._builder
         number = builder.load(self._address(name, place))
-        if self._lanes == 1:
-            return number
-        if name == "_constants":
-            return weighted_sums.spread(builder, number, self._lanes)
+        if self._lanes == 1 or name in self._single:
+            return number if self._mixed else self._spread(number, self._kind)
         vector = builder.insert_element(ir.Constant(self._kind, ir.Undefined), number, LANE(0))
         for lane in range(1, self._lanes):
             number = builder.load(self._address(name, place, lane))
@@ -163,6 +185,7 @@ class _Writer:
         return vector
 
     def _store(self, value: Any, place: int) -> None:
+        value = self._spread(value, self._kind)
         for lane in range(self._lanes):
             single = value
             if self._lanes > 1:

@@ -181,6 +181,36 @@ class ReducedOrderModel(ShortRepr):
         """Time derivative (dim,) of a state."""
         return self.state_space.rates(self._state(state), self._inputs(inputs), time)
 
+    def jacobian(
+        self,
+        state: Any,
+        inputs: Any,
+        with_respect_to: str | Sequence[str] = "state",
+        of: str = "rhs",
+        time: float = 0.0,
+    ) -> np.ndarray:
+        """Analytic derivatives (results, columns) at a state and inputs.
+
+        Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
+
+        Parameters
+        ----------
+        with_respect_to
+            `state`, `inputs`, or names of the model's parameters, of which each component has a
+            column; a reduced model has them only where it holds the model's own equations.
+        of
+            `rhs` or `outputs`; of a kinematic model `outputs` or `coordinates`.
+        time
+            In s: models with control periods have another basis in each.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the model has no such derivatives.
+        """
+        u = self._inputs(inputs)
+        return self.state_space.derivatives(self._state(state), u, time, with_respect_to, of)
+
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
         states, u, single = self._samples(state, inputs)

@@ -8,14 +8,28 @@ from functools import cached_property
 
 import numpy as np
 
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.kernel_derivatives import (
+    CONSTANTS,
+    INPUTS,
+    PLACES,
+    STATE,
+    Arrays,
+    By,
+    chosen,
+    parameter_names,
+    partial,
+)
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.rate_derivatives import Along
 from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.system import System
@@ -69,6 +83,9 @@ class ReducedSystem(ShortRepr):
         (run of the system, inputs) -> what the model tells of it; nothing by default.
     names
         Of the system's states; the model's by default.
+    slopes
+        (state (dim,), inputs) -> derivatives of the full state (2 n, dim) and (2 n, inputs) by
+        both, where the full state is another than the system's.
     """
 
     model: DynamicModel
@@ -83,6 +100,7 @@ class ReducedSystem(ShortRepr):
     project: Callable[[np.ndarray], np.ndarray] | None = None
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
     names: tuple[str, ...] = ()
+    slopes: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
 
     @property
     def state_space(self) -> ReducedSystem:
@@ -112,6 +130,34 @@ class ReducedSystem(ShortRepr):
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float) -> np.ndarray:
         """Time derivative (dim,) of a state."""
         return self.stepper.rates(state, inputs, time)
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
+    ) -> np.ndarray:
+        """Analytic derivatives of the rates or of the outputs."""
+        function, names, along = chosen(of, RESULTS), parameter_names(by), Along(CONSTANTS)
+        if not names:
+            along = Along(PLACES[str(by)])
+        elif np.array_equal(self.system.constants, self.model.constants):
+            along = Along(CONSTANTS, self.model.constants_along(names))
+        else:
+            raise InputError(
+                f"the reduced equations of {self.model.name} don't know {', '.join(names)}: "
+                f"reduce a model that is made with another value"
+            )
+        if function == "derivative":
+            return self.stepper.derivatives(state, inputs, time, along)
+        full, slopes = state, (np.eye(len(state)), np.zeros((len(state), len(inputs))))
+        if self.slopes is not None:
+            full, slopes = (
+                self.full_states(state[None], inputs[None])[0],
+                self.slopes(state, inputs),
+            )
+        by_state = self.model.derivatives(function, full, inputs, "state")
+        if along.place == STATE:
+            return by_state @ slopes[STATE]
+        found = self.model.derivatives(function, full, inputs, by)
+        return found + by_state @ slopes[INPUTS] if along.place == INPUTS else found
 
     def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """States (samples, 2 n) of the model."""
@@ -168,6 +214,14 @@ class ReducedSystem(ShortRepr):
         return None if self.project is None else self.project(states)
 
 
+def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the kernel `full_state` by state and inputs."""
+    by_state, by_inputs = (
+        partial(kernels, "full_state", arrays, size, place) for place in (STATE, INPUTS)
+    )
+    return by_state, by_inputs
+
+
 def transformed_system(
     model: DynamicModel,
     system: System,
@@ -189,7 +243,7 @@ def transformed_system(
         See `ReducedSystem`.
     """
     dim = len(system.reference)
-
+    full = FullStates(system, 2 * len(model.coordinates))
     return ReducedSystem(
         model,
         system,
@@ -199,9 +253,10 @@ def transformed_system(
         settings.solver,
         settings.tolerance,
         encode,
-        FullStates(system, 2 * len(model.coordinates)).lift,
+        full.lift,
         judge=judge,
         names=tuple(names),
+        slopes=full.slopes,
     )
 
 
@@ -215,3 +270,8 @@ class FullStates(ShortRepr):
     def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
         """Full states (samples, size) of a run."""
         return self.system.along("full_state", run.path, inputs, self.size)
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Their derivatives by state and inputs."""
+        arrays = state, inputs, self.system.constants
+        return full_state_slopes(self.system.kernels, arrays, self.size)

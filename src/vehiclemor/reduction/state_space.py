@@ -9,6 +9,7 @@ import numpy as np
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 
@@ -34,6 +35,12 @@ class StateSpace(Protocol):
         """Time derivative of a state."""
         ...
 
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
+    ) -> np.ndarray:
+        """Analytic derivatives of rates or outputs, see `ReducedOrderModel.jacobian`."""
+        ...
+
     def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """States (samples, n) of the full model."""
         ...
@@ -51,10 +58,13 @@ class KinematicStates(ShortRepr):
     ----------
     solved
         (time in s, inputs (1, inputs), coordinates (n,) to begin at) -> solution at one time.
+    slopes
+        (coordinates (n,), inputs, what by, what of) -> analytic derivatives, if there are some.
     """
 
     model: AlgebraicModel
     solved: Callable[[float, np.ndarray, np.ndarray], Trajectory]
+    slopes: Callable[[np.ndarray, np.ndarray, By, str], np.ndarray] | None = None
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -81,6 +91,16 @@ class KinematicStates(ShortRepr):
         """There are none."""
         del state, inputs, time
         raise InputError(f"{self.model.name} is kinematic: its equations have no rates")
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
+    ) -> np.ndarray:
+        """Those of `coordinates` or `outputs`; there are no rates."""
+        if of == "rhs":
+            self.rates(state, inputs, time)
+        if self.slopes is None:
+            raise InputError(f"this reduction of {self.model.name} has no analytic derivatives")
+        return self.slopes(state, inputs, by, of)
 
     def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """The coordinates themselves."""

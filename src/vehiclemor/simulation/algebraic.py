@@ -24,6 +24,8 @@ from vehiclemor.simulation.checks import (
     output_times,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.kernel_derivatives import By
+from vehiclemor.simulation.kinematic_derivatives import kinematic_derivatives
 from vehiclemor.simulation.lane_loops import LaneKernels
 from vehiclemor.simulation.lane_runs import LaneRuns
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
@@ -87,9 +89,19 @@ class AlgebraicModel(Model):
         """Residual Phi(q; u), shape (n,)."""
         return self.evaluated("residual", q, u)
 
-    def jacobian(self, q: Any, u: Any) -> np.ndarray:
-        """Analytic Jacobian of the residual with respect to q, shape (n, n)."""
-        return self.evaluated("residual_jacobian", q, u)[:, :-1].copy()
+    def jacobian(
+        self, state: Any, u: Any, with_respect_to: By = "state", of: str = "residual"
+    ) -> np.ndarray:
+        """Derivatives at coordinates (n,) and inputs, see `Model.jacobian`.
+
+        Parameters
+        ----------
+        of
+            `residual`, `outputs`, or `coordinates`; see `kinematic_derivatives`.
+        """
+        if of == "residual" and with_respect_to == "state":
+            return self.evaluated("residual_jacobian", state, u)[:, :-1].copy()
+        return kinematic_derivatives(self, state, u, with_respect_to, of)
 
     def newton_step(self, q: Any, u: Any) -> np.ndarray:
         """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +13,12 @@ from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
-from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, Values
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterSet, load_parameters, overridden
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
+from vehiclemor.simulation.constants import hoisted_constants, solved_parameters, values_of
 from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> Algebra
     equations, digest = compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
     check_equations(definition, equations)
     _check_states(definition, {DESIGN_START: design})
-    constants = hoisted_constants(equations, parameters, [])
+    constants = hoisted_constants(equations, parameters.flat(), [])
     model = AlgebraicModel(
         definition, equations, parameters, digest, constants, {DESIGN_START: design}
     )
@@ -111,27 +112,19 @@ def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicMo
     """A model of equations of motion."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
-    values = declared_values(definition, parameters)
+    values = values_of(definition, parameters.flat())
     with blamed(f"model {definition.name!r}: check"):
         definition.check(values)
     equations, digest = compiled(definition.name, definition.derive)
     check_equations(definition, equations)
     with blamed(f"model {definition.name!r}: solve_equilibrium"):
-        values |= solved_parameters(definition, values, parameters, equations)
+        values |= solved_parameters(definition, parameters.flat(), equations)
         solved = [float(values[key]) for key in definition.solved]
-    constants = hoisted_constants(equations, parameters, solved)
+    constants = hoisted_constants(equations, parameters.flat(), solved)
     with blamed(f"model {definition.name!r}: starts"):
         initial = {name: real_array(x) for name, x in definition.starts(values).items()}
     _check_states(definition, initial)
     return DynamicModel(definition, equations, parameters, digest, constants, initial)
-
-
-def declared_values(definition: ModelDefinition, parameters: ParameterSet) -> dict[str, Any]:
-    """Parameters by name as a declaration takes them: floats and points."""
-    return {
-        key: parameters[key] if declared.size > 1 else float(parameters[key])
-        for key, declared in definition.parameters.items()
-    }
 
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
@@ -177,28 +170,3 @@ def compiled(
     with blamed(f"model {name!r}: its equations can't be derived"):
         made = derivation(name, derive)
     return made, kernel_hash(f"{made.source}\n{loops_digest(loops)}")
-
-
-def hoisted_constants(
-    equations: Derivation, parameters: ParameterSet, solved: list[float]
-) -> np.ndarray:
-    """Hoisted constants of a parameter set and of the values that were solved for."""
-    constants = np.empty(equations.constants)
-    equations.kernels.call("constants", np.concatenate([parameters.flat(), solved]), constants)
-    return constants
-
-
-def solved_parameters(
-    definition: ModelDefinition, values: Values, parameters: ParameterSet, equations: Derivation
-) -> dict[str, float]:
-    """What a model solves for before it can start, by name."""
-    if not definition.solved:
-        return {}
-
-    def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        result = np.empty(len(x))
-        constants = hoisted_constants(equations, parameters, solved)
-        equations.kernels.call("derivative", x, u, constants, result)
-        return result
-
-    return definition.solve_equilibrium(values, derivative)

@@ -21,6 +21,7 @@ from vehiclemor.simulation.checks import (
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.structures import Observer
+from vehiclemor.simulation.kernel_derivatives import By, chosen
 from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
@@ -30,6 +31,8 @@ from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory, Trust
 
+# What derivatives are of -> function of the equations.
+RESULTS = {"rhs": "derivative", "outputs": "outputs"}
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
 
@@ -122,6 +125,23 @@ class DynamicModel(Model):
     def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
         return self.along("derivative", states, inputs, finite=True)
+
+    def jacobian(
+        self, state: Any, u: Any, with_respect_to: By = "state", of: str = "rhs"
+    ) -> np.ndarray:
+        """Derivatives of the right-hand side or of the outputs, see `Model.jacobian`.
+
+        Parameters
+        ----------
+        of
+            `rhs` or `outputs`.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the derivatives aren't finite.
+        """
+        return self.derivatives(chosen(of, RESULTS), state, u, with_respect_to)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""

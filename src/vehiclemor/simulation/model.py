@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,7 +19,16 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
-from vehiclemor.simulation.paths import along
+from vehiclemor.simulation.constants import components, constants_along
+from vehiclemor.simulation.kernel_derivatives import (
+    CONSTANTS,
+    PLACES,
+    By,
+    along,
+    parameter_names,
+    partial,
+)
+from vehiclemor.simulation.paths import along as along_path
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Start, Trajectory
 
 NEEDED_FOR = {
@@ -163,7 +173,20 @@ class Model(ShortRepr):
         """
         self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
-        return along(self.kernels, function, self.constants, (states, inputs), sizes, finite)
+        return along_path(self.kernels, function, self.constants, (states, inputs), sizes, finite)
+
+    @abstractmethod
+    def jacobian(self, state: Any, u: Any, with_respect_to: By = "state") -> np.ndarray:
+        """Analytic derivatives (results, columns) at a state and inputs.
+
+        Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
+
+        Parameters
+        ----------
+        with_respect_to
+            `state`, `inputs`, or names of parameters: a column for each component of each, in
+            order, of models made anew with it.
+        """
 
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""
@@ -185,6 +208,40 @@ class Model(ShortRepr):
         state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
         self.kernels.call(function, state, u, self.constants, result)
         return result
+
+    def derivatives(self, function: str, state: Any, u: Any, by: By) -> np.ndarray:
+        """Analytic derivatives (results, columns) of a function of the equations, see `jacobian`.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the derivatives aren't finite.
+        """
+        self.require(function)
+        names, size = parameter_names(by), math.prod(self.equations.shapes[function])
+        state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
+        arrays = state, u, self.constants
+        if names:
+            directions = self.constants_along(names)
+            found = along(self.kernels, function, arrays, size, CONSTANTS, directions).T
+        else:
+            assert isinstance(by, str)
+            found = partial(self.kernels, function, arrays, size, PLACES[by])
+        if not np.isfinite(found).all():
+            raise InputError(f"the derivatives of {self.name} are not finite at this state")
+        return found
+
+    def constants_along(self, names: Sequence[str]) -> np.ndarray:
+        """Derivatives (components, constants) of the constants by parameters; they are kept."""
+        for name in names:
+            if name not in self._along:
+                numbers, flat = components(self.definition, name), self.parameters.flat()
+                self._along[name] = constants_along(self.definition, flat, self.equations, numbers)
+        return np.concatenate([self._along[name] for name in names])
+
+    @cached_property
+    def _along(self) -> dict[str, np.ndarray]:
+        return {}
 
     def _state(self, state: Any, name: str) -> np.ndarray:
         return checked_array(state, len(self.definition.states), name, self.name)

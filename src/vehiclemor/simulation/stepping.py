@@ -17,6 +17,7 @@ from vehiclemor.codegen.loops import Prepared, ready
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.simulation.integrators.structures import Output, Signal, Spans
 from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
 from vehiclemor.simulation.run_plans import NO_POINTS, Solver
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
@@ -195,6 +196,13 @@ class Stepper:
         change = np.concatenate([q, projected - np.linalg.solve(mass, force)[:, 0]])
         free = self._evaluated("derivative", place, inputs, n)[half:]
         return np.concatenate([moved, free + self._evaluated("speeds", change, inputs, half)])
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: Along
+    ) -> np.ndarray:
+        """Analytic derivatives (n, columns) of the rates."""
+        window = next(self._parts(time, 2.0 * SHORTEST))[2]
+        return rate_derivatives(self.system, self.windows, window, state, inputs, by)
 
     def _evaluated(
         self, kernel: str, state: np.ndarray, inputs: np.ndarray, size: int

@@ -13,7 +13,8 @@ from vehiclemor.multibody.high_fidelity.quantities import PLACES
 from vehiclemor.reduction.high_fidelity.independent_kernels import free_lengths, independent_kernels
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.build import compiled, hoisted_constants
+from vehiclemor.simulation.build import compiled
+from vehiclemor.simulation.constants import hoisted_constants
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.trajectory import Trust
@@ -84,7 +85,7 @@ def frozen_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
     made, _ = compiled("high_fidelity_frozen_inertia", _derive)
     values = frozen_constants(model)
     fixed = [values[name] for name in frozen.CONSTANTS]
-    return made, hoisted_constants(made, model.parameters, [*free_lengths(model), *fixed])
+    return made, hoisted_constants(made, model.parameters.flat(), [*free_lengths(model), *fixed])
 
 
 def _derive() -> "Program":

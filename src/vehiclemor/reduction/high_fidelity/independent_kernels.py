@@ -7,7 +7,8 @@ import numpy as np
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
-from vehiclemor.simulation.build import compiled, hoisted_constants, solved_parameters
+from vehiclemor.simulation.build import compiled
+from vehiclemor.simulation.constants import hoisted_constants, solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 def independent_kernels(model: DynamicModel) -> tuple[Derivation, np.ndarray]:
     """Kernels over the 14 independent coordinates, and their constants of a ready model."""
     made, _ = compiled("high_fidelity_independent", _derive)
-    return made, hoisted_constants(made, model.parameters, free_lengths(model))
+    return made, hoisted_constants(made, model.parameters.flat(), free_lengths(model))
 
 
 def _derive() -> "Program":
@@ -30,6 +31,5 @@ def _derive() -> "Program":
 def free_lengths(model: DynamicModel) -> list[float]:
     """Free lengths of the springs in m, with which the design position is the equilibrium."""
     definition: ModelDefinition = component("model", model.name)
-    values = model.parameters.values()
-    solved = solved_parameters(definition, values, model.parameters, model.equations)
+    solved = solved_parameters(definition, model.parameters.flat(), model.equations)
     return [solved[name] for name in definition.solved]

@@ -88,7 +88,9 @@ class FullOrderModel(ShortRepr):
         if isinstance(model, AlgebraicModel):
             how = self.solver, self.tolerance
             return KinematicStates(
-                model, lambda time, u, _: model.solve_path(np.array([time]), u, *how)
+                model,
+                lambda time, u, _: model.solve_path(np.array([time]), u, *how),
+                model.jacobian,
             )
         assert isinstance(model, DynamicModel)
         n, whole = len(model.coordinates), whole_space(2 * len(model.coordinates))

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
+from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, ready
+from vehiclemor.codegen.tangent import tangent
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.kernels import map_loop, monomials
+from vehiclemor.reduction.polynomials.kernels import map_kernel, map_loop, monomials
 from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.state_space import KinematicStates
@@ -29,6 +31,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
+from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
@@ -123,7 +126,25 @@ class PathMapModel(ShortRepr):
         def solved(time: float, inputs: np.ndarray, _: np.ndarray) -> Trajectory:
             return self._along(np.array([time]), inputs, ready(Samples(inputs)))
 
-        return KinematicStates(self.model, solved)
+        return KinematicStates(self.model, solved, self._slopes)
+
+    def _slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
+        """Derivatives of coordinates or outputs by the inputs."""
+        if by != "inputs" or of not in ("coordinates", "outputs"):
+            raise InputError("path_map: derivatives are of coordinates or outputs, by inputs")
+        del state
+        cells, degree = self.cells, self.degree
+        place = ((inputs - cells.centres) * cells.scales + 1.0) * cells.halves
+        numbers = np.clip(place, 0.0, cells.tops).astype(int)
+        coefficients = cells.coefficients[
+            np.ravel_multi_index(tuple(numbers), tuple(cells.numbers))
+        ]
+        arrays = 2.0 * (place - numbers) - 1.0, coefficients.ravel()
+        (source,) = kernel_sources(map_kernel(self.moving, degree, self.columns)).values()
+        along = tangent(source, source.arguments[0], len(self.columns))
+        table = along.jacobian(arrays, len(inputs)) * (2.0 * cells.halves * cells.scales)
+        n = len(self.model.coordinates)
+        return table[:n] if of == "coordinates" else table[n:]
 
     def _along(self, times: np.ndarray, inputs: np.ndarray, given: Ready) -> Trajectory:
         """Polynomials at inputs (samples, inputs), also as the loop takes them."""

@@ -13,6 +13,7 @@ from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.reduction.reduced_system import full_state_slopes
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.short_repr import ShortRepr
@@ -92,7 +93,7 @@ class Lifting(ShortRepr):
     transient: Transient
 
     @cached_property
-    def _made(self) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+    def _made(self) -> dict[int, tuple[Kernels, np.ndarray]]:
         return {}
 
     def text(self, modes: int) -> tuple[str, np.ndarray]:
@@ -106,14 +107,19 @@ class Lifting(ShortRepr):
         text = lifting_text(self.features, self.layout, len(self.parameters), modes)
         return text, np.concatenate([self.parameters, rows.ravel()])
 
-    def _kernel(self, modes: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
-        """Address and constants of the kernel."""
-        if (modes, lanes) not in self._made:
+    def _kernels(self, modes: int) -> tuple[Kernels, np.ndarray]:
+        """The kernel and its constants."""
+        if modes not in self._made:
             text, constants = self.text(modes)
-            kernels = Kernels(kernel_sources(text))
-            address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
-            self._made[modes, lanes] = address, constants
-        return self._made[modes, lanes]
+            self._made[modes] = Kernels(kernel_sources(text)), constants
+        return self._made[modes]
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of full states by reduced ones and inputs, without a transient."""
+        kernels, constants = self._kernels(0)
+        size = self.layout.size + len(self.features.watched)
+        found = full_state_slopes(kernels, (state, inputs, constants), size)
+        return found[0][: self.layout.size], found[1][: self.layout.size]
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
         """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
@@ -193,10 +199,14 @@ class Lifting(ShortRepr):
                 )
             )
             inputs = given
-        kernel = self._kernel(modes, LANES if rows >= LANES else 1)
+        kernels, constants = self._kernels(modes)
+        lanes = LANES if rows >= LANES else 1
+        address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(times), self.layout.size + len(watched)))
         largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
-        lifted = _loops()["lifted"].prepared(path, inputs, *kernel, states, largest, first)
+        lifted = _loops()["lifted"].prepared(
+            path, inputs, address, constants, states, largest, first
+        )
         calls.append((lifted, ("path", "inputs", "states")))
         counted = tuple(
             (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls

@@ -37,6 +37,7 @@ def projected_vehicle(
         frame.encode,
         frame.lift,
         project=frame.project,
+        slopes=frame.slopes,
     )
 
 
@@ -60,6 +61,16 @@ class HeadingFrame(ShortRepr):
         spaces, there = self.spaces, self._turned(states, -1.0)
         mean, basis, test = spaces.means[0], spaces.trial_basis[0], spaces.test_basis[0]
         return self._turned(mean + (there - mean) @ test.T @ basis, 1.0)
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the full state by a state and the inputs."""
+        heading, (there,) = self.shape.model.planar[2], self._turned(state[None], 1.0)
+        axes = np.full(len(state), state[heading])
+        found = turned(np.eye(len(state)), self.shape.pairs, axes).T
+        for a, b in self.shape.pairs:
+            found[a, heading] -= there[b]
+            found[b, heading] += there[a]
+        return found, np.zeros((len(state), len(inputs)))
 
     def _turned(self, states: np.ndarray, sign: float) -> np.ndarray:
         heading = self.shape.model.planar[2]

@@ -114,6 +114,7 @@ class ReducedVehicle(ShortRepr):
             self.encoded,
             lambda run, inputs, _: self._lifted(run, inputs)[0],
             judge=lambda run, inputs: self._lifted(run, inputs)[1],
+            slopes=self.lift.slopes,
             names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
         )
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vehiclemor.export.interpreter import evaluated
-from vehiclemor.export.packages import needed
-from vehiclemor.export.straight_line import FUNCTIONS
-from vehiclemor.export.system import ExportedSystem
+from vehiclemor.exporting.interpreter import evaluated
+from vehiclemor.exporting.packages import needed
+from vehiclemor.exporting.straight_line import FUNCTIONS
+from vehiclemor.exporting.system import ExportedSystem
 
 if TYPE_CHECKING:
     import casadi

@@ -99,6 +99,28 @@ static int set(Instance *m, const unsigned *numbers, size_t count, const double 
     return 1;
 }
 
+/* Change of rates and outputs where states, inputs and parameters change by seeds. */
+static int directional(Instance *m, const unsigned *unknown, size_t unknowns, const unsigned *known,
+                       size_t knowns, const double *seed, double *change)
+{
+    double s[END] = {0.0}, c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
+    size_t i;
+    for (i = 0; i < knowns; i++) {
+        if (known[i] >= END)
+            return 0;
+        s[known[i]] += seed[i];
+    }
+    vehiclemor_constants_tangent(m->p, s + P, c);
+    vehiclemor_derivative_tangent(m->x, m->u, m->c, s + X, s + U, c, s + DX);
+    vehiclemor_outputs_tangent(m->x, m->u, m->c, s + X, s + U, c, s + Y);
+    for (i = 0; i < unknowns; i++) {
+        if (unknown[i] >= END)
+            return 0;
+        change[i] = s[unknown[i]];
+    }
+    return 1;
+}
+
 /* Equal steps, none longer than VEHICLEMOR_STEP, with the inputs held; 0 if the motion diverges. */
 static int advance(Instance *m, double time, double length)
 {

@@ -2,23 +2,25 @@
 
 The text of a kernel also has batches of elementary functions and weighted sums, which are for the
 vector units; here they are written out.  What is left are numbers, names, entries of the arguments,
-`+ - * /`, comparisons and calls of `FUNCTIONS`: short enough for any printer or interpreter.
+`+ - * /`, comparisons and calls: short enough for any printer or interpreter.
 """
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from vehiclemor.codegen.kernel_statements import KernelText, places
+from vehiclemor.codegen.kernel_statements import SEED, KernelText, places
+from vehiclemor.codegen.kernels import KernelSource
+from vehiclemor.codegen.tangent import tangent_source
 from vehiclemor.codegen.vector_lanes import LANES, padded
 
-# Names of C's library, of which other systems have their own; besides these there are `pow`, and
-# `select(test, then, otherwise)`.
+# Names of C's library, of which other systems have their own.  Besides these there are `pow`,
+# `select(test, then, otherwise)`, and `entry(row, place)` of a table.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
     *("atan2", "fabs", "fmax", "fmin", "floor"),
 )
-RENAMED = {"abs": "fabs", "np.abs": "fabs", "np.floor": "floor"}
+RENAMED = {"abs": "fabs", "np.abs": "fabs", "np.floor": "floor", "max": "fmax", "min": "fmin"}
 # Function that has batches -> what gives its results.
 BATCHES = {"sincos": ("sin", "cos"), "atan": ("atan",)}
 
@@ -36,6 +38,10 @@ class StraightLine(NamedTuple):
 
     assignments: dict[str, ast.expr]
     results: list[ast.expr]
+
+    def followed_by(self, results: Sequence[ast.expr]) -> "StraightLine":
+        """The same with further results."""
+        return StraightLine(self.assignments, [*self.results, *results])
 
     def pruned(self) -> "StraightLine":
         """The same without assignments that no result needs."""
@@ -67,12 +73,26 @@ def straight_line(
     return StraightLine(reader.assignments, [reader.results[i] for i in sorted(reader.results)])
 
 
+def tangent_line(
+    source: KernelSource,
+    given: Mapping[str, Sequence[ast.expr]],
+    seeds: Mapping[str, Sequence[ast.expr]],
+    before: StraightLine | None = None,
+) -> StraightLine:
+    """The derivative of a kernel along seeds of some of its arguments, see `tangent_text`."""
+    moved = {name: seed for name, seed in seeds.items() if name in source.arguments}
+    text = tangent_source(source, tuple(moved)).text
+    return straight_line(
+        text, {**given} | {SEED + name: seed for name, seed in moved.items()}, before
+    )
+
+
 def entries(name: str, count: int) -> list[ast.expr]:
     """Expressions of the entries of an array."""
     return [ast.Subscript(ast.Name(name), ast.Constant(i)) for i in range(count)]
 
 
-def numbers(values: Sequence[float]) -> list[ast.expr]:
+def numbers(values: Iterable[float]) -> list[ast.expr]:
     """Expressions of numbers."""
     return [ast.Constant(float(value)) for value in values]
 
@@ -93,6 +113,7 @@ class _Reader:
         # What the text's names and scratch space stand for by now.
         self._known: dict[str, ast.expr] = {}
         self._work: dict[int, ast.expr] = {}
+        self._copies: dict[str, int] = {}
 
     def read(self, statement: ast.stmt, kernel: KernelText) -> None:
         match statement:
@@ -138,9 +159,9 @@ class _Reader:
             return value
         # A letter first: names of the text may be reserved words elsewhere.
         own = unused = f"v_{name.lstrip('_')}"
-        count = 1
         while unused in self.assignments:
-            unused, count = f"{own}_{count}", count + 1
+            self._copies[own] = self._copies.get(own, 0) + 1
+            unused = f"{own}_{self._copies[own]}"
         self.assignments[unused] = value
         return ast.Name(unused)
 
@@ -159,10 +180,11 @@ class _Reader:
             case ast.BinOp(left, operator, right):
                 return ast.BinOp(self._value(left), operator, self._value(right))
             case ast.UnaryOp(ast.USub(), operand):
-                value = self._value(operand)
                 # In C two signs in a row are a decrement.
-                negative = isinstance(value, ast.Constant)
-                return ast.Constant(-value.value) if negative else ast.UnaryOp(ast.USub(), value)
+                match value := self._value(operand):
+                    case ast.Constant(value=float() as number):
+                        return ast.Constant(-number)
+                return ast.UnaryOp(ast.USub(), value)
             case ast.Compare(left, [operator], [right]):
                 return ast.Compare(self._value(left), [operator], [self._value(right)])
             case ast.IfExp(test, then, otherwise):

@@ -5,7 +5,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from vehiclemor.export.straight_line import StraightLine
+from vehiclemor.exporting.straight_line import StraightLine
 
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,

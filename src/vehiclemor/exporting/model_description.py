@@ -10,13 +10,14 @@ from collections.abc import Iterable
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from vehiclemor import __version__
-from vehiclemor.export.system import ExportedSystem
-from vehiclemor.export.units import base_units
+from vehiclemor.exporting.c import MODEL, STEPPER, TANGENT
+from vehiclemor.exporting.system import TOOL, ExportedSystem
+from vehiclemor.exporting.units import base_units
+from vehiclemor.multibody.quantities import Quantity
 
 CAPABILITIES = {
-    2: {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"},
-    3: {"canGetAndSetFMUState": "true", "canSerializeFMUState": "true"},
+    2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"),
+    3: ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"),
 }
 # What an importer proposes, in s.
 STOP, COMMUNICATION = 10.0, 0.01
@@ -46,22 +47,21 @@ def variables(system: ExportedSystem) -> list[Variable]:
         described = f"rate of: {q.long_name}"
         unit = f"{q.unit}/s"
         found.append(rate._replace(unit=unit, description=described, derivative_of=reference))
-    for q in system.inputs:
-        found.append(Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0))
-    for q in system.outputs:
-        found.append(Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated"))
+    found += [
+        Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0) for q in system.inputs
+    ]
+    found += [
+        Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated")
+        for q in system.outputs
+    ]
     for q, value in zip(system.parameters, system.values.tolist(), strict=True):
         name = f"parameter.{q.name}"
-        found.append(
-            Variable(name, q.unit, q.long_name, "parameter", "tunable", "exact", value)
-        )
+        found.append(Variable(name, q.unit, q.long_name, "parameter", "tunable", "exact", value))
     return found
 
 
-def _local(name: str, quantity, initial: str, start: float | None = None) -> Variable:
-    return Variable(
-        name, quantity.unit, quantity.long_name, "local", "continuous", initial, start
-    )
+def _local(name: str, quantity: Quantity, initial: str, start: float | None = None) -> Variable:
+    return Variable(name, quantity.unit, quantity.long_name, "local", "continuous", initial, start)
 
 
 def model_description(system: ExportedSystem, token: str, step: float, fmi: int) -> bytes:
@@ -82,13 +82,13 @@ def model_description(system: ExportedSystem, token: str, step: float, fmi: int)
         fmiVersion=f"{fmi}.0",
         modelName=system.name,
         description=system.summary,
-        generationTool=f"vehiclemor {__version__}",
+        generationTool=TOOL,
         variableNamingConvention="structured",
     )
     root.set("guid" if fmi == 2 else "instantiationToken", token)
     if fmi == 2:
         root.set("numberOfEventIndicators", "0")
-    common = {"modelIdentifier": identifier(system), **CAPABILITIES[fmi]}
+    common = {"modelIdentifier": identifier(system), **dict.fromkeys(CAPABILITIES[fmi], "true")}
     exchange = ElementTree.SubElement(root, "ModelExchange", common)
     simulation = ElementTree.SubElement(
         root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"}
@@ -123,7 +123,7 @@ def identifier(system: ExportedSystem) -> str:
 
 def sources(fmi: int) -> tuple[str, ...]:
     """Files that a binary is compiled of."""
-    return f"vehiclemor_fmi{fmi}.c", "vehiclemor_model.c", "vehiclemor_step.c"
+    return f"vehiclemor_fmi{fmi}.c", MODEL, TANGENT, STEPPER
 
 
 def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
@@ -138,9 +138,7 @@ def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
             ElementTree.SubElement(unit, "BaseUnit", given)
 
 
-def _variable(
-    listed: ElementTree.Element, variable: Variable, reference: int, fmi: int
-) -> None:
+def _variable(listed: ElementTree.Element, variable: Variable, reference: int, fmi: int) -> None:
     own = {
         "name": variable.name,
         "valueReference": str(reference),

@@ -7,14 +7,34 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.export.interpreter import evaluated
-from vehiclemor.export.packages import needed
-from vehiclemor.export.straight_line import FUNCTIONS
-from vehiclemor.export.system import ExportedSystem
+from vehiclemor.exporting.interpreter import evaluated
+from vehiclemor.exporting.packages import needed
+from vehiclemor.exporting.python_module import python_module
+from vehiclemor.exporting.straight_line import FUNCTIONS
+from vehiclemor.exporting.system import ExportedSystem
 
 # Where JAX has another name.
 RENAMED = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
 RENAMED |= {"fabs": "abs"}
+ENTRY = """
+
+TABLE = jnp.array({table!r})
+
+
+def entry(row, place):
+    return TABLE[row.astype(int) + place]
+
+"""
+
+
+def module_text(system: ExportedSystem) -> str:
+    """A Python module of its functions; it needs JAX when it is used, not now."""
+    words = {name: f"jnp.{RENAMED.get(name, name)}" for name in FUNCTIONS}
+    words |= {"select": "jnp.where", "pow": "pow", "entry": "entry"}
+    imported = "import jax.numpy as jnp"
+    if len(system.table):
+        imported += ENTRY.format(table=system.table.tolist())
+    return python_module(system, imported, words, "jnp.array")
 
 
 def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:
@@ -32,13 +52,15 @@ def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:
 
     functions = {name: getattr(jnp, RENAMED.get(name, name)) for name in FUNCTIONS}
     functions["select"] = jnp.where
+    table = np.array(system.table)
+    functions["entry"] = lambda row, place: jnp.asarray(table)[row.astype(int) + place]
     values = np.array(system.values)
 
     def function(x: Any, u: Any, p: Any = values) -> tuple[Any, Any]:
         arrays = {"x": x, "u": u, "p": p}
         arrays["c"] = evaluated(system.functions["constants"], arrays, functions)
         dx = evaluated(system.functions["derivative"], arrays, functions)
-        return jnp.stack(dx), jnp.stack(evaluated(system.functions["outputs"], arrays, functions))
+        return jnp.array(dx), jnp.array(evaluated(system.functions["outputs"], arrays, functions))
 
     function.__name__ = system.name
     return function

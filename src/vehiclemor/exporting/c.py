@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from vehiclemor import __version__
-from vehiclemor.export.straight_line import StraightLine
-from vehiclemor.export.system import ExportedSystem
+from vehiclemor.exporting.straight_line import StraightLine
+from vehiclemor.exporting.system import SIGNATURES, TANGENTS, TOOL, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
-# Function -> names of its arguments, in order, and of its result.
-SIGNATURES = {"constants": ("p", "c"), "derivative": ("x", "u", "c", "dx")}
-SIGNATURES["outputs"] = ("x", "u", "c", "y")
+SELECT = """\
+static double select(int test, double then, double otherwise)
+{
+    return test ? then : otherwise;
+}"""
+ENTRY = """\
+static double entry(double row, int place)
+{
+    return vehiclemor_table[(long)row + place];
+}"""
+HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
 STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
 
 
@@ -28,14 +35,22 @@ def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
         Step size in s that the header names.
     """
     shipped = {name: (SOURCES / name).read_text(encoding="utf-8") for name in (STEPPER, DRIVER)}
-    return {"vehiclemor_model.h": _header(system, step), "vehiclemor_model.c": _model(system)} | (
-        shipped
-    )
+    values = [
+        _array("parameters", system.values),
+        *(_array(_start(name), state) for name, state in system.starts.items()),
+    ]
+    return {
+        HEADER: _header(system, step),
+        MODEL: _source(system, "its functions", values, system.functions),
+        TANGENT: _source(system, "derivatives of its functions", [], system.tangents()),
+    } | shipped
 
 
 def _header(system: ExportedSystem, step: float) -> str:
     def listed(title: str, quantities: Sequence) -> list[str]:
-        rows = [f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)]
+        rows = [
+            f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)
+        ]
         return [f"   {title}:", *rows]
 
     sizes = system.sizes
@@ -50,7 +65,7 @@ def _header(system: ExportedSystem, step: float) -> str:
     states = [_declared(_start(name), sizes["x"]) for name in starts]
     lines = [
         f"/* {system.name}: {system.summary}.",
-        f"   Written by vehiclemor {__version__}.",
+        f"   Written by {TOOL}.",
         "",
         *listed("States x", system.states),
         *listed("Inputs u", system.inputs),
@@ -71,8 +86,11 @@ def _header(system: ExportedSystem, step: float) -> str:
         *(f"extern {declared};" for declared in (_declared("parameters", sizes["p"]), *states)),
         f"#define vehiclemor_start vehiclemor_{_start(starts[0])}",
         "",
-        "/* Constants c that follow from the parameters p: call it once, and whenever p changes. */",
-        *(f"void vehiclemor_{name}({_arguments(name)});" for name in SIGNATURES),
+        "/* Constants c follow from the parameters p: needed once, and whenever p changes. */",
+        *(f"{_signature(name)};" for name in SIGNATURES),
+        "",
+        "/* What their results change by where the arguments change by seeds. */",
+        *(f"{_signature(name)};" for name in TANGENTS),
         "",
         "/* Take x over a step of h seconds; inputs are linear from u to u_end, which may be u. */",
         "void vehiclemor_step(double *x, const double *u, const double *u_end, const double *c,",
@@ -91,25 +109,27 @@ def _start(name: str) -> str:
     return f"start_{name}"
 
 
-def _arguments(name: str) -> str:
-    *given, result = SIGNATURES[name]
-    return ", ".join([*(f"const double *{argument}" for argument in given), f"double *{result}"])
+def _signature(name: str) -> str:
+    *given, result = (SIGNATURES | TANGENTS)[name]
+    arguments = ", ".join(f"const double *{argument}" for argument in given)
+    return f"void vehiclemor_{name}({arguments}, double *{result})"
 
 
-def _model(system: ExportedSystem) -> str:
-    parts = [
-        f"/* {system.name}: straight-line functions, written by vehiclemor {__version__}. */",
-        '#include <math.h>\n\n#include "vehiclemor_model.h"',
-        _array("parameters", system.values),
-        *(_array(_start(name), state) for name, state in system.starts.items()),
-    ]
-    functions = {name: c_function(name, system.functions[name]) for name in SIGNATURES}
-    if any("select(" in text for text in functions.values()):
-        parts.append(
-            "static double select(int test, double then, double otherwise)\n"
-            "{\n    return test ? then : otherwise;\n}"
-        )
-    return "\n\n".join([*parts, *functions.values()]) + "\n"
+def _source(
+    system: ExportedSystem,
+    what: str,
+    parts: Sequence[str],
+    functions: Mapping[str, StraightLine],
+) -> str:
+    """Text of a file of functions, after other parts."""
+    texts = [_function(name, function) for name, function in functions.items()]
+    called = "\n".join(texts)
+    helpers = [SELECT] if "select(" in called else []
+    if "entry(" in called:
+        helpers += [f"static {_array('table', system.table)}", ENTRY]
+    head = f"/* {system.name}: {what}, written by {TOOL}. */"
+    included = f'#include <math.h>\n\n#include "{HEADER}"'
+    return "\n\n".join([head, included, *parts, *helpers, *texts]) + "\n"
 
 
 def _array(name: str, values: np.ndarray) -> str:
@@ -119,13 +139,13 @@ def _array(name: str, values: np.ndarray) -> str:
     return f"{_declared(name, len(values))} = {{\n    {body}\n}};"
 
 
-def c_function(name: str, function: StraightLine) -> str:
+def _function(name: str, function: StraightLine) -> str:
     """Definition of a function; arithmetic is written alike in C and Python."""
-    *given, result = SIGNATURES[name]
-    lines = [f"void vehiclemor_{name}({_arguments(name)})", "{"]
+    *given, result = (SIGNATURES | TANGENTS)[name]
+    lines = [_signature(name), "{"]
     lines += [
-        f"    const double {name} = {ast.unparse(expression)};"
-        for name, expression in function.assignments.items()
+        f"    const double {local} = {ast.unparse(expression)};"
+        for local, expression in function.assignments.items()
     ]
     lines += [
         f"    {result}[{i}] = {ast.unparse(expression)};"
@@ -133,5 +153,5 @@ def c_function(name: str, function: StraightLine) -> str:
     ]
     text = "\n".join(lines)
     # What is not read is said so, for compilers that ask.
-    unread = [a for a in (*given, result) if f"{a}[" not in text]
+    unread = [a for a in (*given, result) if f" {a}[" not in text and f"({a}[" not in text]
     return "\n".join([text, *(f"    (void){argument};" for argument in unread), "}"])

@@ -288,5 +288,5 @@ STATUS fmi3GetDirectionalDerivative(fmi3Instance m, REFERENCES, const fmi3ValueR
                                     size_t l, const fmi3Float64 seed[], size_t j, fmi3Float64 v[],
                                     size_t k)
 {
-    return fmi3Error;
+    return j == l && k == n && directional(m, r, n, on, l, seed, v) ? fmi3OK : fmi3Error;
 }

@@ -1,0 +1,180 @@
+"""Models and reduced models, taken along into other tools."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from vehiclemor.arguments import file_path, number, quoted
+from vehiclemor.errors import InputError, did_you_mean
+from vehiclemor.files import make_folder, not_written, temporary_path, write_whole
+
+if TYPE_CHECKING:
+    from vehiclemor.exporting.system import ExportedSystem
+    from vehiclemor.online.rom import ReducedOrderModel
+    from vehiclemor.simulation.model import Model
+
+Target = Literal["c", "fmu", "casadi", "jax", "sympy"]
+TARGETS: tuple[str, ...] = Target.__args__
+# Ending of what is written; C is a folder.
+ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi", "jax": ".py", "sympy": ".py"}
+# Step in s of the integrator in C: stable for modes of up to 2780 1/s; the vehicles' are at 530.
+STEP = 1e-3
+# A folder with this file is one of ours.
+OURS = "vehiclemor_model.h"
+
+
+def export(
+    model: str | Model | ReducedOrderModel,
+    to: Target,
+    path: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    fmi: Literal[2, 3] = 3,
+    step: float = STEP,
+) -> Any:
+    """A full or reduced model for another tool.
+
+    Parameters
+    ----------
+    model
+        Registered name, a model made by `model()`, or a reduced one: of `reduce()`, `load()` or
+        `rom()`.
+    to
+        `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit for model exchange and
+        co-simulation, with sources, and a binary for this platform where there is a C compiler.
+        `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a function (x, u, p) -> (dx, y).
+        `sympy`: expressions.
+    path
+        File or folder to write.  Without it C and FMU go under the model's name into the working
+        folder; of the others the object is returned, and with it a file is written: CasADi's own
+        for `Function.load`, or a Python module.
+    overwrite
+        Whether an export that is there is replaced.
+    fmi
+        Version of the standard.
+    step
+        Of the integrator that C and FMU bring along, in s (Runge-Kutta of order 4).
+
+    Returns
+    -------
+    pathlib.Path, or casadi.Function, callable, Expressions
+        What was written, or the object.
+
+    Raises
+    ------
+    VehiclemorError
+        If an argument is wrong, the method can't be exported, something is there already, a package
+        is missing, or the C compiler fails.  Then nothing is written.
+    """
+    if to not in TARGETS:
+        hint = did_you_mean(to, TARGETS) or f"known: {', '.join(TARGETS)}"
+        raise InputError(f"to: {quoted(to)} is no target; {hint}")
+    if fmi not in (2, 3):
+        raise InputError(f"fmi: {quoted(fmi)} is no version; 2 or 3")
+    if not number("step", step) > 0.0:
+        raise InputError(f"step: {step:g} s is not above 0")
+    system = system_of(model)
+    if len(system.table) and to in ("casadi", "sympy"):
+        raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
+    if path is None and to in ("c", "fmu"):
+        path = f"{system.name}{ENDINGS[to]}"
+    if path is None:
+        return _object(system, to)
+    place = file_path("path", path)
+    _check_free(place, to, overwrite)
+    if to == "c":
+        from vehiclemor.exporting.c import c_files
+
+        return _write_folder(place, c_files(system, step))
+    return write_whole(place, _writer(system, to, fmi, step))
+
+
+def system_of(model: str | Model | ReducedOrderModel) -> ExportedSystem:
+    """The system that a model is exported as."""
+    from vehiclemor.exporting.exported import exported_system
+    from vehiclemor.online.rom import ReducedOrderModel
+    from vehiclemor.simulation.build import build
+    from vehiclemor.simulation.model import Model
+
+    if isinstance(model, ReducedOrderModel):
+        return exported_system(model.reduced, _identifier(f"{model.model.name}_{model.method}"))
+    ready = model if isinstance(model, Model) else build(model)
+    return exported_system(ready, _identifier(ready.name))
+
+
+def _identifier(name: str) -> str:
+    """The name as a word of C."""
+    word = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"_{word}" if word[0].isdigit() else word
+
+
+def _object(system: ExportedSystem, to: str) -> Any:
+    if to == "casadi":
+        from vehiclemor.exporting.to_casadi import casadi_function
+
+        return casadi_function(system)
+    if to == "jax":
+        from vehiclemor.exporting.to_jax import jax_function
+
+        return jax_function(system)
+    from vehiclemor.exporting.to_sympy import sympy_expressions
+
+    return sympy_expressions(system)
+
+
+def _writer(system: ExportedSystem, to: str, fmi: int, step: float) -> Callable[[Path], object]:
+    """What writes a file; all of its content is made before."""
+    if to == "fmu":
+        from vehiclemor.exporting.fmu import fmu_files, write_archive
+
+        files = fmu_files(system, step, fmi)
+        return lambda path: write_archive(files, path)
+    if to == "casadi":
+        function = _object(system, to)
+        return lambda path: function.save(str(path))
+    from vehiclemor.exporting import to_jax, to_sympy
+
+    text = (to_jax if to == "jax" else to_sympy).module_text(system)
+    return lambda path: path.write_text(text, encoding="utf-8")
+
+
+def _check_free(path: Path, to: str, overwrite: bool) -> None:
+    """Raise `InputError` if a path is taken, or nothing can be written there."""
+    try:
+        folder, there = path.is_dir(), path.exists()
+        if not path.absolute().parent.is_dir():
+            raise InputError(f"{path}: the folder {path.parent} does not exist")
+    except OSError as error:
+        raise InputError(f"{path}: can't be written ({error.strerror})") from None
+    if there and not overwrite:
+        raise InputError(f"{path} exists; overwrite=True (--overwrite) replaces it")
+    if there and folder != (to == "c"):
+        raise InputError(f"{path} is {'a folder' if folder else 'a file'}: it is not replaced")
+    if folder and not (path / OURS).is_file():
+        raise InputError(f"{path} holds something else than an export: it is not replaced")
+
+
+def _write_folder(path: Path, files: dict[str, str]) -> Path:
+    """Write a folder whole: under a temporary name first, then moved into place."""
+    temporary = temporary_path(path.absolute())
+    try:
+        make_folder(temporary)
+        for name, text in files.items():
+            (temporary / name).write_text(text, encoding="utf-8")
+        if path.exists():
+            old = temporary_path(path.absolute()).with_suffix(".old")
+            os.replace(path, old)
+            os.replace(temporary, path)
+            shutil.rmtree(old)
+        else:
+            os.replace(temporary, path)
+    except OSError as error:
+        raise not_written(path, error) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return path

@@ -1,0 +1,49 @@
+"""Which system a model, or what a method has made of it, is exported as."""
+
+from typing import Any
+
+from vehiclemor.codegen.kernels import kernel_sources
+from vehiclemor.errors import InputError
+from vehiclemor.exporting.equations_of_motion import full_system, reduced_system
+from vehiclemor.exporting.path_map import map_system
+from vehiclemor.exporting.system import ExportedSystem
+from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.reduction.methods.guarded import GuardedModel
+from vehiclemor.reduction.methods.path_map import PathMapModel
+from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.simulation.dynamic import DynamicModel
+
+
+def exported_system(what: Any, name: str) -> ExportedSystem:
+    """The system of a model, or of what the fit of a method has given.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+
+    Raises
+    ------
+    InputError
+        If it is no system of straight-line equations.
+    """
+    match what:
+        case DynamicModel():
+            return full_system(what, name)
+        case FullOrderModel():
+            return exported_system(what.model, name)
+        case GuardedModel():
+            return exported_system(what.fast, name)
+        case PathMapModel():
+            return map_system(what, name)
+        case ReducedVehicle():
+            text, constants = what.lift.text(0)
+            return reduced_system(what.equations, name, (*kernel_sources(text).values(), constants))
+        case ReducedSystem() if what.spaces.formulation == "full":
+            kernels, constants = what.system.kernels, what.system.constants
+            if "full_state" in kernels:
+                return reduced_system(what, name, (kernels.sources["full_state"], constants))
+            if what.states == what.model.definition.states:
+                return reduced_system(what, name, None)
+    raise InputError(f"{name} can't be exported: its equations are no straight-line program")

@@ -1,0 +1,73 @@
+"""What is exported: a system in straight-line functions, with names, units, values and starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import version
+
+import numpy as np
+
+from vehiclemor.exporting.straight_line import StraightLine
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.short_repr import ShortRepr
+
+# Who has written it.
+TOOL = f"vehiclemor {version('vehiclemor')}"
+# Function -> names of its arguments, in order, and of its result.
+SIGNATURES = {
+    "constants": ("p", "c"),
+    "derivative": ("x", "u", "c", "dx"),
+    "outputs": ("x", "u", "c", "y"),
+}
+# Derivatives along seeds of the arguments: what the results change by.
+SEED = "_seed"
+TANGENTS = {
+    f"{name}_tangent": (*given, *(f"{argument}{SEED}" for argument in given), f"{result}_change")
+    for name, (*given, result) in SIGNATURES.items()
+}
+TRUST = Quantity("trust_indicator", "1", "how far it goes: beyond 1 the reduced model isn't known")
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedSystem(ShortRepr):
+    """A system x' = f(x, u, c(p)), y = g(x, u, c(p)).
+
+    Attributes
+    ----------
+    name, summary
+        Of the model, or of the model and the method; one line.
+    states, inputs, outputs, parameters
+        Quantities in order; of a reduced model nothing is a parameter, its numbers are in the code.
+    values
+        Of the parameters.
+    starts
+        Name -> state; the default first.
+    functions
+        `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
+    tangents
+        Makes the functions of `TANGENTS`.
+    table
+        What `entry(row, place)` reads, a number at row + place; empty if there is none.
+    """
+
+    repr_fields = ("name", "summary")
+
+    name: str
+    summary: str
+    states: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    parameters: tuple[Quantity, ...]
+    values: np.ndarray
+    starts: Mapping[str, np.ndarray]
+    functions: Mapping[str, StraightLine]
+    tangents: Callable[[], Mapping[str, StraightLine]]
+    table: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Array -> number of floats."""
+        constants = len(self.functions["constants"].results)
+        counts = len(self.states), len(self.inputs), constants, len(self.parameters)
+        return dict(zip("xucp", counts, strict=True))

@@ -1,0 +1,98 @@
+"""Hoisted constants of a parameter set, and how they change with single parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.codegen.tangent import tangent
+from vehiclemor.registry import unknown
+
+if TYPE_CHECKING:
+    from vehiclemor.codegen.derivation import Derivation
+    from vehiclemor.multibody.definition import ModelDefinition
+
+# Step of a parameter in differences, as a part of it or of the second number (SI units).
+STEP, SMALLEST = 1e-4, 1e-2
+
+
+def values_of(definition: ModelDefinition, flat: np.ndarray) -> dict[str, Any]:
+    """Values by name of all components in declared order: floats, and arrays of several."""
+    values, place = {}, 0
+    for name, declared in definition.parameters.items():
+        part = flat[place : place + declared.size]
+        values[name] = part.copy() if declared.size > 1 else float(part[0])
+        place += declared.size
+    return values
+
+
+def hoisted_constants(
+    equations: Derivation, flat: np.ndarray, solved: Sequence[float]
+) -> np.ndarray:
+    """Hoisted constants of all components of the parameters and of what was solved for."""
+    constants = np.empty(equations.constants)
+    equations.kernels.call("constants", np.concatenate([flat, solved]), constants)
+    return constants
+
+
+def solved_parameters(
+    definition: ModelDefinition, flat: np.ndarray, equations: Derivation
+) -> dict[str, float]:
+    """What a model solves for before it can start, by name."""
+    if not definition.solved:
+        return {}
+
+    def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        result = np.empty(len(x))
+        constants = hoisted_constants(equations, flat, solved)
+        equations.kernels.call("derivative", x, u, constants, result)
+        return result
+
+    return definition.solve_equilibrium(values_of(definition, flat), derivative)
+
+
+def components(definition: ModelDefinition, name: str) -> range:
+    """Numbers of the components of a parameter among those of all.
+
+    Raises
+    ------
+    InputError
+        If it is no parameter of the model.
+    """
+    if name not in definition.parameters:
+        raise unknown("parameter", name, definition.parameters)
+    place = 0
+    for known, declared in definition.parameters.items():
+        if known == name:
+            break
+        place += declared.size
+    return range(place, place + definition.parameters[name].size)
+
+
+def constants_along(
+    definition: ModelDefinition, flat: np.ndarray, equations: Derivation, numbers: Sequence[int]
+) -> np.ndarray:
+    """Derivatives (numbers, constants) of the hoisted constants by components of the parameters.
+
+    The model is built anew with each: what its equilibrium solves for follows.  That part is by
+    differences of order 4, the rest is exact.
+    """
+
+    def solved(moved: np.ndarray) -> np.ndarray:
+        found = solved_parameters(definition, moved, equations)
+        return np.array([found[name] for name in definition.solved])
+
+    directions = np.zeros((len(numbers), len(flat) + len(definition.solved)))
+    for row, number in zip(directions, numbers, strict=True):
+        row[number] = 1.0
+        if definition.solved:
+            step = np.zeros_like(flat)
+            step[number] = STEP * max(abs(flat[number]), SMALLEST)
+            near, far = (solved(flat + k * step) - solved(flat - k * step) for k in (1, 2))
+            row[len(flat) :] = (8.0 * near - far) / (12.0 * step[number])
+    given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
+    source = equations.sources["constants"]
+    along = tangent(source, source.arguments[0], equations.constants)
+    return along.columns((given,), directions)
