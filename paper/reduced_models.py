@@ -18,11 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vehiclemor import VehiclemorError
+from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder
 from vehiclemor.online.model_file import content
 from vehiclemor.online.rom import ReducedOrderModel, reduce
 from vehiclemor.online.saved import load, shipped_folder
-from vehiclemor.resources import data_folder, data_names
+from vehiclemor.resources import checkout_data, data_folder, data_names
 from vehiclemor.study.method_settings import Settings, complete_settings
 from vehiclemor.study.plans.ledger import Ledger
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
@@ -71,12 +72,13 @@ def path_of(name: str) -> Path:
 def stale(name: str, choice: Choice) -> list[str]:
     """In what a file is not that of the choice and of this source; `source` alone may be harmless.
 
-    Raises
-    ------
-    FileError
-        If there is no such file, or it can't be read.
+    Only `file` if there is none that can be loaded.
     """
-    written, attributes = content(path_of(name))
+    try:
+        load(path_of(name))
+        written, attributes = content(path_of(name))
+    except FileError:
+        return ["file"]
     training = [scenario.content for scenario in choice.training]
     here = {
         "method": (attributes["method"], choice.method),
@@ -94,7 +96,7 @@ def difference(choice: Choice, one: ReducedOrderModel, other: ReducedOrderModel)
     for scenario in choice.protocol.sets["validation"][:COMPARED]:
         start = start_of(choice.protocol.model, scenario)
         a, b = (rom.simulate(scenario.maneuver, start).outputs for rom in (one, other))
-        largest = max(largest, float(np.max(np.abs(a - b) / np.ptp(a, axis=0).clip(1e-12))))
+        largest = max(largest, float(np.max(np.abs(a - b) / np.ptp(a, axis=0).clip(1e-6))))
     return largest
 
 
@@ -104,10 +106,12 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="compare with a fit, write nothing")
     parser.add_argument("models", nargs="*", default=data_names("protocols"), metavar="MODEL")
     given = parser.parse_args()
+    if not given.check and checkout_data() is None:
+        raise VehiclemorError("the package does not run from a checkout: pip install -e . there")
     status = 0
     for name in given.models:
         choice, path = chosen(name), path_of(name)
-        reasons = stale(name, choice) if path.exists() else ["file"]
+        reasons = stale(name, choice)
         if not reasons and not given.check:
             print(f"{name}: {path} is up to date")
             continue

@@ -311,6 +311,44 @@ def test_rates_are_those_of_the_steps(pair: Pair) -> None:
     np.testing.assert_allclose((later - state) / dt, mean, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.parametrize("by", ["state", "inputs"])
+def test_jacobians_are_the_slopes_of_rates_and_outputs(pair: Pair, by: str) -> None:
+    space = getattr(pair.fit(), "state_space", None)
+    if space is None:
+        pytest.skip(f"{pair.name} gives whole runs alone")
+    rom, time = ReducedOrderModel(pair.model, pair.name, {}, (), pair.fit()), 1.63
+    u = pair.maneuver.at(np.array([time]))[0]
+    state = rom.state(inputs=u)
+    if pair.model.kind == "ae":
+        if getattr(space, "slopes", None) is None:
+            with pytest.raises(InputError, match="no analytic derivatives"):
+                rom.jacobian(state, u, by, of="coordinates")
+            return
+        if by == "state":
+            pytest.skip("coordinates follow from the inputs")
+        results = {
+            "coordinates": lambda _, v: rom.state(inputs=v),
+            "outputs": lambda _, v: rom.outputs(rom.state(inputs=v), v),
+        }
+    else:
+        state = rom.step(rom.step(state, u, 0.3, time - 0.3), u, 1e-3, time)
+        results = {"rhs": lambda x, v: rom.rhs(x, v, time), "outputs": rom.outputs}
+    rng = np.random.default_rng(3)
+    for of, function in results.items():
+        found = rom.jacobian(state, u, by, of, time)
+        size = np.maximum(np.abs(state if by == "state" else u), 1e-2)
+        assert found.shape[1] == len(size)
+        along = size * rng.uniform(-1.0, 1.0, len(size))
+        moved = [
+            function(state + h * along, u) if by == "state" else function(state, u + h * along)
+            for h in (1e-4, -1e-4, 5e-5, -5e-5)
+        ]
+        far, near = (moved[0] - moved[1]) / 2e-4, (moved[2] - moved[3]) / 1e-4
+        difference = (4.0 * near - far) / 3.0
+        largest = np.abs(found) @ np.abs(along)
+        assert (np.abs(found @ along - difference) <= 1e-6 * largest + 1e-6).all(), of
+
+
 def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> None:
     settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {})).model_dump()
     training = (Scenario(pair.maneuver, pair.model.starts[0]),)
@@ -335,6 +373,12 @@ def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> Non
         inputs = np.full(len(made.inputs), 1e-3)
         steps = [rom.step(rom.state(inputs=inputs), inputs, 1e-2) for rom in (made, again)]
         np.testing.assert_array_equal(steps[1], steps[0])
+        if pair.model.kind != "ae":
+            first, second = (
+                rom.jacobian(step, inputs, of="outputs")
+                for rom, step in zip((made, again), steps, strict=True)
+            )
+            np.testing.assert_array_equal(second, first)
 
 
 def test_unknown_start_is_refused(pair: Pair) -> None:

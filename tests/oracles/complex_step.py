@@ -7,6 +7,7 @@ The imaginary part of F(x + i h v) / h is F's derivative along v, exact to round
 import cmath
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -41,6 +42,7 @@ def _atan_batch(work: np.ndarray, first: int) -> None:
 FUNCTIONS = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh")
 
 
+@lru_cache(maxsize=16)
 def kernel_function(text: str) -> Any:
     """The function of a kernel's text, which takes real or complex arrays."""
     own = {name: getattr(cmath, name) for name in (*FUNCTIONS, "tanh")}

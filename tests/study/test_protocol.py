@@ -8,7 +8,10 @@ from vehiclemor.reduction.methods import replay
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.resources import data_names
+from vehiclemor.simulation import input_polynomials
 from vehiclemor.simulation.build import build
+from vehiclemor.study import evaluate
+from vehiclemor.study import scenario as scenario_module
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.scenario import Scenario, start_of, training_run
@@ -86,6 +89,21 @@ def test_a_contestant_may_learn_from_some_maneuvers_only(protocols):
         if contestant.label == "fixed basis":
             assert {s.maneuver.name for s in contestant.training} == {"rack_lane_change"}
             assert len(contestant.training) < len(protocols[VEHICLES[1]].sets["training"])
+
+
+def test_what_all_rows_need_of_a_run_is_kept_until_the_next_row(protocols):
+    kept = (
+        input_polynomials._recorded,
+        input_polynomials._found_signal,
+        evaluate.kept_reference,
+        scenario_module._state_at,
+        scenario_module.input_hash,
+    )
+    for protocol in protocols.values():
+        draws = (protocol.definition.drawn, protocol.definition.drawn_outside)
+        runs = len(protocol.sets["test"]) + sum(draw.runs for draw in draws if draw)
+        # Of a smaller cache nothing would be left when the next row comes.
+        assert all(runs <= function.cache_parameters()["maxsize"] for function in kept)
 
 
 def test_one_run_under_two_names_is_found(tmp_path, protocol_text):

@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from vehiclemor import api
+import vehiclemor as vm
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.errors import InputError
-from vehiclemor.exporting.export import STEP, Target
+from vehiclemor.exporting.export import STEP, Target, destination, name_of
 
 
 def export(
@@ -61,28 +61,21 @@ def export(
     step
         Step size in s of the integrator in C and FMU.
     """
-    import vehiclemor as vm
-
     given = key_values("--set", settings)
-    full = parameter or parameters is not None
     kept = Path(model).suffix == ".nc"
-    if (kept or shipped) and (method or given or full):
+    if (kept or shipped) and (method or given or parameter or parameters):
         raise InputError("a reduced model that is kept has its method, settings and parameters")
     if given and method is None:
         raise InputError("--set is for a method: --method NAME")
-    if kept:
-        chosen = vm.load(model)
-    elif shipped:
-        chosen = vm.rom(model)
+    if kept or shipped:
+        chosen = vm.load(model) if kept else vm.rom(model)
+        out = destination(name_of(chosen.model.name, chosen.method), to, out, overwrite)
     else:
-        chosen = api.model(model, key_values("--parameter", parameter), parameters)
+        chosen = vm.model(model, key_values("--parameter", parameter), parameters)
+        # Before anything is fitted.
+        out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
             chosen = vm.reduce(chosen, method, training=training, preset=preset, **given)
-    from vehiclemor.exporting.export import ENDINGS, system_of
-
-    system = system_of(chosen)
-    ending = f"_{to}.py" if ENDINGS[to] == ".py" else ENDINGS[to]
-    path = Path(f"{system.name}{ending}") if out is None else out
-    written = vm.export(chosen, to, path, overwrite=overwrite, fmi=fmi, step=step)
+    written = vm.export(chosen, to, out, overwrite=overwrite, fmi=fmi, step=step)
     print(f"written: {written}")
     return 0

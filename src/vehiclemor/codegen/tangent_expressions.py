@@ -8,7 +8,8 @@ from vehiclemor.codegen.kernel_statements import SEED, places
 
 # Function -> text of its derivative at the argument x, where it has the value v.
 DERIVATIVES = {
-    "math.sqrt": "0.5 / v",
+    # Of a norm at zero it is what is between its slopes to all sides.
+    "math.sqrt": "0.5 / v if v > 0.0 else 0.0",
     "math.sin": "math.cos(x)",
     "math.cos": "-math.sin(x)",
     "math.tan": "1.0 + v * v",

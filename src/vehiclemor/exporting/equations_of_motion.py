@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from vehiclemor.codegen.kernels import KernelSource
@@ -23,35 +26,40 @@ from vehiclemor.simulation.model import Model
 
 def full_system(model: DynamicModel, name: str) -> ExportedSystem:
     """A model with its parameters; among them is what it has solved for."""
-    definition, equations = model.definition, model.equations
-    sources = equations.sources
-    quantities = parameter_quantities(model)
+    definition, sources = model.definition, model.equations.sources
     flat = model.parameters.flat()
-    solved = solved_parameters(definition, flat, equations)
-    values = np.concatenate([flat, [solved[key] for key in definition.solved]])
-    given = {
-        "_x": entries("x", len(definition.states)),
-        "_u": entries("u", len(definition.inputs)),
-        "_constants": entries("c", equations.constants),
-        "_parameters": entries("p", len(quantities)),
-    }
-
-    def tangents() -> dict[str, StraightLine]:
-        seeds = {name: entries(f"{name[1:2]}{SEED}", len(own)) for name, own in given.items()}
-        return {f"{k}_tangent": tangent_line(sources[k], given, seeds).pruned() for k in SIGNATURES}
-
+    solved = solved_parameters(definition, flat, model.equations)
+    given = full_arrays(model) | {"_x": entries("x", len(definition.states))}
+    seeds = seeds_of(given)
     return ExportedSystem(
         name,
         model.summary,
         (*definition.coordinates, *definition.speeds),
         definition.inputs,
         definition.outputs,
-        quantities,
-        values,
+        parameter_quantities(model),
+        np.concatenate([flat, [solved[key] for key in definition.solved]]),
         model.initial,
         {key: straight_line(sources[key].text, given).pruned() for key in SIGNATURES},
-        tangents,
+        lambda: {
+            f"{key}_tangent": tangent_line(sources[key], given, seeds).pruned()
+            for key in SIGNATURES
+        },
     )
+
+
+def full_arrays(model: Model) -> dict[str, list[ast.expr]]:
+    """Arguments of a model's kernels, but for the state, in the entries of the exported arrays."""
+    return {
+        "_u": entries("u", len(model.inputs)),
+        "_constants": entries("c", model.equations.constants),
+        "_parameters": entries("p", len(parameter_quantities(model))),
+    }
+
+
+def seeds_of(arrays: Mapping[str, Sequence[ast.expr]]) -> dict[str, list[ast.expr]]:
+    """What the entries of arrays change by."""
+    return {key: entries(f"{key[1]}{SEED}", len(listed)) for key, listed in arrays.items()}
 
 
 def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
@@ -78,14 +86,13 @@ def reduced_system(
     model, system = reduced.model, reduced.system
     definition, full = model.definition, 2 * len(model.coordinates)
     own = {"_x": entries("x", len(reduced.states)), "_u": entries("u", system.inputs)}
-    seeds = {key: entries(f"{key[1:]}{SEED}", len(listed)) for key, listed in own.items()}
-    rates = system.kernels.sources["derivative"], own | {"_constants": numbers(system.constants)}
-    derivative = straight_line(rates[0].text, rates[1])
+    seeds = seeds_of(own)
+    rates = system.kernels.sources["derivative"]
+    of_rates = own | {"_constants": numbers(system.constants)}
     source = model.kernels.sources["outputs"]
     lifted = StraightLine({}, own["_x"])
     if lift is not None:
-        lifting = lift[0], own | {"_constants": numbers(lift[1])}
-        lifted = straight_line(lifting[0].text, lifting[1])
+        lifted = straight_line(lift[0].text, own | {"_constants": numbers(lift[1])}).named("full")
     given = {"_x": lifted.results, "_u": own["_u"], "_constants": numbers(model.constants)}
     outputs = straight_line(source.text, given, lifted)
     used = lifted.results[full:]
@@ -93,12 +100,13 @@ def reduced_system(
     def tangents() -> dict[str, StraightLine]:
         moved = StraightLine(lifted.assignments, seeds["_x"])
         if lift is not None:
-            moved = tangent_line(*lifting, seeds, lifted)
+            of_lift = own | {"_constants": numbers(lift[1])}
+            moved = tangent_line(lift[0], of_lift, seeds, lifted).named("moved")
         found = tangent_line(source, given, seeds | {"_x": moved.results}, moved)
         further = [trust_tangent(used, moved.results[full:])] if used else []
         return {
             "constants_tangent": StraightLine({}, []),
-            "derivative_tangent": tangent_line(*rates, seeds).pruned(),
+            "derivative_tangent": tangent_line(rates, of_rates, seeds).pruned(),
             "outputs_tangent": found.followed_by(further).pruned(),
         }
 
@@ -115,7 +123,7 @@ def reduced_system(
         {key: reduced.begin(key, nothing) for key in model.starts},
         {
             "constants": StraightLine({}, []),
-            "derivative": derivative.pruned(),
+            "derivative": straight_line(rates.text, of_rates).pruned(),
             "outputs": outputs.followed_by([trust(used)] if used else []).pruned(),
         },
         tangents,

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 Target = Literal["c", "fmu", "casadi", "jax", "sympy"]
 TARGETS: tuple[str, ...] = Target.__args__
-# Ending of what is written; C is a folder.
-ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi", "jax": ".py", "sympy": ".py"}
+# How the name of what is written ends; C is a folder.
+ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi", "jax": "_jax.py"}
+ENDINGS["sympy"] = "_sympy.py"
 # Step in s of the integrator in C: stable for modes of up to 2780 1/s; the vehicles' are at 530.
 STEP = 1e-3
 # A folder with this file is one of ours.
@@ -78,15 +79,17 @@ def export(
         raise InputError(f"fmi: {quoted(fmi)} is no version; 2 or 3")
     if not number("step", step) > 0.0:
         raise InputError(f"step: {step:g} s is not above 0")
+    if isinstance(model, str):
+        from vehiclemor.simulation.build import build
+
+        model = build(model)
     system = system_of(model)
+    kept = path is not None or to in ("c", "fmu")
+    place = destination(system.name, to, path, overwrite) if kept else None
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
-    if path is None and to in ("c", "fmu"):
-        path = f"{system.name}{ENDINGS[to]}"
-    if path is None:
+    if place is None:
         return _object(system, to)
-    place = file_path("path", path)
-    _check_free(place, to, overwrite)
     if to == "c":
         from vehiclemor.exporting.c import c_files
 
@@ -94,23 +97,47 @@ def export(
     return write_whole(place, _writer(system, to, fmi, step))
 
 
-def system_of(model: str | Model | ReducedOrderModel) -> ExportedSystem:
+def destination(name: str, to: str, path: str | Path | None, overwrite: bool) -> Path:
+    """Where an export goes, by default under the model's name into the working folder.
+
+    Raises
+    ------
+    InputError
+        If something is there that must not be replaced, or nothing can be written there.
+    """
+    found = Path(f"{name}{ENDINGS[to]}") if path is None else file_path("path", path)
+    try:
+        folder, there = found.is_dir(), found.exists()
+        if not found.absolute().parent.is_dir():
+            raise InputError(f"{found}: the folder {found.parent} does not exist")
+    except OSError as error:
+        raise InputError(f"{found}: can't be written ({error.strerror})") from None
+    if there and not overwrite:
+        raise InputError(f"{found} exists; overwrite=True (--overwrite) replaces it")
+    if there and folder != (to == "c"):
+        raise InputError(f"{found} is {'a folder' if folder else 'a file'}: it is not replaced")
+    if folder and not (found / OURS).is_file():
+        raise InputError(f"{found} holds something else than an export: it is not replaced")
+    return found
+
+
+def name_of(model: str, method: str | None) -> str:
+    """What an export is called: a word of C, after the model and the method."""
+    word = re.sub(r"\W", "_", f"{model}_{method}" if method else model, flags=re.ASCII)
+    return f"_{word}" if word[:1].isdigit() else word
+
+
+def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
     """The system that a model is exported as."""
     from vehiclemor.exporting.exported import exported_system
     from vehiclemor.online.rom import ReducedOrderModel
-    from vehiclemor.simulation.build import build
     from vehiclemor.simulation.model import Model
 
     if isinstance(model, ReducedOrderModel):
-        return exported_system(model.reduced, _identifier(f"{model.model.name}_{model.method}"))
-    ready = model if isinstance(model, Model) else build(model)
-    return exported_system(ready, _identifier(ready.name))
-
-
-def _identifier(name: str) -> str:
-    """The name as a word of C."""
-    word = re.sub(r"\W", "_", name, flags=re.ASCII)
-    return f"_{word}" if word[0].isdigit() else word
+        return exported_system(model.reduced, name_of(model.model.name, model.method))
+    if not isinstance(model, Model):
+        raise InputError(f"model: {quoted(model)} is neither a name nor a full or reduced model")
+    return exported_system(model, name_of(model.name, None))
 
 
 def _object(system: ExportedSystem, to: str) -> Any:
@@ -141,22 +168,6 @@ def _writer(system: ExportedSystem, to: str, fmi: int, step: float) -> Callable[
 
     text = (to_jax if to == "jax" else to_sympy).module_text(system)
     return lambda path: path.write_text(text, encoding="utf-8")
-
-
-def _check_free(path: Path, to: str, overwrite: bool) -> None:
-    """Raise `InputError` if a path is taken, or nothing can be written there."""
-    try:
-        folder, there = path.is_dir(), path.exists()
-        if not path.absolute().parent.is_dir():
-            raise InputError(f"{path}: the folder {path.parent} does not exist")
-    except OSError as error:
-        raise InputError(f"{path}: can't be written ({error.strerror})") from None
-    if there and not overwrite:
-        raise InputError(f"{path} exists; overwrite=True (--overwrite) replaces it")
-    if there and folder != (to == "c"):
-        raise InputError(f"{path} is {'a folder' if folder else 'a file'}: it is not replaced")
-    if folder and not (path / OURS).is_file():
-        raise InputError(f"{path} holds something else than an export: it is not replaced")
 
 
 def _write_folder(path: Path, files: dict[str, str]) -> Path:

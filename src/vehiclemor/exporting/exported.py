@@ -5,6 +5,7 @@ from typing import Any
 from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.equations_of_motion import full_system, reduced_system
+from vehiclemor.exporting.mechanism import mechanism_system
 from vehiclemor.exporting.path_map import map_system
 from vehiclemor.exporting.system import ExportedSystem
 from vehiclemor.reduction.methods.full_order import FullOrderModel
@@ -12,6 +13,7 @@ from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import DynamicModel
 
 
@@ -31,6 +33,8 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
     match what:
         case DynamicModel():
             return full_system(what, name)
+        case AlgebraicModel():
+            return mechanism_system(what, name)
         case FullOrderModel():
             return exported_system(what.model, name)
         case GuardedModel():
@@ -39,7 +43,8 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
             return map_system(what, name)
         case ReducedVehicle():
             text, constants = what.lift.text(0)
-            return reduced_system(what.equations, name, (*kernel_sources(text).values(), constants))
+            lift = kernel_sources(text)["full_state"], constants
+            return reduced_system(what.equations, name, lift)
         case ReducedSystem() if what.spaces.formulation == "full":
             kernels, constants = what.system.kernels, what.system.constants
             if "full_state" in kernels:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import platform
 import shutil
@@ -17,7 +18,7 @@ from vehiclemor.exporting.c import DRIVER, SOURCES, c_files
 from vehiclemor.exporting.model_description import identifier, model_description, sources
 from vehiclemor.exporting.system import ExportedSystem
 
-VERSIONS = (2, 3)
+_LOG = logging.getLogger("vehiclemor")
 # The system's name of a compiler -> ending of its shared libraries.
 ENDINGS = {"Linux": ".so", "Darwin": ".dylib", "Windows": ".dll"}
 MACHINES = {"AMD64": "x86_64", "arm64": "aarch64"}
@@ -83,6 +84,7 @@ def shared_library(texts: dict[str, str], compiled: tuple[str, ...]) -> bytes | 
     """
     command = compiler()
     if command is None:
+        _LOG.warning("no C compiler (cc, or the variable CC): the unit has sources, but no binary")
         return None
     with tempfile.TemporaryDirectory() as folder:
         for name, text in texts.items():
@@ -93,7 +95,8 @@ def shared_library(texts: dict[str, str], compiled: tuple[str, ...]) -> bytes | 
             command_line, cwd=folder, capture_output=True, text=True, check=False
         )
         if done.returncode:
-            first = next(iter(done.stderr.splitlines()), f"status {done.returncode}")
+            lines = [line for line in done.stderr.splitlines() if "error" in line]
+            first = next(iter(lines), f"status {done.returncode}")
             raise InputError(f"{command} can't compile the model: {first}")
         return (Path(folder) / "library").read_bytes()
 

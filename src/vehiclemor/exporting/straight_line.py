@@ -37,7 +37,16 @@ class StraightLine(NamedTuple):
     """
 
     assignments: dict[str, ast.expr]
-    results: list[ast.expr]
+    results: Sequence[ast.expr]
+
+    def named(self, name: str) -> "StraightLine":
+        """The same with a name for each result, for those who read it several times."""
+        assignments, results = dict(self.assignments), list(self.results)
+        for i, result in enumerate(self.results):
+            if not isinstance(result, ast.Name | ast.Constant | ast.Subscript):
+                results[i] = ast.Name(f"{name}_{i}")
+                assignments[f"{name}_{i}"] = result
+        return StraightLine(assignments, results)
 
     def followed_by(self, results: Sequence[ast.expr]) -> "StraightLine":
         """The same with further results."""
@@ -100,6 +109,16 @@ def numbers(values: Iterable[float]) -> list[ast.expr]:
 def call(name: str, *arguments: ast.expr) -> ast.expr:
     """Expression of a call."""
     return ast.Call(ast.Name(name), list(arguments), [])
+
+
+def negative(value: ast.expr) -> ast.expr:
+    """Minus a value; in C two signs in a row are a decrement."""
+    match value:
+        case ast.Constant(value=float() as number):
+            return ast.Constant(-number)
+        case ast.UnaryOp(ast.USub(), operand):
+            return operand
+    return ast.UnaryOp(ast.USub(), value)
 
 
 class _Reader:
@@ -180,11 +199,7 @@ class _Reader:
             case ast.BinOp(left, operator, right):
                 return ast.BinOp(self._value(left), operator, self._value(right))
             case ast.UnaryOp(ast.USub(), operand):
-                # In C two signs in a row are a decrement.
-                match value := self._value(operand):
-                    case ast.Constant(value=float() as number):
-                        return ast.Constant(-number)
-                return ast.UnaryOp(ast.USub(), value)
+                return negative(self._value(operand))
             case ast.Compare(left, [operator], [right]):
                 return ast.Compare(self._value(left), [operator], [self._value(right)])
             case ast.IfExp(test, then, otherwise):

@@ -4,7 +4,7 @@ import ast
 from collections.abc import Sequence
 from functools import reduce
 
-from vehiclemor.exporting.straight_line import call
+from vehiclemor.exporting.straight_line import call, negative
 
 ZERO = ast.Constant(0.0)
 
@@ -19,7 +19,7 @@ def trust_tangent(used: Sequence[ast.expr], moved: Sequence[ast.expr]) -> ast.ex
     found = None
     for value, change in zip(used, moved, strict=True):
         falls = ast.Compare(value, [ast.Lt()], [ZERO])
-        own = call("select", falls, ast.UnaryOp(ast.USub(), change), change)
+        own = call("select", falls, negative(change), change)
         largest = ast.Compare(call("fabs", value), [ast.GtE()], [trust(used)])
         found = own if found is None else call("select", largest, own, found)
     assert found is not None

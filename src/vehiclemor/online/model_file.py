@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path
+from vehiclemor.arguments import file_path, quoted
 from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.validation import checked_fit
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr, shortened
 from vehiclemor.simulation.build import build
@@ -133,6 +134,9 @@ def read(path: Any) -> Saved:
             raise FileError(f"the equations of {name} have changed since")
         reader = Reader(model, stored)
         made = {name: reader.value(parts[name], name) for name in PARTS}
+        checked_fit(method, made["reduced"])
+        if not isinstance(made["known"], InputRange):
+            raise TypeError(f"known is {quoted(made['known'])}, no InputRange")
         return Saved(model, method, settings, tuple(training), **made)
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None

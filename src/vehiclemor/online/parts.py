@@ -30,8 +30,8 @@ from vehiclemor.simulation.model import Model
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
 # What of a model may be a part of a reduced one.
 OWN = ("system", "kernels")
-# Kinds of arrays, and as what they are stored.
-STORED = {"f": "f8", "i": "i8", "b": "i1", "c": "f8"}
+# Types of arrays, and as what they are stored.
+STORED = {"float64": "f8", "int64": "i8", "bool": "i1", "complex128": "f8"}
 
 
 class Writer:
@@ -72,7 +72,7 @@ class Writer:
 
     def _described(self, value: Any, place: str) -> dict[str, Any]:
         kind = type(value)
-        if isinstance(value, np.ndarray) and value.dtype.kind in STORED:
+        if isinstance(value, np.ndarray) and value.dtype.name in STORED:
             return self._array(value, place)
         if isinstance(value, Kernels):
             if value.sources == self._own_sources:
@@ -95,11 +95,11 @@ class Writer:
     def _array(self, value: np.ndarray, place: str) -> dict[str, Any]:
         # Products of matrices are rounded as their numbers stand in memory.
         turned = value.ndim > 1 and value.flags.f_contiguous and not value.flags.c_contiguous
-        stored = np.ascontiguousarray(value.T if turned else value)
-        kind, shape = value.dtype.kind, stored.shape
-        stored = stored.view(float).reshape(*shape, 2) if kind == "c" else stored
+        value = value.T if turned else value
+        kind, shape, stored = value.dtype.name, value.shape, np.ascontiguousarray(value)
+        stored = stored.view(float).reshape(*shape, 2) if kind == "complex128" else stored
         self.arrays[place] = stored.astype(STORED[kind])
-        return {"array": place, "kind": kind, "shape": list(shape), "turned": turned}
+        return {"array": place, "type": kind, "shape": list(shape), "turned": turned}
 
 
 class Reader:
@@ -164,10 +164,10 @@ class Reader:
         raise ValueError(f"{quoted(part)} is no part of a model")
 
     def _array(self, stored: np.ndarray, part: dict[str, Any]) -> np.ndarray:
-        kind, shape = part["kind"], tuple(part["shape"])
-        stored = np.ascontiguousarray(stored, dtype=STORED[kind])
-        found = stored.ravel().view({"c": complex, "b": bool}.get(kind, stored.dtype))
-        found = found.reshape(shape)
+        stored = np.ascontiguousarray(stored, dtype=STORED[part["type"]]).ravel()
+        complex_pairs = part["type"] == "complex128"
+        found = stored.view(complex) if complex_pairs else stored.astype(part["type"])
+        found = found.reshape(part["shape"])
         return found.T if part["turned"] else found
 
 

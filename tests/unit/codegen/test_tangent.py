@@ -105,6 +105,13 @@ def test_at_a_kink_it_is_the_derivative_towards_larger_arguments():
     assert slopes == [0.0, 2.0, 2.0]
 
 
+def test_a_norm_that_is_zero_has_the_derivative_between_its_slopes():
+    text = "def norm(_x, _work, _result):\n    _result[0] = math.sqrt(_x[0]*_x[0] + _x[1]*_x[1])\n"
+    found = tangent(_source(text), "_x", 1)
+    assert found.jacobian((np.zeros(2),), 2).tolist() == [[0.0, 0.0]]
+    np.testing.assert_allclose(found.jacobian((np.array([3.0, -4.0]),), 2), [[0.6, -0.8]])
+
+
 @pytest.mark.parametrize(
     ("line", "told"),
     [

@@ -10,6 +10,7 @@ from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver, smooth
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
+from vehiclemor.simulation.integrators.catalogue import MOST_CALLS
 from vehiclemor.study.scenario import Scenario
 
 CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
@@ -64,11 +65,19 @@ def test_a_run_is_a_dataset_when_asked(linear):
 def test_a_step_is_a_function_of_its_arguments_alone(linear):
     states = [linear.state(start) for start in linear.model.starts]
     inputs = [[0.0], [0.01], [-0.02]]
-    cases = 20 * [(x, u, dt) for x in states for u in inputs for dt in (0.001, 0.02, 1.0)]
+    ways = [(u, dt, ends) for u in inputs for dt in (0.001, 0.02, 1.0) for ends in (None, [0.01])]
+    cases = 20 * [(x, u, dt, 0.0, ends) for x in states for u, dt, ends in ways]
     known = [linear.step(*case) for case in cases]
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda case: linear.step(*case), reversed(cases)))
     np.testing.assert_array_equal(found[::-1], known)
+
+
+def test_a_loop_may_go_on_for_ever(linear):
+    state, u = linear.state(), np.zeros(1)
+    for _ in range(MOST_CALLS // 3):
+        state = linear.step(state, u, 1e-3)
+    assert state[linear.states.index("X")] == pytest.approx(MOST_CALLS // 3 * 20e-3, rel=1e-6)
 
 
 def test_two_short_steps_are_a_long_one(full):

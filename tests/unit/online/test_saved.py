@@ -2,11 +2,12 @@
 
 import dataclasses
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import netCDF4
 import numpy as np
@@ -17,6 +18,8 @@ import xarray as xr
 import vehiclemor as vm
 from vehiclemor.codegen.kernels import Kernels, KernelSource
 from vehiclemor.errors import FileError, InputError
+from vehiclemor.online import parts
+from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
@@ -41,9 +44,9 @@ def rewritten(path: Path, change: Callable[[xr.Dataset, dict[str, Any]], None]) 
     """A file with other content that is whole, as its author would write it."""
     with xr.open_dataset(path, decode_cf=False) as file:
         dataset = file.load()
-    parts = json.loads(dataset["parts"].item())
-    change(dataset, parts)
-    dataset["parts"] = ((), json.dumps(parts))
+    found = json.loads(dataset["parts"].item())
+    change(dataset, found)
+    dataset["parts"] = ((), json.dumps(found))
     path.unlink()
     write_dataset(dataset, path)
     return path
@@ -68,12 +71,62 @@ print(json.dumps([[run.outputs.tobytes().hex() for run in runs], sorted(sys.modu
 
 def test_another_process_gets_the_same_to_the_bit_and_derives_nothing(car, tmp_path):
     made = [car, *(vm.reduce(CAR, name, training="nominal") for name in ("softened_slip", "pod"))]
+    here = [rom.simulate().outputs.tobytes().hex() for rom in made]
     paths = [str(rom.save(tmp_path / f"{rom.method}.nc")) for rom in made]
     command = [sys.executable, "-c", LOADED, *paths]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     outputs, modules = json.loads(done.stdout)
-    assert outputs == [rom.simulate().outputs.tobytes().hex() for rom in made]
+    assert outputs == here
     assert not {"sympy", "numba", "xarray"} & set(modules)
+
+
+class Pair(NamedTuple):
+    """A part of a model, as methods have them."""
+
+    first: Any
+    second: Any
+
+
+def parted(value: Any) -> tuple[Any, dict[str, np.ndarray]]:
+    """A value, written and read again; arrays as they were written."""
+    model = build("double_wishbone")
+    writer = Writer(model)
+    written = json.loads(json.dumps(writer.part(value, "value")))
+    return Reader(model, writer.arrays).value(written, "value"), writer.arrays
+
+
+def test_parts_are_what_they_were(monkeypatch):
+    # As of a plug-in that is in use.
+    monkeypatch.setattr(parts, "_plug_ins", lambda: {"tests"})
+    table = np.arange(6.0).reshape(2, 3)
+    values = {
+        "numbers": (1, -0.0, np.inf, True, None, "text", np.float64(0.1), np.int64(3)),
+        "nested": [Pair(1, (2, [3.0])), {"a": {"b": ()}}],
+        "arrays": Pair(table, table.T),
+        "kinds": (
+            table > 2.0,
+            table.astype(int),
+            table + 1j * table,
+            np.zeros((0, 3)),
+            np.array(2.0),
+        ),
+        "rest": np.array([np.nan, -np.inf]),
+    }
+    made, _ = parted(values)
+    for before, after in zip(values["kinds"], made["kinds"], strict=True):
+        assert (after.dtype, after.shape) == (before.dtype, before.shape)
+        np.testing.assert_array_equal(after, before)
+    assert made["numbers"] == values["numbers"]
+    assert math.copysign(1.0, made["numbers"][1]) == -1.0
+    assert made["nested"] == values["nested"]
+    assert isinstance(made["nested"][0], Pair)
+    # Rows or columns stand together as they did: products are rounded by it.
+    assert made["arrays"].second.flags.f_contiguous
+    np.testing.assert_array_equal(made["arrays"].second, table.T)
+    np.testing.assert_array_equal(made["rest"], values["rest"])
+    again, once = parted((table, table))
+    assert len(once) == 1
+    np.testing.assert_array_equal(again[0], again[1])
 
 
 def test_parameters_settings_and_training_come_along(tmp_path):
@@ -116,6 +169,7 @@ def test_what_cant_be_written_is_named_and_leaves_no_file(car, tmp_path):
         (Local(), "reduced.offline"),
         ([1.0, {2: 3.0}], "reduced.offline.1"),
         (np.array(["text"]), "reduced.offline"),
+        (np.zeros(3, dtype=np.float32), "reduced.offline"),
     ):
         other = dataclasses.replace(car, reduced=dataclasses.replace(car.reduced, offline=wrong))
         with pytest.raises(InputError, match=f"linear_single_track of {CAR}: .* {what} is"):
@@ -177,33 +231,35 @@ def test_other_equations_are_refused(saved):
 def replaced(places: str, value: Any) -> Callable[[xr.Dataset, dict[str, Any]], None]:
     """Puts a value at `a.b.c` in the parts of a model."""
 
-    def change(_: object, parts: dict[str, Any]) -> None:
-        *path, last = ["reduced", *places.split(".")]
+    def change(_: object, found: dict[str, Any]) -> None:
+        *path, last = places.split(".")
         for name in path:
-            parts = parts[name]
-        parts[last] = value
+            found = found[name]
+        found[last] = value
 
     return change
 
 
 HARM = "__import__('pathlib').Path('harm').touch()"
-FEATURES = "fields.features.fields"
+FEATURES = "reduced.fields.features.fields"
 
 
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        ("class", "os:system"),
-        ("class", "vehiclemor.files:write_text"),
-        ("class", "vehiclemor.reduction.vehicle.features:monomials.__globals__"),
-        ("class", "vehiclemor.cli.app:main"),
-        ("fields.offline", {"function": "os:abort"}),
-        ("fields.offline", {"function": "subprocess:run"}),
-        ("fields.offline", {"code": HARM}),
-        ("fields.offline", {"method": "__reduce__", "of": {"model": ""}}),
-        ("fields.offline", {"same": "reduced.nothing"}),
-        ("fields.offline.fields", {"seconds": 0.0}),
-        ("fields.coefficients", {"array": "reduced.nothing"}),
+        ("reduced.class", "os:system"),
+        ("reduced.class", "vehiclemor.files:write_text"),
+        ("reduced.class", "vehiclemor.reduction.vehicle.features:monomials.__globals__"),
+        ("reduced.class", "vehiclemor.cli.app:main"),
+        ("reduced.fields.offline", {"function": "os:abort"}),
+        ("reduced.fields.offline", {"function": "subprocess:run"}),
+        ("reduced.fields.offline", {"code": HARM}),
+        ("reduced.fields.offline", {"method": "__reduce__", "of": {"model": ""}}),
+        ("reduced.fields.offline", {"same": "reduced.nothing"}),
+        ("reduced.fields.offline.fields", {"seconds": 0.0}),
+        ("reduced", {"tuple": [1.0]}),
+        ("known", {"function": "vehiclemor.reduction.trust:trust_of"}),
+        ("reduced.fields.coefficients", {"array": "reduced.nothing"}),
         # Texts that would become machine code: nothing but arithmetic, of their own numbers.
         (f"{FEATURES}.terms.tuple", [HARM] * 8),
         (f"{FEATURES}.terms.tuple", ["_x[99999]"] * 8),

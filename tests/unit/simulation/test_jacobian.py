@@ -1,0 +1,153 @@
+"""Analytic derivatives of full models, by complex step and by models that are made anew."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.oracles import complex_step
+from vehiclemor.errors import InputError
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+
+VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
+MODELS = ("double_wishbone", *VEHICLES)
+FUNCTIONS = {"rhs": "derivative", "outputs": "outputs", "residual": "residual"}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Model -> it and its nominal run, whose states can be reached."""
+    models = [build(name) for name in MODELS]
+    return {m.name: (m, m.simulate(component("maneuver", m.definition.maneuver))) for m in models}
+
+
+@pytest.mark.parametrize("by", ["state", "inputs"])
+@pytest.mark.parametrize(
+    ("name", "of"),
+    [(name, of) for name in VEHICLES for of in ("rhs", "outputs")]
+    + [("double_wishbone", "residual")],
+)
+@settings(max_examples=8, deadline=None)
+@given(part=st.floats(0.3, 1.0), seed=st.integers(0, 2**32 - 1))
+def test_jacobians_are_those_of_the_complex_step(runs, name, of, by, part, seed):
+    model, run = runs[name]
+    sample = round(part * (len(run.time) - 1))
+    x, u = run.states[sample], run.inputs[sample]
+    source = model.equations.sources[FUNCTIONS[of]]
+    place = ("state", "inputs").index(by)
+    size = np.maximum(np.abs((x, u)[place]), 1e-3)
+    directions = [np.zeros_like(array) for array in (x, u, model.constants)]
+    directions[place] = size * np.random.default_rng(seed).normal(size=len(size))
+    shape = model.equations.shapes[source.name]
+    expected = complex_step.derivative_along(
+        source.text, (x, u, model.constants), directions, shape
+    )
+    jacobian = model.jacobian(x, u, by, of)
+    found = jacobian @ directions[place]
+    # Rounding is a part of the largest number that is added up; forces are differences of others.
+    terms = np.abs(jacobian) @ np.abs(directions[place])
+    allowed = 1e-12 * np.maximum(terms, terms.max() if of == "rhs" else 1.0)
+    right = np.abs(found - expected) <= allowed
+    if of == "outputs":
+        # Norms of what is zero but for rounding.
+        right |= [output.endswith("_drift") for output in model.outputs]
+    assert right.all()
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("independent_suspension_vehicle", ["sprung_mass", "PDY1", "front_axle_distance"]),
+        # Springs are set anew for each.
+        ("high_fidelity_vehicle", ["chassis_mass", "rear_wheel_centre"]),
+    ],
+)
+def test_parameters_are_those_of_models_made_anew(runs, name, parameters):
+    model, run = runs[name]
+    sample = np.abs(run.inputs[:, 0]).argmax()
+    x, u = run.states[sample], run.inputs[sample]
+    for of, function in (("rhs", "derivative"), ("outputs", "outputs")):
+        found, columns = model.jacobian(x, u, parameters, of), []
+        for parameter in parameters:
+            value = np.atleast_1d(model.parameters[parameter])
+            for k in range(len(value)):
+                step = np.zeros_like(value)
+                step[k] = 1e-5 * max(abs(value[k]), 1.0)
+                sides = []
+                for moved in (value + step, value - step):
+                    given = moved.tolist() if len(value) > 1 else moved.item()
+                    try:
+                        other = build(name, None, {parameter: given})
+                    except InputError:
+                        break
+                    sides.append(other.evaluated(function, x, u))
+                if len(sides) == 2:
+                    columns.append((sides[0] - sides[1]) / (2.0 * step[k]))
+        expected = np.column_stack(columns)
+        assert found.shape == expected.shape
+        scale = np.maximum(np.abs(expected).max(axis=0), 1e-3)
+        np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-6, atol=2e-7)
+
+
+def test_coordinates_of_a_mechanism_follow_its_inputs_and_its_points(runs):
+    model, _ = runs["double_wishbone"]
+    u, step = np.array([0.02, -0.01]), 1e-5
+    q = model.solve(u)
+
+    def solved(v, **parameters):
+        other = build(model.name, None, parameters) if parameters else model
+        found = other.solve(v)
+        return np.concatenate([found, other.evaluated("outputs", found, v)])
+
+    by_inputs = [(solved(u + h) - solved(u - h)) / (2.0 * step) for h in step * np.eye(2)]
+    point = model.parameters["tie_rod_outer"]
+    by_point = [
+        (
+            solved(u, tie_rod_outer=(point + h).tolist())
+            - solved(u, tie_rod_outer=(point - h).tolist())
+        )
+        / (2.0 * step)
+        for h in step * np.eye(3)
+    ]
+    for by, expected in (("inputs", by_inputs), ("tie_rod_outer", by_point)):
+        found = [model.jacobian(q, u, by, of) for of in ("coordinates", "outputs")]
+        np.testing.assert_allclose(np.vstack(found), np.transpose(expected), rtol=0, atol=2e-8)
+
+
+def test_places_on_the_road_change_nothing(runs):
+    for name in VEHICLES:
+        model, run = runs[name]
+        jacobian = model.jacobian(run.states[300], run.inputs[300])
+        cyclic = np.setdiff1d(np.arange(len(jacobian)), model.active)
+        assert not jacobian[:, cyclic].any()
+
+
+def test_jacobians_are_those_of_differences_at_straight_running_too(runs):
+    for name in VEHICLES:
+        model, run = runs[name]
+        for x, u in ((model.start(), run.inputs[0]), (run.states[300], run.inputs[300])):
+            jacobian, differences = model.jacobian(x, u), model.system.jacobian(x, u)
+            scale = np.abs(jacobian).max()
+            # At rest on the road a step of differences makes tires slip: a norm at its kink.
+            np.testing.assert_allclose(jacobian / scale, differences / scale, rtol=0, atol=1e-5)
+        # No slip, no drift: norms at zero.
+        assert np.isfinite(model.jacobian(model.start(), run.inputs[0], of="outputs")).all()
+
+
+def test_what_can_not_be_differentiated_is_refused_in_one_line(runs):
+    vehicle, _ = runs["independent_suspension_vehicle"]
+    x, u = vehicle.start(), [0.0]
+    with pytest.raises(InputError, match="unknown parameter 'sprung_mas'; did you mean"):
+        vehicle.jacobian(x, u, "sprung_mas")
+    with pytest.raises(InputError, match="with_respect_to is 3, neither state"):
+        vehicle.jacobian(x, u, 3)
+    with pytest.raises(InputError, match="unknown of 'forces'"):
+        vehicle.jacobian(x, u, of="forces")
+    with pytest.raises(InputError, match="x has shape"):
+        vehicle.jacobian(x[1:], u)
+    mechanism, _ = runs["double_wishbone"]
+    with pytest.raises(InputError, match=r"joints are .* m apart"):
+        mechanism.jacobian(mechanism.design, [0.05, 0.0], "inputs", of="outputs")
+    with pytest.raises(InputError, match="by inputs or parameters"):
+        mechanism.jacobian(mechanism.design, [0.0, 0.0], of="coordinates")
