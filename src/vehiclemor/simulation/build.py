@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.parameters import ParameterSet, load_parameters, overridden
+from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -73,6 +74,22 @@ def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
 def _made(definition: ModelDefinition, parameters: ParameterSet) -> Model:
     make = _algebraic if definition.kind == "ae" else _dynamic
     return make(definition, parameters)
+
+
+def kept_build(name: str) -> Model:
+    """As `build` with the model's own parameters; kept while these are the same, to be read."""
+    definition: ModelDefinition = component("model", name)
+    try:
+        parameters = (definition.parameter_file or parameter_path(name)).read_bytes()
+    except OSError:
+        # What is wrong with it is told where it is read.
+        parameters = b""
+    return _kept(definition, parameters)
+
+
+@lru_cache(maxsize=8)
+def _kept(definition: ModelDefinition, _: bytes) -> Model:
+    return build(definition.name)
 
 
 def build_derived(name: str) -> Model | None:
