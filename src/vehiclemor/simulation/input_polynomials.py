@@ -44,7 +44,15 @@ def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:
     """The maneuver to which another is proportional, if it declares that it is."""
     if not maneuver.linear_in_amplitude or maneuver.amplitude_factor == 1.0:
         return None
-    return maneuver.perturbed(maneuver.frequency_factor)
+    unit = maneuver.perturbed(maneuver.frequency_factor)
+    return unit if _is_linear(unit) else None
+
+
+@lru_cache(maxsize=KEPT)
+def _is_linear(unit: Maneuver) -> bool:
+    """Whether it is what it declares: a copy with another signal may not be."""
+    doubled = unit.perturbed(unit.frequency_factor, 2.0).at(unit.times)
+    return bool(np.array_equal(doubled, 2.0 * unit.at(unit.times)))
 
 
 @lru_cache(maxsize=64)
