@@ -156,6 +156,8 @@ def _kinks(lengths: np.ndarray, values: np.ndarray) -> np.ndarray:
     bends = np.zeros((len(values), values.shape[1]))
     np.divide(slopes[1:] - slopes[:-1], spacing, out=bends[1:-1])
     off = np.abs(bends[1:-1] - 0.5 * (bends[:-2] + bends[2:]))
+    # A sample beside a corner doesn't bend itself.
+    np.minimum(off, np.abs(bends[1:-1]), out=off)
     largest = np.maximum(values.max(axis=0), -values.min(axis=0))
     return (off * spacing * np.maximum(spacing, FINE) > KINK * largest).any(axis=1)
 

@@ -130,7 +130,7 @@ def test_the_example_study_runs(here, capsys):
     assert "frequency_factor" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["keep-a-model", "my-loop"])
+@pytest.mark.parametrize("name", ["keep-a-model", "my-loop", "my-signal"])
 def test_the_code_of_a_page_runs(name, here, capsys):
     page = ROOT / "paper" / "handbook" / f"{name}.md"
     # Files that are quoted have tests of their own.
