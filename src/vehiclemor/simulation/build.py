@@ -67,13 +67,18 @@ def build(
 
 def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     """The model with some of its parameters changed: name -> value in SI units; see `build`."""
-    declared = model.definition.parameters
-    return _made(model.definition, overridden(model.parameters, declared, overrides))
+    parameters = overridden(model.parameters, model.definition.parameters, overrides)
+    return _made(model.definition, parameters, (model.equations, model.kernel_hash))
 
 
-def _made(definition: ModelDefinition, parameters: ParameterSet) -> Model:
+def _made(
+    definition: ModelDefinition,
+    parameters: ParameterSet,
+    derived: tuple[Derivation, str] | None = None,
+) -> Model:
+    """A model of equations that may have been derived already, see `compiled`."""
     make = _algebraic if definition.kind == "ae" else _dynamic
-    return make(definition, parameters)
+    return make(definition, parameters, derived)
 
 
 def kept_build(name: str) -> Model:
@@ -98,14 +103,16 @@ def build_derived(name: str) -> Model | None:
     return build(name) if is_derived(name, definition.derive) else None
 
 
-def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> AlgebraicModel:
+def _algebraic(
+    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
+) -> AlgebraicModel:
     """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
     # Imported here: a model of one kind needs nothing of the other.
     from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
 
     with blamed(f"model {definition.name!r}: design_coordinates"):
         design = real_array(definition.design_coordinates(parameters.values()))
-    equations, digest = compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
+    equations, digest = derived or compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
     check_equations(definition, equations)
     _check_states(definition, {DESIGN_START: design})
     constants = hoisted_constants(equations, parameters.flat(), [])
@@ -125,14 +132,16 @@ def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> Algebra
     return model
 
 
-def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicModel:
+def _dynamic(
+    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
+) -> DynamicModel:
     """A model of equations of motion."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
     values = values_of(definition, parameters.flat())
     with blamed(f"model {definition.name!r}: check"):
         definition.check(values)
-    equations, digest = compiled(definition.name, definition.derive)
+    equations, digest = derived or compiled(definition.name, definition.derive)
     check_equations(definition, equations)
     with blamed(f"model {definition.name!r}: solve_equilibrium"):
         values |= solved_parameters(definition, parameters.flat(), equations)

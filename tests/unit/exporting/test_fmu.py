@@ -1,0 +1,255 @@
+"""Functional mock-up units, through FMPy: its checker, both interfaces, derivatives, states."""
+
+import shutil
+import subprocess
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from tests.unit.exporting.programs import in_use, relative, runge_kutta, steering
+from vehiclemor.exporting import fmu
+from vehiclemor.exporting.units import base_units
+
+fmpy = pytest.importorskip("fmpy")
+validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+# Step of the integrator inside, and steps between exchanges with the outside.
+STEP, HELD = 1e-3, 10
+CASES = [
+    ("independent_suspension_vehicle", "full", 3),
+    ("independent_suspension_vehicle", "reduced", 2),
+    ("high_fidelity_vehicle", "full", 3),
+]
+
+
+@pytest.fixture(scope="module")
+def units(tmp_path_factory):
+    """(model, kind, version) -> model in use and path of its unit, quickly compiled."""
+    made = {}
+
+    def unit(name, kind, version):
+        if (name, kind, version) not in made:
+            path = tmp_path_factory.mktemp("unit") / "car.fmu"
+            model = in_use(name, kind)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0", "-Wall", "-Werror"))
+                made[name, kind, version] = model, vm.export(model, "fmu", path, fmi=version)
+        return made[name, kind, version]
+
+    return unit
+
+
+class Instance:
+    """A unit that has been started by hand."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
+
+        described = fmpy.read_model_description(str(path))
+        self.number = {v.name: v.valueReference for v in described.modelVariables}
+        self.outputs = [v.name for v in described.modelVariables if v.causality == "output"]
+        third = described.fmiVersion == "3.0"
+        self.slave = (FMU3Slave if third else FMU2Slave)(
+            guid=described.guid,
+            unzipDirectory=fmpy.extract(str(path), str(folder)),
+            modelIdentifier=described.coSimulation.modelIdentifier,
+            instanceName="car",
+        )
+        self.slave.instantiate()
+        if not third:
+            self.slave.setupExperiment()
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+        self._get = self.slave.getFloat64 if third else self.slave.getReal
+        self._set = self.slave.setFloat64 if third else self.slave.setReal
+
+    def of(self, names):
+        return [self.number[name] for name in names]
+
+    def get(self, names):
+        return np.array(self._get(self.of(names)))
+
+    def set(self, names, values):
+        self._set(self.of(names), np.asarray(values, float).tolist())
+
+    def along(self, unknown, known):
+        rows = [
+            self.slave.getDirectionalDerivative(self.of(unknown), self.of([name]), [1.0])
+            for name in known
+        ]
+        return np.array(rows).T
+
+
+@pytest.fixture
+def started(units, tmp_path):
+    """Start a unit."""
+    running = []
+
+    def start(*case):
+        model, path = units(*case)
+        running.append(Instance(path, tmp_path))
+        return model, running[-1]
+
+    yield start
+    for instance in running:
+        instance.slave.terminate()
+        instance.slave.freeInstance()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_checker_finds_nothing_and_co_simulation_is_our_integrator(units, case):
+    model, path = units(*case)
+    assert validate_fmu(str(path)) == []
+    samples = 16
+    inputs = steering(model, samples, HELD * STEP)
+    times = np.arange(samples) * HELD * STEP
+    given = np.array(
+        [(t, *u) for t, u in zip(times, inputs, strict=True)],
+        dtype=[("time", float), *((name, float) for name in model.inputs)],
+    )
+    found = fmpy.simulate_fmu(
+        str(path),
+        stop_time=times[-1],
+        step_size=HELD * STEP,
+        output_interval=HELD * STEP,
+        input=given,
+        output=list(model.output_names),
+        fmi_type="CoSimulation",
+    )
+    states = runge_kutta(model.rhs, model.state(), inputs, STEP, HELD)[::HELD]
+    # Outputs are read before the next inputs are set.
+    wanted = model.outputs(states, np.vstack([inputs[:1], inputs[:-1]]))
+    assert relative(np.array([list(row)[1:] for row in found]), wanted) < 1e-9
+
+
+@pytest.mark.parametrize("case", CASES[:2])
+def test_model_exchange_with_another_integrator(units, case):
+    model, path = units(*case)
+    found = fmpy.simulate_fmu(
+        str(path),
+        stop_time=1.0,
+        output_interval=0.1,
+        relative_tolerance=1e-9,
+        start_values={"delta": 0.03},
+        output=list(model.output_names),
+        fmi_type="ModelExchange",
+        solver="CVode",
+    )
+    inputs = np.full((1001, 1), 0.03)
+    states = runge_kutta(model.rhs, model.state(), inputs, STEP)[::100]
+    wanted = model.outputs(states, inputs[::100])
+    assert relative(np.array([list(row)[1:] for row in found]), wanted) < 1e-5
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_directional_derivatives_are_the_models(started, case):
+    model, unit = started(*case)
+    start = model.state()
+    states = [f"state.{name}" for name in model.states]
+    assert np.array_equal(unit.get(states), start)
+    x = start + 1e-3 * np.cos(np.arange(len(start)))
+    u = 0.01 * np.cos(np.arange(len(model.inputs)))
+    unit.set(states, x)
+    unit.set(model.inputs, u)
+    rates = [f"der({name})" for name in states]
+    # The full high-fidelity vehicle's own take half a minute to compile.
+    for names, by in ((states, "state"), (list(model.inputs), "inputs")) * (case != CASES[2]):
+        wanted = model.jacobian(x, u, by)
+        assert np.abs(unit.along(rates, names) - wanted).max() <= 1e-12 * np.abs(wanted).max()
+    # Of outputs, trust and parameters too, against differences of order 4 of the unit itself.
+    every = [*rates, *unit.outputs]
+    turned = [*(["parameter.tire_stiffness"] if case[1] == "full" else states[:2]), *model.inputs]
+    for name in turned:
+        (value,) = unit.get([name])
+        size, ends = 1e-5 * max(abs(value), 1.0), []
+        for place in (1, -1, 2, -2):
+            unit.set([name], [value + place * size])
+            ends.append(unit.get(every))
+        unit.set([name], [value])
+        wanted = (8.0 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12.0 * size)
+        found = unit.along(every, [name])[:, 0]
+        for part in (slice(len(rates)), slice(len(rates), None)):
+            largest = max(np.abs(wanted[part]).max(), 1e-6)
+            assert np.abs(found[part] - wanted[part]).max() <= 1e-6 * largest
+
+
+def test_a_parameter_that_is_set_is_the_parameter(started):
+    model, unit = started(*CASES[0])
+    lighter = vm.model(model.model.name, {"sprung_mass": 1200.0})
+    unit.set(["parameter.sprung_mass"], [1200.0])
+    states = [f"state.{name}" for name in model.states]
+    found = unit.get([f"der({name})" for name in states])
+    wanted = lighter.derivative(unit.get(states), [0.0])
+    assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
+    assert np.abs(found - model.rhs(unit.get(states), [0.0])).max() > 0.1
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[1]])
+def test_a_state_that_was_kept_is_gone_back_to(started, case):
+    _, unit = started(*case)
+    unit.set(["delta"], [0.02])
+    state = unit.slave.getFMUState() if case[2] == 3 else unit.slave.getFMUstate()
+    ends = []
+    for _ in range(2):
+        unit.slave.doStep(0.0, 0.05)
+        ends.append(unit.get(unit.outputs))
+        (unit.slave.setFMUState if case[2] == 3 else unit.slave.setFMUstate)(state)
+    assert np.array_equal(*ends)
+    (unit.slave.freeFMUState if case[2] == 3 else unit.slave.freeFMUstate)(state)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_declarations_are_those_of_the_standards_headers(units, tmp_path, version):
+    _, path = units(*CASES[3 - version])
+    with ZipFile(path) as archive:
+        archive.extractall(tmp_path)
+    headers = Path(fmpy.__file__).parent / "c-code"
+    options = ["-std=c11", "-Wall", "-Werror", "-fsyntax-only", f"-DFMI{version}_HEADER"]
+    source = tmp_path / "sources" / f"vehiclemor_fmi{version}.c"
+    command = ["cc", *options, f"-I{headers}", source]
+    subprocess.run(command, check=True)
+
+
+def test_a_path_map_has_neither_states_nor_rates(tmp_path):
+    model = vm.rom("double_wishbone")
+    path = vm.export(model, "fmu", tmp_path / "suspension.fmu")
+    assert validate_fmu(str(path)) == []
+    found = fmpy.simulate_fmu(
+        str(path),
+        stop_time=0.1,
+        step_size=0.1,
+        start_values={"z": 0.05},
+        output=[*model.output_names, "trust_indicator"],
+        fmi_type="CoSimulation",
+    )
+    run = model.simulate(vm.Signal.from_samples([0.0, 1.0], [[0.05, 0.0], [0.05, 0.0]]))
+    assert list(found[0])[1:-1] == pytest.approx(run.outputs[0].tolist(), abs=1e-14)
+    assert found[0]["trust_indicator"] == pytest.approx(run.trust.indicator)
+
+
+def test_without_a_compiler_the_unit_has_sources_alone(tmp_path, monkeypatch, caplog):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    path = vm.export(vm.rom("independent_suspension_vehicle"), "fmu", tmp_path / "car.fmu")
+    assert "no C compiler" in caplog.text
+    with ZipFile(path) as archive:
+        assert not any(name.startswith("binaries") for name in archive.namelist())
+    assert validate_fmu(str(path)) == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "powers"),
+    [
+        ("N s/m", {"kg": 1, "m": 0, "s": -1}),
+        ("kg m^2", {"kg": 1, "m": 2}),
+        ("m/s^2", {"m": 1, "s": -2}),
+        ("m/s/s", {"m": 1, "s": -2}),
+        ("1/s", {"s": -1}),
+        ("furlong/s", None),
+    ],
+)
+def test_units_in_base_units(unit, powers):
+    assert base_units(unit) == powers

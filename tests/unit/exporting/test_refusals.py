@@ -1,0 +1,106 @@
+"""What can't be exported, or not there: one line, and nothing is half written."""
+
+import pytest
+
+import vehiclemor as vm
+from tests.reducing import fitted
+from vehiclemor.cli import main
+from vehiclemor.exporting import export, packages
+from vehiclemor.online.rom import ReducedOrderModel
+
+CAR = "independent_suspension_vehicle"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"to": "matlab"}, "'matlab' is no target"),
+        ({"to": "fmu", "fmi": 1}, "1 is no version; 2 or 3"),
+        ({"to": "c", "step": 0.0}, "step: 0 s is not above 0"),
+        ({"to": "c", "step": float("nan")}, "nan is not finite"),
+        ({"to": "c", "path": "no-such-folder/car"}, "does not exist"),
+        ({"to": "c", "path": ""}, "is not a path"),
+    ],
+)
+def test_wrong_arguments(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(vm.VehiclemorError, match=words):
+        vm.export(CAR, **arguments)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_no_model():
+    with pytest.raises(vm.VehiclemorError, match="neither a name nor a full or reduced model"):
+        vm.export(3, "casadi")
+    with pytest.raises(vm.VehiclemorError, match="did you mean"):
+        vm.export("independent_suspension_vehicl", "casadi")
+
+
+def test_a_method_without_equations_of_its_own(model, nominal):
+    reduced = fitted(model, nominal, "pod", rank=2)
+    with pytest.raises(vm.VehiclemorError, match="double_wishbone_pod can't be exported"):
+        vm.export(ReducedOrderModel(model, "pod", {}, (), reduced), "casadi")
+
+
+def test_a_table_is_no_expression():
+    with pytest.raises(vm.VehiclemorError, match="reads a table"):
+        vm.export(vm.rom("double_wishbone"), "sympy")
+
+
+@pytest.mark.parametrize(("to", "extra"), [("casadi", "casadi"), ("jax", "jax")])
+def test_missing_packages_are_named(monkeypatch, to, extra):
+    monkeypatch.setattr(packages, "find_spec", lambda _: None)
+    with pytest.raises(vm.VehiclemorError, match=rf"pip install 'vehiclemor\[{extra}\]'"):
+        vm.export(vm.rom(CAR), to)
+
+
+def test_a_compiler_that_fails(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(vm.VehiclemorError, match="can't compile the model: status 1"):
+        vm.export(vm.rom(CAR), "fmu", tmp_path / "car.fmu")
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_replaced_unasked(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    command = ["export", CAR, "--shipped", "--to", "c"]
+    assert main(command) == 0
+    folder = tmp_path / f"{CAR}_guarded"
+    assert capsys.readouterr().out == f"written: {folder.name}\n"
+    written = {path.name: path.read_text() for path in folder.iterdir()}
+    assert main(command) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    (folder / "vehiclemor_model.c").write_text("")
+    assert main([*command, "--overwrite"]) == 0
+    assert {path.name: path.read_text() for path in folder.iterdir()} == written
+    assert [path.name for path in tmp_path.iterdir()] == [folder.name]
+
+
+def test_what_is_not_ours_is_never_replaced(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(vm.VehiclemorError, match="holds something else"):
+        vm.export(CAR, "c", tmp_path / "mine", overwrite=True)
+    with pytest.raises(vm.VehiclemorError, match="is a folder"):
+        vm.export(CAR, "fmu", tmp_path / "mine", overwrite=True)
+    assert (tmp_path / "mine" / "letter.txt").read_text() == "dear"
+
+
+def test_a_failure_on_the_way_leaves_what_was_there(tmp_path, monkeypatch):
+    path = vm.export(vm.rom(CAR), "c", tmp_path / "car")
+    before = {file.name: file.read_text() for file in path.iterdir()}
+
+    def full(_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(export, "make_folder", full)
+    with pytest.raises(vm.VehiclemorError, match="No space left"):
+        vm.export(CAR, "c", path, overwrite=True)
+    assert {file.name: file.read_text() for file in path.iterdir()} == before
+
+
+def test_a_kept_model_has_its_method(capsys):
+    assert main(["export", CAR, "--shipped", "--method", "pod", "--to", "c"]) == 2
+    assert "has its method" in capsys.readouterr().err
+    assert main(["export", CAR, "--set", "rank=3", "--to", "c"]) == 2
+    assert "--method NAME" in capsys.readouterr().err

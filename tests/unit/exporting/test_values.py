@@ -1,0 +1,178 @@
+"""Exported systems over the values of other libraries: all give the model's numbers."""
+
+import importlib.util
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import vehiclemor as vm
+from tests.unit.exporting.programs import in_use, relative
+from vehiclemor.exporting.export import system_of
+from vehiclemor.exporting.interpreter import evaluated
+from vehiclemor.exporting.straight_line import FUNCTIONS, entries, straight_line
+
+CASES = [
+    ("independent_suspension_vehicle", "full"),
+    ("independent_suspension_vehicle", "reduced"),
+    ("high_fidelity_vehicle", "full"),
+    ("high_fidelity_vehicle", "reduced"),
+]
+FLOATS = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}
+FLOATS |= {"fmax": max, "fmin": min, "select": lambda test, then, other: then if test else other}
+
+
+def around(model, rng, samples=3):
+    """States and inputs near the start."""
+    start = model.state()
+    states = start + 1e-3 * rng.standard_normal((samples, len(start)))
+    return states, 5e-3 * rng.standard_normal((samples, len(model.inputs)))
+
+
+def wanted(model, states, inputs):
+    rates = np.array([model.rhs(x, u) for x, u in zip(states, inputs, strict=True)])
+    return rates, model.outputs(states, inputs)
+
+
+def agree(found, states, model, inputs):
+    """Rates and outputs; the first to 1e-12, the others lose digits to slips."""
+    rates, outputs = wanted(model, states, inputs)
+    assert np.abs(found[0] - rates).max() <= 1e-12 * np.abs(rates).max()
+    assert relative(found[1][:, : outputs.shape[1]], outputs) < 1e-10
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_plain_numbers(case, rng):
+    model = in_use(*case)
+    system = system_of(model)
+    states, inputs = around(model, rng)
+    found = []
+    for x, u in zip(states.tolist(), inputs.tolist(), strict=True):
+        arrays = {"x": x, "u": u, "p": system.values.tolist()}
+        arrays["c"] = evaluated(system.functions["constants"], arrays, FLOATS)
+        found.append(
+            [evaluated(system.functions[n], arrays, FLOATS) for n in ("derivative", "outputs")]
+        )
+    agree([np.array(part) for part in zip(*found, strict=True)], states, model, inputs)
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[3]])
+def test_casadi(case, rng, tmp_path):
+    casadi = pytest.importorskip("casadi")
+    model = in_use(*case)
+    function = vm.export(model, "casadi")
+    parameters = system_of(model).values
+    states, inputs = around(model, rng)
+    found = function(states.T, inputs.T, parameters)
+    agree([part.full().T for part in found], states, model, inputs)
+    x, u = (casadi.SX.sym(name, len(a)) for name, a in (("x", states[0]), ("u", inputs[0])))
+    by_state = casadi.Function("j", [x, u], [casadi.jacobian(function(x, u, parameters)[0], x)])
+    exact = model.jacobian(states[0], inputs[0])
+    assert (
+        np.abs(np.array(by_state(states[0], inputs[0])) - exact).max() <= 1e-12 * abs(exact).max()
+    )
+    path = vm.export(model, "casadi", tmp_path / "car.casadi")
+    kept = casadi.Function.load(str(path))
+    assert (kept(states.T, inputs.T, parameters)[0].full() == found[0].full()).all()
+
+
+def test_jax_over_a_batch(rng, tmp_path):
+    jax = pytest.importorskip("jax")
+    jax.config.update("jax_enable_x64", True)
+    model = in_use("independent_suspension_vehicle", "reduced")
+    states, inputs = around(model, rng)
+    found = jax.jit(jax.vmap(vm.export(model, "jax")))(states, inputs)
+    agree([np.asarray(part) for part in found], states, model, inputs)
+    module = imported(vm.export(model, "jax", tmp_path / "car.py"))
+    assert np.allclose(module.derivative(states[0], inputs[0], []), found[0][0], 1e-12, 1e-12)
+
+
+def test_jax_reads_tables(tmp_path):
+    jax = pytest.importorskip("jax")
+    jax.config.update("jax_enable_x64", True)
+    model = vm.rom("double_wishbone")
+    inputs = np.array([[0.05, 0.0], [-0.02, 0.0]])
+    run = model.simulate(vm.Signal.from_samples([0.0, 1.0], inputs))
+    ends = [0, -1]
+    _, outputs = jax.vmap(vm.export(model, "jax"))(np.zeros((2, 0)), inputs)
+    assert np.abs(np.asarray(outputs)[:, :-1] - run.outputs[ends]).max() < 1e-13
+    module = imported(vm.export(model, "jax", tmp_path / "suspension.py"))
+    found = np.array([module.outputs([], jax.numpy.array(u), []) for u in inputs])
+    assert np.array_equal(found, outputs)
+
+
+def test_sympy(rng, tmp_path):
+    model = in_use("independent_suspension_vehicle", "full")
+    states, inputs = around(model, rng)
+    expressions = vm.export(model, "sympy")
+    assert [symbol.name for symbol in expressions.x] == list(model.states)
+    values = system_of(model).values
+    found = []
+    for results in (expressions.derivative, expressions.outputs):
+        function = sp.lambdify(
+            [expressions.x, expressions.u, expressions.p],
+            results,
+            modules="math",
+            cse=lambda _, results=results: (expressions.assignments, [*results]),
+        )
+        rows = [function(x, u, values) for x, u in zip(states, inputs, strict=True)]
+        found.append(np.array(rows))
+    agree(found, states, model, inputs)
+    module = imported(vm.export(model, "sympy", tmp_path / "car.py"))
+    assert tuple(model.states) == module.STATES
+    constants = list(module.constants(values.tolist()))
+    rates = module.derivative(states[0].tolist(), inputs[0].tolist(), constants)
+    assert np.abs(np.array(rates, float)[:, 0] - found[0][0]).max() < 1e-10
+
+
+def imported(path):
+    """The Python module at a path."""
+    described = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(described)
+    described.loader.exec_module(module)
+    return module
+
+
+TEXT = """
+def kernel(_x, _constants, _work, _result):
+    a = _x[0]
+    b = -_x[1]
+    int = -a ** 3.0 + abs(b)
+    _work[0] = a
+    _work[1] = b
+    {padding}
+    sincos_batch(_work, 0)
+    _sin_a = _work[8]
+    _cos_b = _work[17]
+    s, c = sincos_one(int)
+    ({sums},) = weighted_sums(_constants, 1, (_sin_a, 1.0, (a if a > b else b)))
+    a = s0 - -s1
+    _result[0, 0] = a * (b - s) / (c + 3.0)
+    _result[0, 1] = math.atan2(_cos_b, s2) - math.exp(-a)
+    _result[1, 0] = -(-s4)
+    _result[1, 1] = (1.0 if a != b else 2.0)
+"""
+
+
+@pytest.mark.parametrize("x", [(0.3, -0.7), (-1.2, 0.4), (0.5, -0.5)])
+def test_text_is_written_out_as_it_is_meant(x):
+    padding = "\n    ".join(f"_work[{i}] = 0.0" for i in range(2, 8))
+    text = TEXT.format(padding=padding, sums=", ".join(f"s{i}" for i in range(5))).strip()
+    weights = np.random.default_rng(1).standard_normal(25)
+    weights[3] = 0.0
+    line = straight_line(text, {"_x": entries("x", 2), "_constants": entries("c", 25)})
+    found = evaluated(line.pruned(), {"x": x, "c": weights.tolist()}, FLOATS)
+    a, b = x[0], -x[1]
+    size = -(a**3) + abs(b)
+    sums = np.array([math.sin(a), 1.0, max(a, b)]) @ weights[1:].reshape(3, 8)[:, :5]
+    new = sums[0] + sums[1]
+    assert found == pytest.approx(
+        [
+            new * (b - math.sin(size)) / (math.cos(size) + 3.0),
+            math.atan2(math.cos(b), sums[2]) - math.exp(-new),
+            sums[4],
+            1.0,
+        ],
+        rel=1e-14,
+    )
