@@ -1,12 +1,15 @@
 """Exported C: it compiles without a warning and does what the model does."""
 
+import re
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
 
 import vehiclemor as vm
 from tests.unit.exporting.programs import (
+    FLAGS,
     compiled,
     driven,
     in_use,
@@ -14,6 +17,7 @@ from tests.unit.exporting.programs import (
     runge_kutta,
     steering,
 )
+from vehiclemor.resources import handbook_folder
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 STEP = 1e-3
@@ -87,3 +91,16 @@ def test_the_suspension_needs_no_states(drivers, kind):
     at = np.isin(np.round(t, 9), np.round(run.time, 9))
     assert at.sum() > 5
     assert np.abs(rows[at, :-1] - wanted[at]).max() < 1e-12
+
+
+def test_the_program_of_the_handbook(drivers, tmp_path):
+    model, driver = drivers("independent_suspension_vehicle", "reduced")
+    page = handbook_folder() / "export.md"
+    (text,) = re.findall(r"```c\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "main.c").write_text(text)
+    sources = [driver.parent / f"vehiclemor_{part}.c" for part in ("model", "step")]
+    command = ["cc", *FLAGS, f"-I{driver.parent}", "-o", "main", "main.c", *sources, "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout
+    _, rows = driven(driver, np.full((2001, 1), 0.02), STEP)
+    assert float(printed) == rows[-1, len(model.states) + 1]
