@@ -6,6 +6,7 @@ Timings are reported, never gated.  Counts and operation counts stand beside the
 import numpy as np
 import pytest
 
+import vehiclemor as vm
 from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -17,6 +18,8 @@ from vehiclemor.steering_maneuvers import lane_change
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000
+# Runs of a batch.
+BATCH = 1024
 FULL = {
     "explicit 1e-6": ("dopri5", 1e-6),
     "explicit 1e-3": ("dopri5", 1e-3),
@@ -105,3 +108,20 @@ def test_method(benchmark, model, reference, label):
     }
     assert run.status == "ok"
     assert run.outputs.shape == reference.outputs.shape
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("which", ["reduced", "full"])
+def test_batch(benchmark, model, which, jobs):
+    """Ten-second maneuvers with inputs of their own, three outputs at 10 Hz; all of the call."""
+    benchmark.group = f"{BATCH} maneuvers of 10 s, whole call"
+    car = vm.rom(model.name)
+    if which == "full":
+        car = vm.reduce(model, "full_order", solver="ros34pw2", tolerance=2e-3)
+    times, rng = np.linspace(0.0, 10.0, 501), np.random.default_rng(1)
+    rate = rng.uniform(0.5, 4.0, (BATCH, 1))
+    signals = vm.Signals(times, 0.01 * np.tanh(times) * np.sin(rate * times), "cubic")
+    kept = {"outputs": ["lateral_position", "yaw", "Fz_FL"], "times": times[::5]}
+    found = benchmark(vm.simulate_many, car, signals, jobs=jobs, **kept)
+    benchmark.extra_info["seconds in compiled loops"] = found.seconds.sum().item()
+    assert (found.status == "ok").all()

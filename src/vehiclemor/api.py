@@ -111,9 +111,6 @@ def model(
     return build(name, path, parameters)
 
 
-_model = model
-
-
 def simulate(
     model: str | Model,
     method: str = "full_order",
@@ -126,9 +123,13 @@ def simulate(
     training: str = "matched",
     training_set: Sequence[tuple[float, float]] = (),
     rtol: float | None = None,
+    errors: bool = True,
     **settings: object,
 ) -> xr.Dataset:
     """Simulate a model with a method and measure its errors against the full-order solution.
+
+    Models that are built by name, the last fits and the last full-order solutions are kept, and
+    used again while what they depend on is the same.
 
     Parameters
     ----------
@@ -150,6 +151,9 @@ def simulate(
         (frequency, amplitude) factors of the policy `set`.
     rtol
         Tolerance of the solver; for a kinematic model the largest step of the last iteration.
+    errors
+        Whether to compare with the full-order solution; without it nothing is solved but by the
+        method, and there are no errors and floors.
     **settings
         Settings of the method, such as `rank=3`.
 
@@ -166,6 +170,7 @@ def simulate(
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.maneuver import Maneuver
+    from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -173,7 +178,7 @@ def simulate(
     from vehiclemor.study.method_settings import complete_settings
     from vehiclemor.study.scenario import Scenario, check, training_scenarios
 
-    ready = model if isinstance(model, Model) else _model(model)
+    ready = model if isinstance(model, Model) else kept_build(model)
     if maneuver is None:
         maneuver = ready.definition.maneuver
     base = maneuver if isinstance(maneuver, Maneuver) else component("maneuver", maneuver)
@@ -189,7 +194,8 @@ def simulate(
     test = Scenario(base.perturbed(frequency, amplitude), own)
     check(ready, test)
     trained = training_scenarios(test, training, _pairs(training_set))
-    dataset = evaluate(make_experiment(ready, method, chosen, trained, (test,)), ready)
+    experiment = make_experiment(ready, method, chosen, trained, (test,))
+    dataset = evaluate(experiment, ready, errors=errors)
     status = str(dataset["status"].item())
     if status in ("unreachable", "rejected"):
         error = UnreachableError if status == "unreachable" else InputError

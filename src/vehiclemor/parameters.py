@@ -107,7 +107,8 @@ class ParameterSet(ShortRepr):
 
     def flat(self) -> np.ndarray:
         """All components in one array, in declared order."""
-        return np.concatenate([np.atleast_1d(self[name]) for name in self.entries])
+        values = (entry.value for entry in self.entries.values())
+        return np.array([c for v in values for c in (v if isinstance(v, list) else (v,))], float)
 
 
 def parameter_path(model: str) -> Path:

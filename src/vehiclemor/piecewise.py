@@ -61,33 +61,26 @@ class Pieces(NamedTuple):
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
-        return evaluated(self.coefficients, *self.located(times))
-
-    def located(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the pieces in which times (n,) lie, and the parts of them that have passed."""
-        edges, first, starts, _ = self
+        edges, first, starts, coefficients = self
         if len(starts):
             rows = np.searchsorted(starts, times, side="right") - 1
             rows = np.clip(rows, 0, len(starts) - 1)
-            return rows, (times - starts[rows]) / self.lengths[rows]
-        segments: Any = 0
-        if len(edges) > 2:
-            reached = times + ROUNDING * (1.0 + times)
-            segments = np.searchsorted(edges, reached, side="right") - 1
-            segments = np.clip(segments, 0, len(edges) - 2)
-        pieces, begin = first[segments + 1] - first[segments], edges[segments]
-        places = (times - begin) / (edges[segments + 1] - begin) * pieces
-        rows = np.clip(places.astype(np.int64), 0, pieces - 1)
-        return rows + first[segments], places - rows
-
-
-def evaluated(coefficients: np.ndarray, rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """Values (..., n, inputs) of polynomials (..., pieces, inputs, :), see `Pieces.located`."""
-    own, parts = coefficients[..., rows, :, :], parts[:, None]
-    values = own[..., -1]
-    for power in range(own.shape[-1] - 2, -1, -1):
-        values = own[..., power] + parts * values
-    return values
+            parts = (times - starts[rows]) / self.lengths[rows]
+        else:
+            segments: Any = 0
+            if len(edges) > 2:
+                reached = times + ROUNDING * (1.0 + times)
+                segments = np.searchsorted(edges, reached, side="right") - 1
+                segments = np.clip(segments, 0, len(edges) - 2)
+            pieces, begin = first[segments + 1] - first[segments], edges[segments]
+            places = (times - begin) / (edges[segments + 1] - begin) * pieces
+            rows = np.clip(places.astype(np.int64), 0, pieces - 1)
+            parts, rows = places - rows, rows + first[segments]
+        own, parts = coefficients[rows], parts[:, None]
+        values = own[:, :, -1]
+        for power in range(own.shape[2] - 2, -1, -1):
+            values = own[:, :, power] + parts * values
+        return values
 
 
 def held(times: np.ndarray, values: np.ndarray) -> Pieces:
@@ -141,28 +134,28 @@ def joined(times: np.ndarray, bends: np.ndarray, coefficients: np.ndarray) -> Pi
 
 def bent(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Which of the inner samples (n - 2,) are break points: kinks, and ends of quiet."""
-    return _kinks(np.diff(times), values) | _quiet_ends(times, values)
+    moves = (values[1:] != values[:-1]).any(axis=1)
+    return bent_by_column(times, values).any(axis=1) | quiet_ends(times, moves)
 
 
-def _kinks(lengths: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """At which of the inner samples (n - 2,) the slope changes otherwise than beside it.
+def bent_by_column(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """At which of the inner samples (n - 2, inputs) the slope changes otherwise than beside it.
 
     A curve that is sampled finely bends by as much from sample to sample; what is left of noise,
     corners and coarse samples is what an integrator must not step over.
     """
-    lengths = lengths[:, None]
+    lengths = np.diff(times)[:, None]
     spacing = 0.5 * (lengths[1:] + lengths[:-1])
     slopes = (values[1:] - values[:-1]) / lengths
     bends = np.zeros((len(values), values.shape[1]))
     np.divide(slopes[1:] - slopes[:-1], spacing, out=bends[1:-1])
     off = np.abs(bends[1:-1] - 0.5 * (bends[:-2] + bends[2:]))
     largest = np.maximum(values.max(axis=0), -values.min(axis=0))
-    return (off * spacing * np.maximum(spacing, FINE) > KINK * largest).any(axis=1)
+    return off * spacing * np.maximum(spacing, FINE) > KINK * largest
 
 
-def _quiet_ends(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """At which of the inner samples (n - 2,) a stretch of equal samples begins or ends."""
-    moves = (values[1:] != values[:-1]).any(axis=1)
+def quiet_ends(times: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """At which of the inner samples (n - 2,) stretches begin or end that don't move (n - 1,)."""
     inner = moves[1:] != moves[:-1]
     if inner.any():
         changes = np.concatenate([[0], inner.nonzero()[0] + 1, [len(times) - 1]])

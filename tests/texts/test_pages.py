@@ -130,12 +130,21 @@ def test_the_example_study_runs(here, capsys):
     assert "frequency_factor" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["export", "keep-a-model", "my-loop"])
+PAGES_WITH_CODE = (
+    "export",
+    "keep-a-model",
+    "my-loop",
+    "predictive-control",
+    "ten-thousand-maneuvers",
+)
+
+
+@pytest.mark.parametrize("name", PAGES_WITH_CODE)
 def test_the_code_of_a_page_runs(name, here, capsys):
     page = ROOT / "paper" / "handbook" / f"{name}.md"
     # Files that are quoted have tests of their own.
     own = [b.content for b in blocks(page) if b.language == "python" and b.above[:1] != "`"]
-    (here / "page.py").write_text("\n".join(own))
+    (here / "page.py").write_text("\n".join(own).replace("10_000", "100"))
     runpy.run_path("page.py")
     assert capsys.readouterr().out
 

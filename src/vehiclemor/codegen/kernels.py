@@ -7,6 +7,7 @@ import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -125,14 +126,15 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
 
 def kernel_sources(text: str) -> dict[str, KernelSource]:
     """Sources of the kernels in a text, by name."""
+    found = [_source(f"{part}\n") for part in re.split(r"\n+(?=def )", text.strip())]
+    return {source.name: source for source in found}
+
+
+# Models with other parameters ask for the same again.
+@lru_cache(maxsize=64)
+def _source(text: str) -> KernelSource:
     from vehiclemor.codegen.kernel_statements import KernelText
 
-    found = {}
-    for part in re.split(r"\n+(?=def )", text.strip()):
-        kernel = KernelText(f"{part}\n")
-        sizes = tuple(kernel.sizes[name] for name in kernel.pointers)
-        arguments = tuple(kernel.pointers)
-        found[kernel.name] = KernelSource(
-            kernel.name, kernel.text, arguments, sizes, kernel.dimensions
-        )
-    return found
+    kernel = KernelText(text)
+    sizes = tuple(kernel.sizes[name] for name in kernel.pointers)
+    return KernelSource(kernel.name, text, tuple(kernel.pointers), sizes, kernel.dimensions)

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,29 +46,49 @@ class Tangent(ShortRepr):
     ----------
     source
         Its text.
-    size
-        Number of floats of the result.
+    size, width
+        Numbers of floats of the result and of the argument.
     moving
         Places of the argument on which results depend; the others' columns are zero.
     """
 
     source: KernelSource
     size: int
+    width: int
     moving: np.ndarray
 
+    @cached_property
+    def _units(self) -> np.ndarray:
+        """Directions along the places that matter, filled up."""
+        units = np.zeros((self._rows(len(self.moving)), self.width))
+        units[np.arange(len(self.moving)), self.moving] = 1.0
+        return units
+
+    def _rows(self, count: int) -> int:
+        return count if count <= FEW else -(-count // DIRECTIONS) * DIRECTIONS
+
     def columns(self, arrays: Sequence[np.ndarray], directions: np.ndarray) -> np.ndarray:
-        """Products with directions (k, argument), as rows (k, size).
+        """Products with directions (k, width), as rows (k, size).
 
         Parameters
         ----------
         arrays
             The kernel's own arguments in order, as `Kernels.call` wants them, without the result.
         """
-        count, width = directions.shape
-        lanes = 1 if count <= FEW else DIRECTIONS
-        rows = -(-count // lanes) * lanes
-        seeds, result = np.zeros((rows, width)), np.zeros((rows, self.size))
-        seeds[:count] = directions
+        seeds = np.zeros((self._rows(len(directions)), self.width))
+        seeds[: len(directions)] = directions
+        return self._products(arrays, seeds)[: len(directions)]
+
+    def jacobian(self, arrays: Sequence[np.ndarray]) -> np.ndarray:
+        """Derivatives (size, width) by the entries of the argument."""
+        found = np.zeros((self.width, self.size))
+        if len(self.moving):
+            found[self.moving] = self._products(arrays, self._units)[: len(self.moving)]
+        return np.ascontiguousarray(found.T)
+
+    def _products(self, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:
+        rows, lanes = len(seeds), 1 if len(seeds) <= FEW else DIRECTIONS
+        result = np.empty((rows, self.size))
         given = [*arrays, seeds[0], result[0]]
         for array, size in zip(given, self.source.sizes, strict=True):
             if array.size < size or array.dtype != np.float64 or not array.flags.c_contiguous:
@@ -76,17 +97,10 @@ class Tangent(ShortRepr):
                 )
         function, pointers = _function(self.source, lanes), [array.ctypes.data for array in given]
         for _ in range(0, rows, lanes):
-            function(*pointers, *((width, self.size) if lanes > 1 else ()))
-            pointers[-2] += 8 * lanes * width
+            function(*pointers, *((self.width, self.size) if lanes > 1 else ()))
+            pointers[-2] += 8 * lanes * self.width
             pointers[-1] += 8 * lanes * self.size
-        return result[:count]
-
-    def jacobian(self, arrays: Sequence[np.ndarray], width: int) -> np.ndarray:
-        """Derivatives (size, width) by the entries of the argument."""
-        found = np.zeros((self.size, width))
-        if len(self.moving):
-            found[:, self.moving] = self.columns(arrays, np.eye(width)[self.moving]).T
-        return found
+        return result
 
 
 @once
@@ -100,14 +114,14 @@ def _function(source: KernelSource, lanes: int) -> Callable[..., None]:
 
 
 @once
-def tangent(source: KernelSource, argument: str, size: int) -> Tangent:
+def tangent(source: KernelSource, argument: str, size: int, width: int) -> Tangent:
     """The tangent of a kernel along one of its arguments, such as `_x`.
 
     Parameters
     ----------
-    size
-        Number of floats of the kernel's result.
+    size, width
+        Numbers of floats of the kernel's result and of the argument.
     """
     found = tangent_source(source, (argument,))
     places = re.findall(rf"_seed{argument}\[(\d+)\]", found.text)
-    return Tangent(found, size, np.unique(np.array(places, dtype=np.int64)))
+    return Tangent(found, size, width, np.unique(np.array(places, dtype=np.int64)))

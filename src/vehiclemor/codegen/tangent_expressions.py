@@ -8,8 +8,9 @@ from vehiclemor.codegen.kernel_statements import SEED, places
 
 # Function -> text of its derivative at the argument x, where it has the value v.
 DERIVATIVES = {
-    # Of a norm at zero it is what is between its slopes to all sides.
-    "math.sqrt": "0.5 / v if v > 0.0 else 0.0",
+    # Finite at zero: there a norm, whose square has the slope zero, has it too.  A choice would
+    # become a branch, and branches break up what is one long block.
+    "math.sqrt": "0.5 / (v + 1e-300)",
     "math.sin": "math.cos(x)",
     "math.cos": "-math.sin(x)",
     "math.tan": "1.0 + v * v",

@@ -7,7 +7,7 @@ does not depend on a seeded argument has no tangent and leaves no statement.  In
 lanes are directions: values and coefficients are computed once for all of them.
 
 Where a function has a kink, such as |x| at 0, it is the derivative on the side of larger arguments;
-the norm of a vector that is zero, a square root of zero, has the derivative zero.
+the norm of a vector that is zero has the derivative zero.
 """
 
 import ast

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import FileError, InputError, one_line
 from vehiclemor.files import make_folder, temporary_path, write_whole
 
 if TYPE_CHECKING:
@@ -48,23 +49,40 @@ def opened(path: Path) -> xr.Dataset:
     """The whole dataset, read where it is asked for."""
     import xarray as xr
 
-    engine = "zarr" if path.suffix == ZARR else "netcdf4"
-    return xr.open_dataset(path, engine=engine, chunks=None)
+    if path.suffix == ZARR:
+        return xr.open_zarr(path, chunks=None, consolidated=False)
+    return xr.open_dataset(path, engine="netcdf4")
 
 
 def _write_netcdf(path: Path, parts: Iterator[xr.Dataset]) -> None:
     import netCDF4
 
     first = next(parts)
-    first.to_netcdf(path, engine="netcdf4", unlimited_dims=["run"])
-    with netCDF4.Dataset(path, "a") as file:
-        growing = [name for name in first.variables if "run" in first[name].dims]
+    with _blamed(path):
+        chunks = {"values": {"chunksizes": first["values"].shape}}
+        first.to_netcdf(path, engine="netcdf4", unlimited_dims=["run"], encoding=chunks)
+        file = netCDF4.Dataset(path, "a")
+    growing = [str(name) for name, own in first.variables.items() if "run" in own.dims]
+    try:
         for part in parts:
             end = file.dimensions["run"].size
             for name in growing:
                 values = part[name].values
                 values = values.astype(object) if values.dtype.kind == "U" else values
-                file.variables[name][end : end + len(values)] = values
+                with _blamed(path):
+                    file.variables[name][end : end + len(values)] = values
+    finally:
+        with _blamed(path):
+            file.close()
+
+
+@contextmanager
+def _blamed(path: Path) -> Iterator[None]:
+    """Turn what the library says when it can't write into one line."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise FileError(f"{path}: can't be written ({one_line(error)})") from None
 
 
 def _write_zarr(path: Path, parts: Iterator[xr.Dataset]) -> None:
@@ -72,7 +90,11 @@ def _write_zarr(path: Path, parts: Iterator[xr.Dataset]) -> None:
     try:
         for number, part in enumerate(parts):
             further = {"append_dim": "run"} if number else {"mode": "w"}
-            part.to_zarr(temporary, consolidated=False, **further)  # type: ignore[call-overload]
+            # Texts of any length, as those of other chunks may be longer.
+            texts = {
+                name: v.astype(object) for name, v in part.variables.items() if v.dtype.kind == "U"
+            }
+            part.assign(texts).to_zarr(temporary, consolidated=False, **further)  # type: ignore[call-overload]
         os.replace(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

@@ -46,6 +46,14 @@ class Stage(NamedTuple):
     rows: IntVector
 
 
+class Stages(NamedTuple):
+    """Time loop, what decays of the start, lifting; a full model has but the first."""
+
+    integration: Stage
+    decay: Stage
+    lifting: Stage
+
+
 class Recorded(NamedTuple):
     """Where the time loop leaves a run, see `structures.Output`; the first of `buffer` is when."""
 
@@ -74,27 +82,38 @@ class Lifted(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """What is delivered.
+    """What is delivered of a run, and what is watched.
 
     Attributes
     ----------
     samples
-        Numbers of the samples, increasing.
+        Numbers of the samples that are kept, increasing.
     columns
         Numbers of the quantities: states, and behind them outputs.
     observer
         Of all outputs.
-    width
-        Of rows of states and outputs side by side, padded.
-    scratch
-        As long as such rows at all points and at one sample.
+    limits
+        How many of its limits a run must keep; it is only remarked that the others are left.
+    watch
+        Address of a kernel of the limited outputs alone; empty if all outputs are made at all
+        points, since all samples are kept.
+    width, points, chosen
+        Rows of states and outputs side by side, padded to this width: at all points and one more,
+        and at those that are kept.
+    states, inputs
+        States and inputs at the points that are kept; empty where no outputs are made of them.
     """
 
     samples: IntVector
     columns: IntVector
     observer: Observer
+    limits: Int
+    watch: IntVector
     width: Int
-    scratch: Vector
+    points: Vector
+    chosen: Vector
+    states: Matrix
+    inputs: Matrix
 
 
 class Told(NamedTuple):
@@ -129,15 +148,12 @@ class Told(NamedTuple):
 
 
 def many_runs(
-    integration: Stage,
-    decay: Stage,
-    lifting: Stage,
+    stages: Stages,
     recorded: Recorded,
     lifted: Lifted,
     given: Cube,
     starts: Matrix,
     wanted: Wanted,
-    limits: Int,
     told: Told,
 ) -> Int:
     """Integrate, lift and deliver one run after the other.
@@ -149,16 +165,14 @@ def many_runs(
     starts
         Full states (runs, n), which are known better than what is lifted from reduced ones; empty
         where nothing is lifted.
-    limits
-        How many of the limits a run must keep; it is only remarked that the others are left.
     """
     for run in range(len(given)):
         for k in range(len(recorded.counts)):
             recorded.counts[k] = 0
-        status = called(integration, run, 0)
+        status = called(stages.integration, run, 0)
         rows = rows_of(recorded, given.shape[1], status)
-        called(decay, run, rows)
-        called(lifting, run, rows)
+        called(stages.decay, run, rows)
+        called(stages.lifting, run, rows)
         if len(starts) and (not len(recorded.places) or recorded.places[0, 1] < 0.0):
             for i in range(starts.shape[1]):
                 lifted.states[0, i] = starts[run, i]
@@ -174,7 +188,17 @@ def many_runs(
         if left < rows:
             told.moments[run, 1] = recorded.moments[left]
         inputs = lifted.inputs if len(lifted.inputs) else given[run]
-        deliver(recorded.places, lifted.states[:rows], inputs, wanted, status, limits, told, run)
+        states = lifted.states[:rows]
+        end = watched(recorded.places, states, inputs, wanted, status, told, run)
+        told.ends[run, 2] = end
+        kept(recorded.places, states, inputs, wanted, end, told.result[run])
+    return 0
+
+
+def for_each_run(stage: Stage) -> Int:
+    """Call a stage for each run."""
+    for run in range(len(stage.by_run)):
+        called(stage, run, 0)
     return 0
 
 
@@ -203,43 +227,88 @@ def rows_of(recorded, samples, status):
     return max(row, LANES)
 
 
-def deliver(places, states, inputs, wanted, status, limits, told, run):
-    """Read the chosen quantities at the chosen samples, and watch all samples; see `delivered`."""
-    observer, columns, result = wanted.observer, wanted.columns, told.result
-    n, width = observer.states, wanted.width
-    samples = len(places) if len(places) else len(states)
-    points = matrix(wanted.scratch, 0, len(states), width)
-    observed(states, inputs, observer, wanted.scratch, points)
-    row_at = matrix(wanted.scratch, len(states) * width, 1, width)[0]
-    first = told.outside[run]
+def watched(places, states, inputs, wanted, status, told, run):
+    """First sample of a run outside of a limit that it must keep; see `path_loops.delivered`."""
+    observer, first, width = wanted.observer, told.outside[run], wanted.width
+    points = matrix(wanted.points, 0, len(states) + 1, width)
+    n, samples = observer.states, len(places) if len(places) else len(states)
+    kernel = wanted.watch if len(wanted.watch) else observer.kernel
+    observed(states, inputs, observer, kernel, wanted.points, points)
+    between = points[len(states)]
     for k in range(len(first)):
         first[k] = samples
-    known, within, reached, place, end = -1, False, True, 0, samples
+    known, within, end = -1, False, samples
     told.value[run] = 0.0
     for sample in range(samples):
         row, z = point_of(places, sample)
+        if row < 0:
+            break
         if z < 0.0:
             within = False
         elif row != known:
             within = cubics_within(points, row, observer)
         known = row
-        chosen = place < len(wanted.samples) and wanted.samples[place] == sample
-        if within and not chosen:
+        if within:
             continue
-        read_point(points, row, z, row_at)
+        at = points[row]
+        if z >= 0.0:
+            read_point(points, row, z, between)
+            at = between
         if status != FINISHED:
+            reached = True
             for i in range(n):
-                reached = reached and math.isfinite(row_at[i])
-        # From the failure on there are no numbers, which says nothing of limits.
-        if not within and reached:
-            note_outside(row_at, observer, sample, samples, first)
-            for k in range(limits):
-                if first[k] == sample and end == samples and status == FINISHED:
-                    end = sample
-                    told.value[run] = row_at[n + observer.limited[k]]
-        if chosen:
-            for j in range(len(columns)):
-                # What follows means nothing.
-                result[run, place, j] = row_at[columns[j]] if sample < end else math.nan
-            place += 1
-    told.ends[run, 2] = end
+                reached = reached and math.isfinite(at[i])
+            # From the failure on there are no numbers, which says nothing of limits.
+            if not reached:
+                break
+        note_outside(at, observer, sample, samples, first)
+        for k in range(wanted.limits):
+            if first[k] == sample and end == samples and status == FINISHED:
+                end = sample
+                told.value[run] = at[n + observer.limited[k]]
+    return end
+
+
+def kept(places, states, inputs, wanted, end, result):
+    """Read the chosen quantities (samples, columns); none from sample `end` on."""
+    points = matrix(wanted.points, 0, len(states) + 1, wanted.width)
+    between, columns = points[len(states)], wanted.columns
+    rows, known, own = 0, -1, len(wanted.states) > 0
+    if own:
+        for place in range(len(wanted.samples)):
+            row, z = point_of(places, wanted.samples[place])
+            if row >= 0 and row != known:
+                for node in range(1 if z < 0.0 else NODES):
+                    copied(states, inputs, row + node, wanted, rows)
+                    rows += 1
+            known = row
+        while 0 < rows < LANES <= len(states):
+            # Kernels take so many at once.
+            copied(states, inputs, known if known >= 0 else 0, wanted, rows)
+            rows += 1
+        observer, chosen = wanted.observer, wanted.chosen
+        points = matrix(chosen, 0, rows, wanted.width)
+        states, inputs = wanted.states[:rows], wanted.inputs[:rows]
+        observed(states, inputs, observer, observer.kernel, chosen, points)
+    rows, known, first = 0, -1, 0
+    for place in range(len(wanted.samples)):
+        row, z = point_of(places, wanted.samples[place])
+        if own and row >= 0 and row != known:
+            first = rows
+            rows += 1 if z < 0.0 else NODES
+        known = row
+        if row >= 0 and own:
+            row = first
+        read_point(points, row, z, between)
+        for j in range(len(columns)):
+            # What follows means nothing.
+            after = wanted.samples[place] >= end
+            result[place, j] = math.nan if after else between[columns[j]]
+
+
+def copied(states, inputs, row, wanted, to):
+    """Copy states and inputs of a point to those of the points that are kept."""
+    for i in range(wanted.states.shape[1]):
+        wanted.states[to, i] = states[row, i]
+    for j in range(inputs.shape[1]):
+        wanted.inputs[to, j] = inputs[row, j]

@@ -109,17 +109,12 @@ class Found(NamedTuple):
     @classmethod
     def empty(cls, runs: int, shape: tuple[int, int], counts: int) -> Found:
         """Room for so many runs."""
-        text = [np.full(runs, "", dtype=object) for _ in range(3)]
-        return cls(
-            np.empty((runs, *shape)),
-            np.full(runs, "ok", dtype=object),
-            *text[:2],
-            np.full(runs, np.nan),
-            np.full(runs, np.inf),
-            text[2],
-            np.zeros((runs, counts), dtype=np.int64),
-            np.zeros(runs),
+        status, message, remark, reason = (
+            np.full(runs, text, dtype=object) for text in ("ok", "", "", "")
         )
+        values, whole = np.empty((runs, *shape)), np.zeros((runs, counts), dtype=np.int64)
+        told = np.full(runs, np.nan), np.full(runs, np.inf), reason
+        return cls(values, status, message, remark, *told, whole, np.zeros(runs))
 
     def write(self, runs: Any, other: Found) -> None:
         """Write results of some of the runs."""

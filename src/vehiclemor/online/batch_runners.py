@@ -11,6 +11,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_result import Found, Selection
 from vehiclemor.online.batch_runs import BatchRuns
+from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.reduction.methods.guarded import GuardedModel, handed_over
@@ -33,9 +34,9 @@ def runner_of(reduced: ReducedOrderModel, chosen: Selection) -> Runner:
     fitted = reduced.reduced
     if _in_one_loop(fitted):
         return BatchRuns(fitted, chosen)  # type: ignore[arg-type]
-    guarded = isinstance(fitted, GuardedModel) and np.isinf(fitted.back)
-    if guarded and _in_one_loop(fitted.ahead) and _in_one_loop(fitted.safe):
-        return GuardedRuns(fitted, chosen)
+    if isinstance(fitted, GuardedModel) and np.isinf(fitted.back):
+        both = _in_one_loop(fitted.ahead) and _in_one_loop(fitted.safe)
+        return GuardedRuns(fitted, chosen) if both else SingleRuns(reduced, chosen)
     return SingleRuns(reduced, chosen)
 
 
@@ -86,6 +87,8 @@ class SingleRuns:
 
     def found(self, signals: Sequence[Maneuver], starts: Sequence[Start]) -> Found:
         """Results of the runs in their order."""
+        if isinstance(signals, Signals):
+            signals = signals.apart()
         times, rows = self.chosen.samples(signals[0])
         columns, counts = self.chosen.columns, self.reduced.model.counts
         found = Found.empty(len(signals), (len(rows), len(columns)), len(counts))

@@ -10,30 +10,29 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, Prepared, cache_lines, loops, ready
+from vehiclemor.codegen.loops import Prepared, cache_lines, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.online.batch_loops import Lifted, Recorded, Stage, Told, Wanted
+from vehiclemor.online.batch_loops import Lifted, Recorded, Stage, Stages, Told, Wanted
 from vehiclemor.online.batch_result import Found, Selection
-from vehiclemor.online.batch_signals import Given, Signals, addresses, given_of
+from vehiclemor.online.batch_signals import Given, Signals, given_of
+from vehiclemor.online.batch_stages import NO_STAGE, NOTHING, addresses, batch_loop, stage
+from vehiclemor.online.watched_outputs import WatchedOutputs
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.checks import lifted_wheels, out_of_validity
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.integrators.structures import NODES
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
-from vehiclemor.simulation.paths import PATH_LOOPS
 from vehiclemor.simulation.projection_windows import smooth_spans, whole_space
 from vehiclemor.simulation.run_plans import Solver
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.spare_spaces import SpareSpaces
 from vehiclemor.simulation.system import REASONS
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start
-
-NOTHING = np.zeros(0, dtype=np.int64)
-NO_STAGE = Stage(NOTHING, NOTHING, NOTHING, NOTHING.reshape(0, 0), NOTHING)
 
 
 class Begin(NamedTuple):
@@ -99,6 +98,8 @@ class BatchRuns:
         self.chosen, self._spare = chosen, SpareSpaces[Space]()
         self.reduced = fitted if isinstance(fitted, ReducedVehicle) else None
         self.system = self.reduced.system if self.reduced else self.model.system
+        self._watched = WatchedOutputs(self.model)
+        self._columns = self._watched.columns(chosen.columns)
         self.windows = whole_space(len(self.system.error_scale))
         self.solver, self.tolerance = fitted.solver, fitted.tolerance
 
@@ -118,37 +119,43 @@ class BatchRuns:
 
     def _recorded_alike(self, signals: Sequence[Maneuver], starts: Sequence[Start]) -> Found:
         """Results of runs with the same output times."""
-        names = self.model.inputs
-        times, rows = self.chosen.samples(signals[0])
-        refused: dict[int, str] = {}
-        if isinstance(signals, Signals):
-            signal, given = signals.first.for_inputs(names), signals.given(names, times)
-            outside = outside_of_bounds(self.model.definition, given.inputs)
-            refused = {run: refusal(signals[run], self.model) for run in outside}
-            runs = np.setdiff1d(np.arange(len(signals)), outside).tolist()
-            given = given if not refused else given.part(runs)
-        else:
-            refused = {run: m for run, s in enumerate(signals) if (m := refusal(s, self.model))}
-            runs = [run for run in range(len(signals)) if run not in refused]
-            complete = [signals[run].for_inputs(names) for run in runs]
-            if runs:
-                signal, given = complete[0], given_of(complete, times)
-        found = Found.empty(
-            len(signals), (len(rows), len(self.chosen.columns)), len(DYNAMIC_COUNTS)
-        )
+        first = signals.first if isinstance(signals, Signals) else signals[0]
+        times, rows = self.chosen.samples(first)
+        given, refused = self._given(signals, times)
+        shape = len(rows), len(self.chosen.columns)
+        found = Found.empty(len(signals), shape, len(DYNAMIC_COUNTS))
         found.refuse(refused)
-        if not runs:
+        if given is None:
             return found
+        runs = [run for run in range(len(signals)) if run not in refused]
+        first = first if isinstance(signals, Signals) else signals[runs[0]]
         begins = [self._begin(starts[run], given.inputs[k, 0]) for k, run in enumerate(runs)]
-        kinds = _by([(begin.excited.shape[1], begin.until < signal.duration) for begin in begins])
+        kinds = _by([(begin.excited.shape[1], begin.until < first.duration) for begin in begins])
         for kind, numbers in kinds.items():
             of_kind = given if len(kinds) == 1 else given.part(numbers)
-            key = signal.duration, signal.samples, *kind
-            part = self._of_kind(key, signal, of_kind, [begins[k] for k in numbers])
+            key = first.duration, first.samples, *kind
+            part = self._of_kind(key, first, of_kind, [begins[k] for k in numbers])
             if len(numbers) == len(signals):
                 return part
             found.write([runs[k] for k in numbers], part)
         return found
+
+    def _given(
+        self, signals: Sequence[Maneuver], times: np.ndarray | None
+    ) -> tuple[Given | None, dict[int, str]]:
+        """Inputs of the runs that can be begun, if any, and why the others can't."""
+        names = self.model.inputs
+        if isinstance(signals, Signals):
+            given = signals.given(names, times)
+            outside = outside_of_bounds(self.model.definition, given.inputs)
+            refused = {run: refusal(signals[run], self.model) for run in outside}
+            runs = [run for run in range(len(signals)) if run not in refused]
+            if refused:
+                given = given.part(runs) if runs else None
+            return given, refused
+        refused = {run: m for run, s in enumerate(signals) if (m := refusal(s, self.model))}
+        complete = [s.for_inputs(names) for run, s in enumerate(signals) if run not in refused]
+        return given_of(complete, times) if complete else None, refused
 
     def _begin(self, start: Start, inputs: np.ndarray) -> Begin:
         """Where a run from a start begins."""
@@ -168,7 +175,8 @@ class BatchRuns:
         signal
             One with their output times.
         """
-        space = self._spare.taken(kind, lambda: self._space(signal, begins[0], given.inputs[0]))
+        whole = signal.for_inputs(self.model.inputs)
+        space = self._spare.taken(kind, lambda: self._space(whole, begins[0], given.inputs[0]))
         starts = np.stack([begin.state for begin in begins])
         full = np.stack([begin.full for begin in begins])
         excited = np.stack([begin.excited for begin in begins])
@@ -192,15 +200,13 @@ class BatchRuns:
         ]
         columns = addresses(starts), of_inputs, until.view(np.int64), given.words, spans
         told = self._told(len(begins), len(space.wanted.samples))
-        loop = _loop().prepared(
-            _stage(call, places, columns),
-            *self._lifting_stages(space, of_inputs, excited),
+        loop = batch_loop("many_runs").prepared(
+            Stages(stage(call, places, columns), *self._lifting_stages(space, of_inputs, excited)),
             space.recorded,
             space.lifted,
             given.inputs,
             full if full.shape[1] else np.empty((0, 0)),
             space.wanted,
-            len(self.model.limits[0]),
             told,
         )
         _, seconds = timed(loop)
@@ -220,7 +226,7 @@ class BatchRuns:
                 places += [call.address("rates"), call.address("amplitudes")]
                 rates = addresses(excited)
                 columns += [rates, rates + excited[0, 0].nbytes]
-            stages.append(_stage(call, places, columns, rows, len(of_inputs)))
+            stages.append(stage(call, places, columns, rows, len(of_inputs)))
         return (NO_STAGE, *stages)[-2:] if stages else (NO_STAGE, NO_STAGE)  # type: ignore[return-value]
 
     def _space(self, signal: Maneuver, begin: Begin, inputs: np.ndarray) -> Space:
@@ -242,12 +248,35 @@ class BatchRuns:
             )
             stages = of_lift.calls
             lifted = Lifted(of_lift.states, points, of_lift.largest, of_lift.first)
-        observer = self.model.observer(LANES if len(output.samples) >= LANES else 1).bundle
-        width = -(-(observer.states + len(self.model.outputs)) // LANES) * LANES
-        scratch = cache_lines(len(output.samples) + 1, width)[0].reshape(-1)
-        wanted = Wanted(rows, self.chosen.columns, observer, width, scratch)
+        wanted = self._wanted(rows, lifted.states, inputs.shape[1])
         call = loop.prepared(*arguments)
         return Space(call, stages, recorded, lifted, wanted, output.samples, direct)
+
+    def _wanted(self, rows: np.ndarray, states: np.ndarray, inputs: int) -> Wanted:
+        """What is delivered of runs with these states, and room for it."""
+        samples, lanes = len(states), LANES if len(states) >= LANES else 1
+        observer = self.model.observer(lanes).bundle
+        width = -(-(observer.states + len(self.model.outputs)) // LANES) * LANES
+        watch, kept = NOTHING, 0
+        made = bool((self._columns >= observer.states).any())
+        if len(rows) < samples or not made:
+            watch = self._watched.kernel(lanes)
+            kept = made * (min(len(rows) * NODES, samples) + LANES)
+        points, chosen = (cache_lines(size, width)[0].reshape(-1) for size in (samples + 1, kept))
+        # What is watched are few of the columns.
+        points.fill(0.0)
+        return Wanted(
+            rows,
+            self._columns,
+            observer,
+            len(self.model.limits[0]),
+            watch,
+            width,
+            points,
+            chosen,
+            np.empty((kept, observer.states)),
+            np.empty((kept, inputs)),
+        )
 
     def _told(self, runs: int, times: int) -> Told:
         watched = len(self.reduced.lift.features.watched) if self.reduced else 0
@@ -284,7 +313,7 @@ class BatchRuns:
                 message = f"{REASONS[status]} at t = {moments[run][0]:.6g} s"
             elif end < samples:
                 name = names[told.outside[run, : len(names)].tolist().index(end)]
-                message = out_of_validity(definition, name, told.value[run], times[end])
+                message = out_of_validity(definition, name, told.value[run], times.item(end))
             if message:
                 found.status[run], found.message[run] = "diverged", message
             trust = None
@@ -330,25 +359,3 @@ def refusal(signal: Maneuver, model: DynamicModel) -> str:
     except InputError as error:
         return str(error)
     return ""
-
-
-def _stage(
-    call: Prepared,
-    places: Sequence[int],
-    columns: Sequence[np.ndarray],
-    rows: Sequence[int] = (),
-    runs: int = 0,
-) -> Stage:
-    """A stage whose words at some places change from run to run."""
-    by_run = np.column_stack(columns) if len(columns) else np.empty((runs, 0), dtype=np.int64)
-    return Stage(
-        np.array([call.entry], dtype=np.int64),
-        np.frombuffer(call.words, dtype=np.int64),
-        np.array(places, dtype=np.int64),
-        np.ascontiguousarray(by_run),
-        np.array(rows, dtype=np.int64),
-    )
-
-
-def _loop() -> Loop:
-    return loops((*PATH_LOOPS, "online.batch_loops"), ("many_runs",))["many_runs"]

@@ -9,13 +9,14 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from vehiclemor.arguments import real_array
-from vehiclemor.codegen.loops import address_of_array, ready
+from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.piecewise import CONTINUOUS, bent, evaluated, joined
+from vehiclemor.online.batch_stages import addresses, batch_loop, stage
+from vehiclemor.piecewise import CONTINUOUS, Pieces, bent_by_column, joined, quiet_ends
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
-from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
+from vehiclemor.simulation.input_polynomials import SIGNAL_LOOPS, recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import structures
 from vehiclemor.simulation.maneuver_checks import cut_short
 
@@ -127,50 +128,62 @@ class Signals(Sequence[Signal], ShortRepr):
 
     def given(self, names: tuple[str, ...], times: np.ndarray | None) -> Given:
         """The inputs of a model with these names, as loops take them; see `given_of`."""
-        whole = self.inputs == names or (not self.inputs and self.u.shape[2] == len(names))
-        if self.hold not in CONTINUOUS:
-            return given_of([self[run].for_inputs(names) for run in range(len(self))], times)
-        coefficients = self._coefficients()
-        own_times = self.t - self.t[0]
-        patterns: dict[bytes, list[int]] = {}
-        bends = [bent(own_times, u) for u in self.u]
-        for run, pattern in enumerate(bends):
-            patterns.setdefault(pattern.tobytes(), []).append(run)
-        pieces = [
-            (runs, joined(own_times, bends[runs[0]], coefficients[runs[0]]))
-            for runs in patterns.values()
-        ]
-        if not whole:
-            signals: list[Any] = [None] * len(self)
-            for runs, first in pieces:
-                for run in runs:
-                    own = first._replace(coefficients=coefficients[run])
-                    signals[run] = replace(self.first, pieces=own, kept={}).for_inputs(names)
-            return given_of(signals, times)
-        at = self.first.times if times is None else times
-        inputs = np.empty((len(self), len(at), len(names)))
-        edges: list[Any] = [None] * len(self)
-        words, kept = [], []
-        for runs, first in pieces:
-            inputs[runs] = evaluated(coefficients[runs], *first.located(at))
-            for run in runs:
+        derived = self.inputs != names and (self.inputs or self.u.shape[2] != len(names))
+        if self.hold not in CONTINUOUS or derived:
+            return given_of([signal.for_inputs(names) for signal in self.apart()], times)
+        pieces, coefficients = self._pieces()
+        kept = [ready(structures.Signal(*first)) for _, first in pieces]
+        words = np.empty((self.runs, len(kept[0].words) // 8), dtype=np.int64)
+        edges: list[Any] = [None] * self.runs
+        for (alike, first), shared in zip(pieces, kept, strict=True):
+            words[alike] = np.frombuffer(shared.words, dtype=np.int64)
+            for run in alike:
                 edges[run] = first.edges
-            kept.append(ready(structures.Signal(*first)))
-            words.append(np.frombuffer(kept[-1].words, dtype=np.int64))
-        table = np.empty((len(self), len(words[0])), dtype=np.int64)
-        for (runs, _), row in zip(pieces, words, strict=True):
-            table[runs] = row
         # The address of the coefficients comes before their shape, which is last.
-        table[:, -4] = addresses(coefficients)
-        return Given(table, edges, inputs, [""] * len(self), (coefficients, kept))
+        words[:, -4] = addresses(coefficients)
+        inputs = _sampled(kept[0], words, self.first.times if times is None else times)
+        return Given(words, edges, inputs, [""] * self.runs, (coefficients, kept))
 
-    def _coefficients(self) -> np.ndarray:
-        """Polynomials (runs, intervals, inputs, degree + 1)."""
+    def apart(self) -> list[Signal]:
+        """The signals, one by one; polynomials of all are made together."""
+        if self.hold not in CONTINUOUS:
+            return [self[run] for run in range(self.runs)]
+        pieces, coefficients = self._pieces()
+        signals: list[Any] = [None] * self.runs
+        for alike, first in pieces:
+            for run in alike:
+                own = first._replace(coefficients=coefficients[run])
+                signals[run] = replace(self.first, pieces=own, kept={})
+        return signals
+
+    def _pieces(self) -> tuple[list[tuple[list[int], Pieces]], np.ndarray]:
+        """Runs with the same segments, and the first of them; all coefficients by run."""
         runs, n, columns = self.u.shape
+        times = self.t - self.t[0]
         side_by_side = self.u.swapaxes(0, 1).reshape(n, runs * columns)
-        found = CONTINUOUS[self.hold](self.t - self.t[0], side_by_side)
-        found = found.reshape(n - 1, runs, columns, -1)
-        return np.ascontiguousarray(found.swapaxes(0, 1))
+        found = CONTINUOUS[self.hold](times, side_by_side).reshape(n - 1, runs, columns, -1)
+        coefficients = np.ascontiguousarray(found.swapaxes(0, 1))
+        kinks = bent_by_column(times, side_by_side).reshape(n - 2, runs, columns)
+        moves = np.diff(self.u, axis=1) != 0.0
+        segments: dict[bytes, tuple[np.ndarray, list[int]]] = {}
+        for run in range(runs):
+            bends = kinks[:, run].any(axis=1) | quiet_ends(times, moves[run].any(axis=1))
+            segments.setdefault(bends.tobytes(), (bends, []))[1].append(run)
+        pieces = [
+            (alike, joined(times, bends, coefficients[alike[0]]))
+            for bends, alike in segments.values()
+        ]
+        return pieces, coefficients
+
+
+def _sampled(first: Ready, words: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Inputs (runs, samples, inputs) at some times, of signals in words; one of them is ready."""
+    result = np.empty((len(words), len(times), first.bundle.coefficients.shape[1]))
+    call = loops(SIGNAL_LOOPS, ("sampled",))["sampled"].prepared(first, times, result[0])
+    begin = call.address("signal.edges")
+    places = [*range(begin, begin + words.shape[1]), call.address("inputs")]
+    batch_loop("for_each_run")(stage(call, places, [words, addresses(result)]))
+    return result
 
 
 def given_of(signals: Sequence[Maneuver], times: np.ndarray | None) -> Given:
@@ -191,8 +204,3 @@ def given_of(signals: Sequence[Maneuver], times: np.ndarray | None) -> Given:
         [cut_short(signal) for signal in signals],
         held,
     )
-
-
-def addresses(arrays: np.ndarray) -> np.ndarray:
-    """Addresses (runs,) of the parts of an array along its first dimension."""
-    return address_of_array(arrays) + np.arange(len(arrays)) * arrays[0].nbytes

@@ -12,20 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import count, file_path, quoted, real_array
+from vehiclemor.arguments import count, file_path
 from vehiclemor.errors import InputError, VehiclemorError
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.online.batch_arguments import (
+    count_of,
+    kept_times,
+    model_behind,
+    parameter_sets,
+    starts_of,
+)
 from vehiclemor.online.batch_files import checked_target, opened, written
 from vehiclemor.online.batch_result import Found, Selection, dataset, selected
 from vehiclemor.online.batch_runners import Runner, runner_of
 from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
-from vehiclemor.reduction.methods.full_order import FullOrderModel
-from vehiclemor.registry import unknown
-from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
-from vehiclemor.simulation.build import build, reparametrised
-from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
+from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 from vehiclemor.study.linear_algebra import one_thread
@@ -62,7 +64,7 @@ def simulate_many(
     model
         Reduced or full model made by `reduce()`; or a full model, or its name, which is integrated
         as `Model.simulate` does by default, to be measured against: `reduce(model, "full_order",
-        solver="ros34pw2", tolerance=2e-3)` is 50 times faster.
+        solver="ros34pw2", tolerance=2e-3)` is far faster.
     signals
         One for each run: `Signals`, or a list of signals or maneuvers.  They have the same output
         times, unless `times` are given.
@@ -96,20 +98,14 @@ def simulate_many(
     InputError
         If an argument is wrong, or the result does not fit into memory.
     """
-    reduced = _ready(model)
-    runs = _count(signals, reduced.model)
+    reduced = model_behind(model)
+    runs = count_of(signals, reduced.model)
     chosen = selected(reduced.model, outputs, times)
-    kept = _kept_times(chosen, signals)
-    begins = _starts(starts, runs, reduced.model)
-    sets = _parameter_sets(parameters, runs, reduced)
+    kept = kept_times(chosen, signals)
+    begins = starts_of(starts, runs, reduced.model)
+    sets = parameter_sets(parameters, runs, reduced)
     threads = _cores() if jobs is None else count("jobs", jobs)
-    about = attributes(
-        f"{runs} runs of {reduced.model.name}, {reduced.method}",
-        reduced.model.kernel_hash,
-        model=reduced.model.name,
-        method=reduced.method,
-        settings=repr(dict(reduced.settings)),
-    )
+    about = _attributes(reduced, runs)
     work = _Work(reduced, chosen, signals, begins, sets)
 
     def labelled(found: Found, first: int) -> xr.Dataset:
@@ -129,6 +125,17 @@ def simulate_many(
     target = checked_target(file_path("path", path))
     written(target, (labelled(found, first) for first, found in _chunks(work, runs, threads)))
     return opened(target)
+
+
+def _attributes(reduced: ReducedOrderModel, runs: int) -> dict[str, object]:
+    """Where the runs come from."""
+    return attributes(
+        f"{runs} runs of {reduced.model.name}, {reduced.method}",
+        reduced.model.kernel_hash,
+        model=reduced.model.name,
+        method=reduced.method,
+        settings=repr(dict(reduced.settings)),
+    )
 
 
 def _chunks(work: Callable[[slice], Found], runs: int, threads: int) -> Iterator[tuple[int, Found]]:
@@ -206,101 +213,3 @@ def _cores() -> int:
     """Number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
-
-
-def _ready(model: Any) -> ReducedOrderModel:
-    """The model behind the names of a reduced one."""
-    if isinstance(model, ReducedOrderModel):
-        return model
-    full = build(model) if isinstance(model, str) else model
-    if not isinstance(full, Model):
-        raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    solver, tolerance = (
-        ("newton", NEWTON_TOLERANCE) if full.kind == "ae" else ("dopri5", REFERENCE_TOLERANCE)
-    )
-    settings = {"solver": solver, "tolerance": tolerance}
-    return ReducedOrderModel(full, "full_order", settings, (), FullOrderModel(full, **settings))
-
-
-def _count(signals: Any, model: Model) -> int:
-    """Number of runs; `InputError` if something else than inputs of the model is given."""
-    if isinstance(signals, Maneuver) or not isinstance(signals, Sequence) or not len(signals):
-        raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
-    for run, signal in enumerate([signals.first] if isinstance(signals, Signals) else signals):
-        if not isinstance(signal, Maneuver):
-            raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
-        if signal.for_inputs(model.inputs).inputs != model.inputs:
-            raise InputError(
-                f"signals[{run}]: {signal} gives inputs {', '.join(signal.inputs)}, "
-                f"{model.name} needs {', '.join(model.inputs)}"
-            )
-    return len(signals)
-
-
-def _kept_times(chosen: Selection, signals: Any) -> np.ndarray:
-    """Times in s of the result; `InputError` if runs don't share or don't reach them."""
-    first = signals[0]
-    others = () if isinstance(signals, Signals) else signals
-    if chosen.times is None:
-        for run, signal in enumerate(others):
-            if (signal.duration, signal.samples) != (first.duration, first.samples):
-                raise InputError(
-                    f"signals[{run}] has other output times than the first: choose times="
-                )
-        return first.times
-    shortest = min(signal.duration for signal in (first, *others))
-    if chosen.times[0] < 0.0 or chosen.times[-1] > shortest * (1.0 + 1e-9):
-        raise InputError(f"times must lie within all runs, 0 to {shortest:g} s")
-    return chosen.times
-
-
-def _starts(starts: Any, runs: int, model: Model) -> Sequence[Start]:
-    """The start of each run, checked."""
-    if starts is None or isinstance(starts, str):
-        model.start(starts)
-        return [starts or model.starts[0]] * runs
-    if not isinstance(starts, Sequence | np.ndarray):
-        raise InputError(f"starts is {quoted(starts)}, neither names nor states")
-    if not len(starts) or (np.ndim(starts[0]) == 0 and not isinstance(starts[0], str)):
-        return [model.start(starts)] * runs  # type: ignore[arg-type]
-    if len(starts) != runs:
-        raise InputError(f"there are {len(starts)} starts for {runs} runs")
-    if isinstance(starts, np.ndarray):
-        return checked_path(starts, len(model.definition.states), "starts")  # type: ignore[return-value]
-    return [start if isinstance(start, str) else model.start(start) for start in starts]
-
-
-def _parameter_sets(
-    parameters: Any, runs: int, reduced: ReducedOrderModel
-) -> Sequence[tuple] | None:
-    """Parameters (name, value) of each run, none if all have the model's own."""
-    if parameters is None:
-        return None
-    if reduced.method != "full_order":
-        raise InputError(
-            f"parameters: {reduced.method} was fitted to one parameter set; "
-            f"other ones are for the full model"
-        )
-    if isinstance(parameters, Mapping):
-        declared = reduced.model.definition.parameters
-        columns = {}
-        for name, value in parameters.items():
-            if name not in declared:
-                raise unknown("parameter", name, declared)
-            try:
-                array = real_array(value)
-            except (TypeError, ValueError):
-                raise InputError(f"parameter {name}: {quoted(value)} is not a number") from None
-            own = () if declared[name].size == 1 else (declared[name].size,)
-            if array.shape not in (own, (runs, *own)):
-                raise InputError(
-                    f"parameter {name} has shape {array.shape}, not {own} or {(runs, *own)}"
-                )
-            columns[name] = np.broadcast_to(array, (runs, *own)).tolist()
-        names = [*columns]
-        return [
-            tuple(zip(names, values, strict=True)) for values in zip(*columns.values(), strict=True)
-        ] or None
-    if not isinstance(parameters, Sequence) or len(parameters) != runs:
-        raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
-    return [tuple(own.items()) for own in parameters]

@@ -12,6 +12,7 @@ import dataclasses
 import inspect
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -181,11 +182,12 @@ def named(name: str) -> Any:
     """
     module, _, own = name.partition(":")
     if module.startswith(ROOMS):
-        found = getattr(import_module(module), own, None)
-    else:
-        # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
-        known = module.partition(".")[0] in _plug_ins()
-        found = getattr(sys.modules.get(module), own, None) if known else None
+        with suppress(ImportError):
+            import_module(module)
+    # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
+    elif module.partition(".")[0] not in _plug_ins():
+        module = ""
+    found = getattr(sys.modules.get(module), own, None)
     fitting = inspect.isfunction(found) or _fields(found)
     if not fitting or getattr(found, "__module__", "") != module:
         raise ValueError(f"there is no {name}")
@@ -213,7 +215,7 @@ def _name(value: Any, definition: Any, place: str) -> str:
     name = f"{definition.__module__}:{definition.__qualname__}"
     try:
         found = named(name)
-    except (ValueError, ImportError):
+    except ValueError:
         found = None
     if found is not definition:
         raise _unwritable(place, value)

@@ -92,13 +92,7 @@ class AlgebraicModel(Model):
     def jacobian(
         self, state: Any, u: Any, with_respect_to: By = "state", of: str = "residual"
     ) -> np.ndarray:
-        """Derivatives at coordinates (n,) and inputs, see `Model.jacobian`.
-
-        Parameters
-        ----------
-        of
-            `residual`, `outputs`, or `coordinates`; see `kinematic_derivatives`.
-        """
+        """Derivatives of `residual`, `outputs` or `coordinates`, see `kinematic_derivatives`."""
         if of == "residual" and with_respect_to == "state":
             return self.evaluated("residual_jacobian", state, u)[:, :-1].copy()
         return kinematic_derivatives(self, state, u, with_respect_to, of)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.parameters import ParameterSet, load_parameters, overridden
+from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -66,13 +67,34 @@ def build(
 
 def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     """The model with some of its parameters changed: name -> value in SI units; see `build`."""
-    declared = model.definition.parameters
-    return _made(model.definition, overridden(model.parameters, declared, overrides))
+    parameters = overridden(model.parameters, model.definition.parameters, overrides)
+    return _made(model.definition, parameters, (model.equations, model.kernel_hash))
 
 
-def _made(definition: ModelDefinition, parameters: ParameterSet) -> Model:
+def _made(
+    definition: ModelDefinition,
+    parameters: ParameterSet,
+    derived: tuple[Derivation, str] | None = None,
+) -> Model:
+    """A model of equations that may have been derived already, see `compiled`."""
     make = _algebraic if definition.kind == "ae" else _dynamic
-    return make(definition, parameters)
+    return make(definition, parameters, derived)
+
+
+def kept_build(name: str) -> Model:
+    """As `build` with the model's own parameters; kept while these are the same, to be read."""
+    definition: ModelDefinition = component("model", name)
+    try:
+        parameters = (definition.parameter_file or parameter_path(name)).read_bytes()
+    except OSError:
+        # What is wrong with it is told where it is read.
+        parameters = b""
+    return _kept(definition, parameters)
+
+
+@lru_cache(maxsize=8)
+def _kept(definition: ModelDefinition, _: bytes) -> Model:
+    return build(definition.name)
 
 
 def build_derived(name: str) -> Model | None:
@@ -81,14 +103,16 @@ def build_derived(name: str) -> Model | None:
     return build(name) if is_derived(name, definition.derive) else None
 
 
-def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> AlgebraicModel:
+def _algebraic(
+    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
+) -> AlgebraicModel:
     """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
     # Imported here: a model of one kind needs nothing of the other.
     from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
 
     with blamed(f"model {definition.name!r}: design_coordinates"):
         design = real_array(definition.design_coordinates(parameters.values()))
-    equations, digest = compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
+    equations, digest = derived or compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
     check_equations(definition, equations)
     _check_states(definition, {DESIGN_START: design})
     constants = hoisted_constants(equations, parameters.flat(), [])
@@ -108,14 +132,16 @@ def _algebraic(definition: ModelDefinition, parameters: ParameterSet) -> Algebra
     return model
 
 
-def _dynamic(definition: ModelDefinition, parameters: ParameterSet) -> DynamicModel:
+def _dynamic(
+    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
+) -> DynamicModel:
     """A model of equations of motion."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
     values = values_of(definition, parameters.flat())
     with blamed(f"model {definition.name!r}: check"):
         definition.check(values)
-    equations, digest = compiled(definition.name, definition.derive)
+    equations, digest = derived or compiled(definition.name, definition.derive)
     check_equations(definition, equations)
     with blamed(f"model {definition.name!r}: solve_equilibrium"):
         values |= solved_parameters(definition, parameters.flat(), equations)

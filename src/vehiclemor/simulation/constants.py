@@ -94,5 +94,5 @@ def constants_along(
             row[len(flat) :] = (8.0 * near - far) / (12.0 * step[number])
     given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
     source = equations.sources["constants"]
-    along = tangent(source, source.arguments[0], equations.constants)
+    along = tangent(source, source.arguments[0], equations.constants, len(given))
     return along.columns((given,), directions)

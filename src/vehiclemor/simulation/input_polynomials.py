@@ -11,10 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor import signals
 from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.signals import Signal as GivenSignal
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.integrators.structures import Signal
 
@@ -28,7 +28,7 @@ KEPT = 512
 
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    if not isinstance(maneuver, signals.Signal):
+    if not isinstance(maneuver, GivenSignal):
         return _recorded(maneuver)
     # Kept with the signal, so not longer than it.
     if "recorded" not in maneuver.kept:
@@ -44,7 +44,15 @@ def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:
     """The maneuver to which another is proportional, if it declares that it is."""
     if not maneuver.linear_in_amplitude or maneuver.amplitude_factor == 1.0:
         return None
-    return maneuver.perturbed(maneuver.frequency_factor)
+    unit = maneuver.perturbed(maneuver.frequency_factor)
+    return unit if _is_linear(unit) else None
+
+
+@lru_cache(maxsize=KEPT)
+def _is_linear(unit: Maneuver) -> bool:
+    """Whether it is what it declares: a copy with another signal may not be."""
+    doubled = unit.perturbed(unit.frequency_factor, 2.0).at(unit.times)
+    return bool(np.array_equal(doubled, 2.0 * unit.at(unit.times)))
 
 
 @lru_cache(maxsize=64)
@@ -74,7 +82,7 @@ def signal_of(maneuver: Maneuver) -> Ready:
     InputError
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
-    if not isinstance(maneuver, signals.Signal):
+    if not isinstance(maneuver, GivenSignal):
         return _found_signal(maneuver)
     if "ready" not in maneuver.kept:
         maneuver.kept["ready"] = ready(Signal(*maneuver.polynomials))

@@ -76,7 +76,7 @@ def delivered(
     """
     samples = len(result)
     points = matrix(scratch, 0, len(states), result.shape[1])
-    observed(states, inputs, observer, scratch, points)
+    observed(states, inputs, observer, observer.kernel, scratch, points)
     for k in range(len(first)):
         first[k] = samples
     known, within = -1, False
@@ -93,8 +93,8 @@ def delivered(
     return 0
 
 
-def observed(states, inputs, observer, scratch, points):
-    """States and outputs side by side at the points (points, width), where the scratch begins."""
+def observed(states, inputs, observer, kernel, scratch, points):
+    """States and what a kernel makes of them, side by side at the points, the scratch space."""
     n, width = observer.states, points.shape[1]
     for row in range(len(states)):
         for i in range(n):
@@ -104,9 +104,9 @@ def observed(states, inputs, observer, scratch, points):
             points[row, i] = 0.0
     outputs = matrix(scratch, n, len(states), width)
     if len(states) >= LANES:
-        lane_path(states, inputs, observer.kernel, observer.constants, outputs)
+        lane_path(states, inputs, kernel, observer.constants, outputs)
     else:
-        kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
+        kernel_path(states, inputs, kernel, observer.constants, outputs)
 
 
 def point_of(places, sample):

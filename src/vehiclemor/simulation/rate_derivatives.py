@@ -43,14 +43,15 @@ def rate_derivatives(
     state: np.ndarray,
     inputs: np.ndarray,
     by: Along,
+    from_state: bool = False,
 ) -> np.ndarray:
-    """Derivatives (n, columns) of `Stepper.rates` in a window."""
+    """Derivatives (n, columns) of `Stepper.rates` in a window, whose origin may be the state."""
     n, arrays = len(state), (state, inputs, system.constants)
     if windows.formulation == "full":
         if by.place == CONSTANTS:
             return along(system.kernels, "derivative", arrays, n, *by).T
         return partial(system.kernels, "derivative", arrays, n, by.place)
-    rank, mean = int(windows.ranks[window]), windows.means[window]
+    rank, mean = int(windows.ranks[window]), state if from_state else windows.means[window]
     trial, test = windows.trial_basis[window, :rank], windows.test_basis[window, :rank]
     columns = {STATE: n, CONSTANTS: len(by.directions)}.get(by.place, len(inputs))
     moved = np.eye(n) if by.place == STATE else np.zeros((n, columns))
@@ -58,30 +59,33 @@ def rate_derivatives(
     if windows.formulation == "state":
         onto = trial.T @ test
         place = mean + onto @ (state - mean)
-        return onto @ slopes.of("derivative", place, onto @ moved, n)
+        return onto @ slopes.of("derivative", place, moved if from_state else onto @ moved, n)
     half = n // 2
-    return _of_coordinates(
-        slopes, state, moved, mean, (trial[: rank // 2, :half], test[: rank // 2, :half])
-    )
+    bases = trial[: rank // 2, :half], test[: rank // 2, :half]
+    return _of_coordinates(slopes, state, moved, None if from_state else mean, bases)
 
 
 def _of_coordinates(
     slopes: _Slopes,
     state: np.ndarray,
     moved: np.ndarray,
-    mean: np.ndarray,
+    mean: np.ndarray | None,
     bases: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """The same where the equations of motion are projected; step by step as in `Stepper.rates`."""
+    """The same where the equations of motion are projected; step by step as in `Stepper.rates`.
+
+    Without a mean the coordinates themselves are the origin.
+    """
     (trial, test), half, system = bases, len(state) // 2, slopes.system
     onto = trial.T @ test
 
     def value(name: str, x: np.ndarray, size: int) -> np.ndarray:
         return system.along(name, x[None], slopes.inputs[None], size)[0]
 
-    q = mean[:half] + onto @ (state[:half] - mean[:half])
+    q, dq = state[:half], moved[:half]
+    if mean is not None:
+        q, dq = mean[:half] + onto @ (q - mean[:half]), onto @ dq
     rates = onto @ value("derivative", state, 2 * half)[:half]
-    dq = onto @ moved[:half]
     drates = onto @ slopes.of("derivative", state, moved, 2 * half)[:half]
     turned, dturned = np.concatenate([q, rates]), np.vstack([dq, drates])
     place = np.concatenate([q, value("speeds", turned, half)])

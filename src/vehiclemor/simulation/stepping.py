@@ -202,7 +202,7 @@ class Stepper:
     ) -> np.ndarray:
         """Analytic derivatives (n, columns) of the rates."""
         window = next(self._parts(time, 2.0 * SHORTEST))[2]
-        return rate_derivatives(self.system, self.windows, window, state, inputs, by)
+        return rate_derivatives(self.system, self.windows, window, state, inputs, by, self.moved)
 
     def _evaluated(
         self, kernel: str, state: np.ndarray, inputs: np.ndarray, size: int

@@ -59,8 +59,9 @@ def with_units(dataset: xr.Dataset) -> xr.Dataset:
     `see output_unit` becomes the unit of all outputs if they share one, and is left out otherwise:
     a plot would show it.  The unit of each output stays beside it.
     """
-    for variable in dataset.data_vars.values():
-        if variable.attrs.get("units", "").startswith("see "):
-            units = set(dataset[variable.attrs.pop("units").removeprefix("see ")].values.tolist())
+    for variable in dataset.variables.values():
+        if str(variable.attrs.get("units", "")).startswith("see "):
+            of = variable.attrs.pop("units").removeprefix("see ")
+            units = set(dataset.variables[of].values.tolist())
             variable.attrs |= {"units": units.pop()} if len(units) == 1 else {}
     return dataset

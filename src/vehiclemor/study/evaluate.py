@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, cast
 
@@ -38,14 +38,27 @@ if TYPE_CHECKING:
 ONLINE = ("solver", "tolerance")
 
 
-def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
+@dataclass
+class Fitted:
+    """A fit, and whether it has been run before."""
+
+    reduced: ReducedModel | Failure
+    warm: bool = False
+
+
+def evaluate(
+    experiment: Experiment, model: Model | None = None, *, errors: bool = True
+) -> xr.Dataset:
     """Labelled result of an experiment, whatever becomes of it.
 
     Parameters
     ----------
     model
-        The model that the experiment was made with.  By default it is built from the registry, and
-        what was fitted and solved for other experiments is used again.
+        The model that the experiment was made with; what was lately fitted to it and solved with it
+        is used again.  By default it is built from the registry, and that of all other experiments
+        is.
+    errors
+        Whether to compare with the full-order solution; without it, it is not solved.
 
     Returns
     -------
@@ -56,19 +69,24 @@ def evaluate(experiment: Experiment, model: Model | None = None) -> xr.Dataset:
     kept = model is None
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
         model = model or model_of(experiment)
-        found = attempt(partial(_evaluated, experiment, model, kept))
+        found = attempt(partial(_evaluated, experiment, model, kept, errors))
         return _failed(experiment, model, found) if isinstance(found, Failure) else found
 
 
-def _evaluated(experiment: Experiment, model: Model, kept: bool) -> xr.Dataset:
+def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -> xr.Dataset:
     refused = refusal(model, experiment)
-    reduced = refused or (kept_fit if kept else fresh_fit)(model, experiment)
-    solve = kept_reference if kept else reference_run
+    if kept or refused:
+        fitted = Fitted(refused or kept_fit(model, experiment))
+    else:
+        fitted = recent_fit(model, experiment)
+    reduced, solve = fitted.reduced, kept_reference if kept else recent_reference
     outcomes: list[Outcome | Failure] = []
     for scenario in experiment.test:
-        outcome = refused or attempt(partial(solve, model, scenario), "the full-order reference: ")
-        if isinstance(outcome, Trajectory):
-            outcome = _tested(model, reduced, scenario, outcome, experiment)
+        outcome: Any = refused
+        if errors and not refused:
+            outcome = attempt(partial(solve, model, scenario), "the full-order reference: ")
+        if not isinstance(outcome, Failure):
+            outcome = _tested(model, fitted, scenario, outcome, experiment)
         outcomes.append(outcome)
     if experiment.keep == "errors":
         return errors_dataset(model, experiment, outcomes, reduced)
@@ -114,6 +132,9 @@ def reference_run(model: Model, scenario: Scenario) -> Trajectory:
     return trajectory
 
 
+# As many as a session goes back and forth between; they are large.
+RECENT = 16
+recent_reference = lru_cache(maxsize=RECENT)(reference_run)
 # More than the scenarios of any protocol, each of which is simulated with every candidate.
 kept_reference = lru_cache(maxsize=1024)(reference_run)
 
@@ -121,6 +142,35 @@ kept_reference = lru_cache(maxsize=1024)(reference_run)
 def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     """Fit the method on the training scenarios, and on nothing else."""
     return _fit(model, experiment.method, _text(experiment.settings), experiment.training)
+
+
+def recent_fit(model: Model, experiment: Experiment) -> Fitted:
+    """As `fresh_fit`, but what was lately fitted alike is used again."""
+    method: Method = component("method", experiment.method)
+    try:
+        settings = _text(experiment.settings)
+        return _recent_fit(model, experiment.method, settings, experiment.training, method.fit)
+    except _FitError as bug:
+        return Fitted(bug.args[0])
+
+
+@lru_cache(maxsize=RECENT)
+def _recent_fit(
+    model: Model,
+    method_name: str,
+    settings: str,
+    training: tuple[Scenario, ...],
+    _: Callable,
+) -> Fitted:
+    """Found by the method's function too, which may be written anew under the same name."""
+    return Fitted(_unless_bug(_fit(model, method_name, settings, training)))
+
+
+def _unless_bug(fitted: ReducedModel | Failure) -> ReducedModel | Failure:
+    """A fit to be kept; what is raised is not: a bug may be mended before the next try."""
+    if isinstance(fitted, Failure) and fitted.status == "error":
+        raise _FitError(fitted)
+    return fitted
 
 
 def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
@@ -178,11 +228,7 @@ def _kept_fit(
             return method.fit(model, [training_run(model, s) for s in training], given)
         return found
 
-    fitted = _fit(model, method_name, settings, training, other)
-    if isinstance(fitted, Failure) and fitted.status == "error":
-        # What is raised is not kept: a bug may be mended before the next try.
-        raise _FitError(fitted)
-    return fitted
+    return _unless_bug(_fit(model, method_name, settings, training, other))
 
 
 class _FitError(Exception):
@@ -195,14 +241,15 @@ def _text(content: Mapping[str, object]) -> str:
 
 def _tested(
     model: Model,
-    reduced: ReducedModel | Failure,
+    fitted: Fitted,
     scenario: Scenario,
-    reference: Trajectory,
+    reference: Trajectory | None,
     experiment: Experiment,
 ) -> Outcome | Failure:
     """One test scenario, simulated with the reduced model."""
-    if isinstance(reduced, Failure):
-        return reduced
+    if isinstance(fitted.reduced, Failure):
+        return fitted.reduced
+    reduced: ReducedModel = fitted.reduced
 
     def run() -> Outcome:
         start = start_of(model, scenario)
@@ -210,9 +257,13 @@ def _tested(
             trajectory = _sound(model, reduced, scenario, start)
             trajectory = warned(model, experiment.method, experiment.training, scenario, trajectory)
             return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
-        # The first run loads machine code and warms caches, the second is timed.
-        reduced.simulate(scenario.maneuver, start)
+        # The first run loads machine code and warms caches, another is timed.
+        if not fitted.warm:
+            reduced.simulate(scenario.maneuver, start)
+            fitted.warm = True
         trajectory = _remarked(model, experiment, _sound(model, reduced, scenario, start))
+        if reference is None:
+            return Outcome(trajectory, None)
         nearest = reduced.best_approximation(reference.states)
         if nearest is None:
             return Outcome(trajectory, reference)

@@ -35,6 +35,8 @@ class Outcome:
 
     Attributes
     ----------
+    reference
+        None where nothing is compared.
     floor
         RMS errors (outputs,) of the best approximation in the same subspaces, if there is one.
     estimate
@@ -42,7 +44,7 @@ class Outcome:
     """
 
     trajectory: Trajectory
-    reference: Trajectory
+    reference: Trajectory | None
     floor: np.ndarray | None = None
     estimate: ErrorEstimate | None = None
 
@@ -64,27 +66,37 @@ def metrics_dataset(
     if isinstance(outcome, Failure):
         reduced, missing = outcome, _missing(model, experiment.test[0].maneuver, outcome)
         outcome = Outcome(missing, missing)
+    run = outcome.trajectory
+    found, histories = _compared(model, outcome)
+    if model.speeds:
+        found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
+    if model.kind == "ae":
+        residuals = model.along("residual", run.coordinates, run.inputs)
+        found["largest_residual"] = float(np.abs(residuals).max())
+    dataset = trajectory_dataset(model, run, variables(found | _of_fit(reduced)) | histories)
+    if experiment.keep == "metrics":
+        dataset = dataset.drop_dims(["time", "input"])
+    dataset.attrs |= _attributes(experiment)
+    return dataset
+
+
+def _compared(model: Model, outcome: Outcome) -> tuple[dict[str, object], dict[str, tuple]]:
+    """Errors and floors, and the reference's histories; nothing where there is none."""
     run, full, floor = outcome.trajectory, outcome.reference, outcome.floor
-    floor = np.full(len(model.outputs), np.nan) if floor is None else floor
+    if full is None:
+        return {}, {}
     error = run.outputs - full.outputs
     found: dict[str, object] = {
         "rms_error": rms(error),
         "max_error": max_abs(error),
-        "floor_rms_error": floor,
+        "floor_rms_error": np.full(len(model.outputs), np.nan) if floor is None else floor,
         "signal_range": signal_range(full.outputs),
         "rms_coordinate_error": rms(run.coordinates - full.coordinates),
     }
     if model.speeds:
         found["rms_speed_error"] = rms(run.speeds - full.speeds)
-        found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
-    if model.kind == "ae":
-        residuals = model.along("residual", run.coordinates, run.inputs)
-        found["largest_residual"] = float(np.abs(residuals).max())
-    histories = variables({"reference_outputs": full.outputs}, "time")
-    dataset = trajectory_dataset(model, run, variables(found | _of_fit(reduced)) | histories)
-    if experiment.keep == "metrics":
-        dataset = dataset.drop_dims(["time", "input"])
-    return dataset.assign_attrs(_attributes(experiment))
+    # A reference may be kept for further results.
+    return found, variables({"reference_outputs": full.outputs.copy()}, "time")
 
 
 def _of_fit(reduced: ReducedModel | Failure) -> dict[str, object]:
@@ -159,6 +171,7 @@ def errors_dataset(
 
 def _errors(outcome: Outcome) -> tuple[np.ndarray, ...]:
     """RMS and largest errors (outputs,), largest magnitudes of the first seconds, least values."""
+    assert outcome.reference is not None
     outputs = outcome.trajectory.outputs
     error = outputs - outcome.reference.outputs
     times = outcome.trajectory.time

@@ -35,7 +35,7 @@ def test_costs_fall_as_their_derivatives_say(control, reduced):
 
 def test_the_car_goes_around_the_obstacle_and_comes_back(control, reduced):
     full = vm.reduce(reduced.model, "full_order")
-    runs = [control.drive(control.Controller(reduced), car, 4.5) for car in (full, reduced)]
+    runs = [control.drive(control.Controller(reduced), car, 3.6) for car in (full, reduced)]
     for run in runs:
         assert control.clearance(run["place"]) > 0.98
         assert np.abs(run["steering"]).max() < control.LIMIT

@@ -270,8 +270,8 @@ FEATURES = "reduced.fields.features.fields"
         (f"{FEATURES}.lines.tuple", [{"tuple": ["a = 1.0\n    _x", "z0"]}]),
         (f"{FEATURES}.diagonal.tuple", [9, 9]),
         (
-            "fields.error_scale",
-            {"array": "reduced.parameters", "kind": "f", "shape": [1], "turned": False},
+            "reduced.fields.error_scale",
+            {"array": "reduced.parameters", "type": "float64", "shape": [1], "turned": False},
         ),
     ],
 )
@@ -279,6 +279,26 @@ def test_parts_that_would_do_harm_are_refused(saved, place, value, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     refusal(rewritten(saved, replaced(place, value)))
     assert not Path("harm").exists()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "os:system",
+        "subprocess:run",
+        "builtins:eval",
+        "vehiclemor.files:write_text",
+        "vehiclemor.cli.app:main",
+        "vehiclemor.reduction.no_such_room:thing",
+        "vehiclemor.reduction.vehicle.features:Features.blocks",
+        "vehiclemor.reduction.vehicle.features:PLANAR",
+        # Defined elsewhere.
+        "vehiclemor.reduction.vehicle.shape:dataclass",
+    ],
+)
+def test_names_of_other_things_are_refused(name):
+    with pytest.raises(ValueError, match="there is no"):
+        parts.named(name)
 
 
 @pytest.mark.parametrize(
@@ -350,3 +370,9 @@ def test_a_shipped_model_keeps_its_bounds_on_runs_of_the_validation(name):
 def test_a_model_without_a_shipped_one_is_named():
     with pytest.raises(InputError, match="unknown model with a reduced one that ships 'tricycle'"):
         vm.rom("tricycle")
+
+
+def test_a_reduced_plug_in_is_saved(plug_in_package, tmp_path):
+    made = vm.reduce("quarter_car", "pod", training="nominal", rank=2)
+    again = vm.load(made.save(tmp_path / "model.nc"))
+    np.testing.assert_array_equal(again.simulate().outputs, made.simulate().outputs)

@@ -18,7 +18,7 @@ from pydantic import Field
 
 from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, ready
-from vehiclemor.codegen.tangent import tangent
+from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
@@ -128,21 +128,22 @@ class PathMapModel(ShortRepr):
 
         return KinematicStates(self.model, solved, self._slopes)
 
+    @cached_property
+    def _tangent(self) -> Tangent:
+        (source,) = kernel_sources(map_kernel(self.moving, self.degree, self.columns)).values()
+        return tangent(source, source.arguments[0], len(self.columns), len(self.ranges))
+
     def _slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
         """Derivatives of coordinates or outputs by the inputs."""
         if by != "inputs" or of not in ("coordinates", "outputs"):
             raise InputError("path_map: derivatives are of coordinates or outputs, by inputs")
         del state
-        cells, degree = self.cells, self.degree
+        cells = self.cells
         place = ((inputs - cells.centres) * cells.scales + 1.0) * cells.halves
         numbers = np.clip(place, 0.0, cells.tops).astype(int)
-        coefficients = cells.coefficients[
-            np.ravel_multi_index(tuple(numbers), tuple(cells.numbers))
-        ]
-        arrays = 2.0 * (place - numbers) - 1.0, coefficients.ravel()
-        (source,) = kernel_sources(map_kernel(self.moving, degree, self.columns)).values()
-        along = tangent(source, source.arguments[0], len(self.columns))
-        table = along.jacobian(arrays, len(inputs)) * (2.0 * cells.halves * cells.scales)
+        cell = np.ravel_multi_index(tuple(numbers), tuple(cells.numbers))
+        arrays = 2.0 * (place - numbers) - 1.0, cells.coefficients[cell].ravel()
+        table = self._tangent.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
         n = len(self.model.coordinates)
         return table[:n] if of == "coordinates" else table[n:]
 

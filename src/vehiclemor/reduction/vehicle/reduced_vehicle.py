@@ -9,6 +9,7 @@ import numpy as np
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
+from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
@@ -112,8 +113,8 @@ class ReducedVehicle(ShortRepr):
             self.solver,
             self.tolerance,
             self.encoded,
-            lambda run, inputs, _: self._lifted(run, inputs)[0],
-            judge=lambda run, inputs: self._lifted(run, inputs)[1],
+            lambda run, inputs, _: self._lifted(run, inputs),
+            judge=self._judged,
             slopes=self.lift.slopes,
             names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
         )
@@ -123,8 +124,14 @@ class ReducedVehicle(ShortRepr):
         """The reduced equations: a state tells nothing of what has decayed after the start."""
         return self.equations
 
-    def _lifted(self, run: Run, inputs: np.ndarray) -> tuple[np.ndarray, Trust | None]:
-        return self.lift.states(run.times, run.path, inputs, np.empty((2, 0, 2)))
+    def _lifted(self, run: Run, inputs: np.ndarray) -> np.ndarray:
+        return self.lift.states(run.times, run.path, inputs, np.empty((2, 0, 2)))[0]
+
+    def _judged(self, run: Run, inputs: np.ndarray) -> Trust | None:
+        """Of states one by one: they tell neither how long a run has lasted nor of its start."""
+        watched = self.lift.features.watched
+        used = self._lifted(run, inputs)[:, self.lift.layout.size :]
+        return trust_of(run.times, used, [name for _, name in watched]) if watched else None
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""

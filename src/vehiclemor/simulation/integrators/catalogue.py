@@ -137,9 +137,8 @@ def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
 
 def transposed_inverses(jacobian: np.ndarray) -> np.ndarray:
     """Transposed (step sizes, 1, n, n) of (I - gamma h J)^-1."""
-    identity = np.eye(len(jacobian))
-    found = [np.linalg.inv(identity - GAMMA * h * jacobian) for h in STEP_GRID]
-    return np.array([[inverse.T] for inverse in found])
+    matrices = np.eye(len(jacobian)) - GAMMA * STEP_GRID[:, None, None] * jacobian
+    return np.ascontiguousarray(np.linalg.inv(matrices).swapaxes(1, 2)[:, None])
 
 
 def matrix_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:

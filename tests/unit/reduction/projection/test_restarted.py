@@ -75,3 +75,15 @@ def test_steps_begin_at_the_state_that_they_are_given(car, maneuver):
         state = rom.step(state, u, 0.02, run.time[sample], ends)
         # Straight lines between the samples stand for the steering.
         np.testing.assert_allclose(state, run.states[sample + 1], rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("formulation", ["coordinates", "state"])
+def test_its_jacobian_is_that_of_its_rates(car, maneuver, formulation):
+    rom = vm.reduce(car, "pod", restart="full_model", formulation=formulation)
+    x, u, t = car.simulate(maneuver).states[90], maneuver.at(np.array([1.8]))[0], 1.8
+    found, columns = rom.jacobian(x, u, time=t), []
+    for step in 1e-6 * np.maximum(np.abs(x), 1.0) * np.eye(len(x)):
+        sides = rom.rhs(x + step, u, t) - rom.rhs(x - step, u, t)
+        columns.append(sides / (2.0 * step.sum()))
+    scale = np.abs(found).max()
+    np.testing.assert_allclose(np.transpose(columns) / scale, found / scale, atol=1e-7)

@@ -1,0 +1,121 @@
+"""What is handed in for a batch of runs, checked where it comes in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.arguments import quoted, real_array
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.online.batch_result import Selection
+from vehiclemor.online.batch_signals import Signals
+from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.registry import unknown
+from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.checks import checked_path
+from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.trajectory import Start
+
+
+def model_behind(model: Any) -> ReducedOrderModel:
+    """The model behind the names of a reduced one."""
+    if isinstance(model, ReducedOrderModel):
+        return model
+    full = build(model) if isinstance(model, str) else model
+    if not isinstance(full, Model):
+        raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
+    solver, tolerance = (
+        ("newton", NEWTON_TOLERANCE) if full.kind == "ae" else ("dopri5", REFERENCE_TOLERANCE)
+    )
+    settings = {"solver": solver, "tolerance": tolerance}
+    return ReducedOrderModel(full, "full_order", settings, (), FullOrderModel(full, **settings))
+
+
+def count_of(signals: Any, model: Model) -> int:
+    """Number of runs; `InputError` if something else than inputs of the model is given."""
+    if isinstance(signals, Maneuver) or not isinstance(signals, Sequence) or not len(signals):
+        raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
+    for run, signal in enumerate([signals.first] if isinstance(signals, Signals) else signals):
+        if not isinstance(signal, Maneuver):
+            raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
+        if signal.for_inputs(model.inputs).inputs != model.inputs:
+            raise InputError(
+                f"signals[{run}]: {signal} gives inputs {', '.join(signal.inputs)}, "
+                f"{model.name} needs {', '.join(model.inputs)}"
+            )
+    return len(signals)
+
+
+def kept_times(chosen: Selection, signals: Any) -> np.ndarray:
+    """Times in s of the result; `InputError` if runs don't share or don't reach them."""
+    first = signals.first if isinstance(signals, Signals) else signals[0]
+    others = () if isinstance(signals, Signals) else signals
+    if chosen.times is None:
+        for run, signal in enumerate(others):
+            if (signal.duration, signal.samples) != (first.duration, first.samples):
+                raise InputError(
+                    f"signals[{run}] has other output times than the first: choose times="
+                )
+        return first.times
+    shortest = min(signal.duration for signal in (first, *others))
+    if chosen.times[0] < 0.0 or chosen.times[-1] > shortest * (1.0 + 1e-9):
+        raise InputError(f"times must lie within all runs, 0 to {shortest:g} s")
+    return chosen.times
+
+
+def starts_of(starts: Any, runs: int, model: Model) -> Sequence[Start]:
+    """The start of each run, checked."""
+    if starts is None or isinstance(starts, str):
+        model.start(starts)
+        return [starts or model.starts[0]] * runs
+    if not isinstance(starts, Sequence | np.ndarray):
+        raise InputError(f"starts is {quoted(starts)}, neither names nor states")
+    if not len(starts) or (np.ndim(starts[0]) == 0 and not isinstance(starts[0], str)):
+        return [model.start(starts)] * runs  # type: ignore[arg-type]
+    if len(starts) != runs:
+        raise InputError(f"there are {len(starts)} starts for {runs} runs")
+    if isinstance(starts, np.ndarray):
+        return checked_path(starts, len(model.definition.states), "starts")  # type: ignore[return-value]
+    return [start if isinstance(start, str) else model.start(start) for start in starts]
+
+
+def parameter_sets(
+    parameters: Any, runs: int, reduced: ReducedOrderModel
+) -> Sequence[tuple] | None:
+    """Parameters (name, value) of each run, none if all have the model's own."""
+    if parameters is None:
+        return None
+    if reduced.method != "full_order":
+        raise InputError(
+            f"parameters: {reduced.method} was fitted to one parameter set; "
+            f"other ones are for the full model"
+        )
+    if isinstance(parameters, Mapping):
+        declared = reduced.model.definition.parameters
+        columns = {}
+        for name, value in parameters.items():
+            if name not in declared:
+                raise unknown("parameter", name, declared)
+            try:
+                array = real_array(value)
+            except (TypeError, ValueError):
+                raise InputError(f"parameter {name}: {quoted(value)} is not a number") from None
+            own = () if declared[name].size == 1 else (declared[name].size,)
+            if array.shape not in (own, (runs, *own)):
+                raise InputError(
+                    f"parameter {name} has shape {array.shape}, not {own} or {(runs, *own)}"
+                )
+            columns[name] = np.broadcast_to(array, (runs, *own)).tolist()
+        names = [*columns]
+        return [
+            tuple(zip(names, values, strict=True)) for values in zip(*columns.values(), strict=True)
+        ] or None
+    if not isinstance(parameters, Sequence) or len(parameters) != runs:
+        raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
+    return [tuple(own.items()) for own in parameters]

@@ -1,0 +1,268 @@
+"""Batches of runs: each is the run alone, in memory or in a file, in however many threads."""
+
+import weakref
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import vehiclemor as vm
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.online import batches
+from vehiclemor.registry import component
+
+CAR, MECHANISM = "independent_suspension_vehicle", "double_wishbone"
+TIMES = np.linspace(0.0, 4.0, 41)
+KEPT = {"outputs": ["lateral_position", "Fz_FL", "u"], "times": [0.5, 1.0, 3.98]}
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    """The reduced car that ships: a slow manifold with the full order behind it."""
+    return vm.rom(CAR)
+
+
+@pytest.fixture(scope="module")
+def full(reduced):
+    """The full car with its fastest integrator."""
+    return vm.reduce(reduced.model, "full_order", solver="ros34pw2", tolerance=2e-3)
+
+
+def steering(runs: int, size: float = 0.02) -> np.ndarray:
+    """Steering angles (runs, samples) in rad that set in at different times."""
+    rng = np.random.default_rng(1)
+    past = np.maximum(TIMES - rng.uniform(0.2, 1.5, (runs, 1)), 0.0)
+    rate, height = rng.uniform(1.0, 4.0, (runs, 1)), rng.uniform(-1.0, 1.0, (runs, 1))
+    return size * height * np.sin(rate * past) * np.tanh(past)
+
+
+def check_alone(model, signals, found: xr.Dataset, starts=None) -> None:
+    """Each run of a batch is the run alone, to the bit."""
+    assert found.run.values.tolist() == [*range(len(signals))]
+    for run, signal in enumerate(signals):
+        start = starts if starts is None or isinstance(starts, str) else starts[run]
+        alone = model.simulate(signal, start)
+        table = np.hstack([alone.outputs, alone.coordinates, alone.speeds])
+        names = [*model.model.outputs, *model.model.coordinates, *model.model.speeds]
+        columns = [names.index(name) for name in found.output.values]
+        rows = np.searchsorted(alone.time, found.time.values - 1e-9)
+        expected = table[np.ix_(rows, columns)]
+        np.testing.assert_array_equal(found["values"].values[run], expected)
+        own = found.isel(run=run)
+        for name in ("status", "message", "remark"):
+            assert own[name].item() == getattr(alone, name)
+        assert {name: own[name].item() for name in alone.counts} == alone.counts
+        if alone.trust:
+            assert own.indicator.item() == alone.trust.indicator
+            assert own.until.item() == alone.trust.until
+
+
+@pytest.mark.parametrize("kept", [{}, KEPT, {"outputs": "yaw"}], ids=["all", "few", "state"])
+@pytest.mark.parametrize("start", [None, "dropped"])
+@pytest.mark.parametrize("which", ["reduced", "full"])
+def test_runs_are_those_alone(which, start, kept, request):
+    model = request.getfixturevalue(which)
+    signals = vm.Signals(TIMES, steering(6), "cubic")
+    found = vm.simulate_many(model, signals, start, **kept)
+    assert (found.status == "ok").all()
+    check_alone(model, signals, found, start)
+
+
+def test_every_run_has_a_start_of_its_own(reduced, full):
+    own = reduced.model.start("equilibrium")
+    moved = np.array([own, 1.02 * own, own, 0.97 * own])
+    signals = vm.Signals(TIMES, steering(4), "zero")
+    for model in (reduced, full):
+        for starts in (moved, [own, "dropped", "equilibrium", moved[3]]):
+            check_alone(model, signals, vm.simulate_many(model, signals, starts, **KEPT), starts)
+
+
+@settings(max_examples=12)
+@given(chunk=st.integers(1, 9), jobs=st.integers(1, 4), runs=st.integers(1, 20))
+def test_neither_threads_nor_chunks_change_a_bit(reduced, chunk, jobs, runs):
+    signals = vm.Signals(TIMES, steering(20, 0.06)[:runs])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batches, "CHUNK", chunk)
+        found = vm.simulate_many(reduced, signals, jobs=jobs, **KEPT)
+    whole = vm.simulate_many(reduced, vm.Signals(TIMES, steering(20, 0.06)), jobs=1, **KEPT)
+    xr.testing.assert_identical(
+        found.drop_vars("seconds").drop_attrs(),
+        whole.isel(run=slice(runs)).drop_vars("seconds").drop_attrs(),
+    )
+
+
+def test_what_fails_is_a_result_beside_the_others(reduced, full):
+    u, states = steering(5), reduced.model.definition.states
+    # Beyond the steering angles for which the model holds, and a car that is thrown on its side.
+    u[3] = 1.2 * np.tanh(TIMES)
+    signals = vm.Signals(TIMES, u, "cubic")
+    thrown = reduced.model.start("equilibrium")
+    thrown[states.index("phi")], thrown[states.index("p")] = 0.9, 8.0
+    starts = ["equilibrium", thrown, *["equilibrium"] * 3]
+    for model in (reduced, full):
+        found = vm.simulate_many(model, signals, starts, **KEPT)
+        assert found.status.values.tolist() == ["ok", "diverged", "ok", "rejected", "ok"]
+        assert "delta is" in found.message.item(3)
+        assert "roll is" in found.message.item(1)
+        assert np.isnan(found["values"][[1, 3]]).all()
+        others = [0, 2, 4]
+        alone = vm.simulate_many(model, vm.Signals(TIMES, u[others], "cubic"), **KEPT)
+        np.testing.assert_array_equal(found["values"][others], alone["values"])
+        check_alone(model, signals[1:2], found.isel(run=[1]).assign_coords(run=[0]), [thrown])
+
+
+def test_maneuvers_of_different_lengths_share_chosen_times(full):
+    maneuvers = [component("maneuver", name) for name in ("step_steer", "lane_change", "multisine")]
+    with pytest.raises(InputError, match=r"signals\[1\] has other output times"):
+        vm.simulate_many(full, maneuvers)
+    found = vm.simulate_many(full, maneuvers, times=[0.0, 1.0, 2.5], outputs=["yaw", "Fz_RR"])
+    check_alone(full, maneuvers, found)
+
+
+def test_times_need_not_be_output_times(full):
+    signals, times = vm.Signals(TIMES, steering(3), "cubic"), [0.123, 1.0, 2.7183]
+    found = vm.simulate_many(full, signals, times=times, outputs=["roll", "Fz_FL"])
+    for run, signal in enumerate(signals):
+        # With the end of the run, where its last step ends.
+        own = np.array([*times, TIMES[-1]])
+        alone = full.model.simulate(signal, None, own, "ros34pw2", 2e-3)
+        columns = [full.model.outputs.index(name) for name in ("roll", "Fz_FL")]
+        np.testing.assert_allclose(found["values"][run], alone.outputs[:-1, columns], rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["full_order", "path_map"])
+def test_mechanisms_in_batches(method):
+    model = vm.rom(MECHANISM) if method == "path_map" else vm.reduce(MECHANISM, method)
+    waves = 0.04 * np.sin(np.outer([1.0, 2.0, 2.5], TIMES))
+    waves[2] *= 6.0
+    signals = vm.Signals(TIMES, np.stack([waves, 0.0 * waves], axis=2), "cubic")
+    found = vm.simulate_many(model, signals)
+    assert found.status.values.tolist()[:2] == ["ok", "ok"]
+    assert found.status.item(2) in ("untrusted", "unreachable")
+    check_alone(model, signals[:2], found.isel(run=slice(2)))
+
+
+def test_parameters_by_run(full):
+    masses, signals = [1400.0, 1500.0, 1500.0, -1.0], vm.Signals(TIMES, steering(4), "cubic")
+    table = vm.simulate_many(full, signals, parameters={"sprung_mass": masses}, **KEPT)
+    listed = [{"sprung_mass": mass} for mass in masses]
+    xr.testing.assert_equal(
+        table.drop_vars("seconds"),
+        vm.simulate_many(full, signals, parameters=listed, **KEPT).drop_vars("seconds"),
+    )
+    assert table.status.values.tolist() == ["ok", "ok", "ok", "rejected"]
+    heavy = vm.model(CAR, parameters={"sprung_mass": 1500.0})
+    own = vm.reduce(heavy, "full_order", solver="ros34pw2", tolerance=2e-3)
+    alone = vm.simulate_many(own, signals[1:3], **KEPT)
+    np.testing.assert_array_equal(table["values"][1:3], alone["values"])
+    assert abs(table["values"] - table["values"][0])[1].max() > 1e-3
+
+
+@pytest.mark.parametrize("ending", [".nc", ".zarr"])
+def test_a_file_holds_what_memory_would(ending, reduced, tmp_path, monkeypatch):
+    if ending == ".zarr":
+        pytest.importorskip("zarr")
+    u = steering(11)
+    u[4] = 1.2 * np.tanh(TIMES)
+    signals = vm.Signals(TIMES, u, "cubic")
+    whole = vm.simulate_many(reduced, signals, **KEPT)
+    monkeypatch.setattr(batches, "CHUNK", 3)
+    path = tmp_path / f"runs{ending}"
+    with vm.simulate_many(reduced, signals, path=path, **KEPT) as stored:
+        xr.testing.assert_equal(stored.load().drop_vars("seconds"), whole.drop_vars("seconds"))
+        assert stored.attrs["model"] == CAR
+    assert [found.name for found in tmp_path.iterdir()] == [path.name]
+
+
+def test_few_chunks_are_alive_at_a_time(full, tmp_path, monkeypatch):
+    alive, most = [], []
+    work = batches._Work.__call__
+
+    def watched(self, part):
+        found = work(self, part)
+        alive.append(weakref.ref(found.values))
+        return found
+
+    def counted(model, chosen, times, found, first):
+        most.append(sum(reference() is not None for reference in alive))
+        return dataset(model, chosen, times, found, first)
+
+    dataset = batches.dataset
+    monkeypatch.setattr(batches._Work, "__call__", watched)
+    monkeypatch.setattr(batches, "dataset", counted)
+    monkeypatch.setattr(batches, "CHUNK", 2)
+    signals = vm.Signals(TIMES, steering(40), "cubic")
+    vm.simulate_many(full, signals, jobs=2, path=tmp_path / "runs.nc", **KEPT).close()
+    assert len(most) == 20
+    # Those that wait, one that is written, and one before it.
+    assert max(most) <= 2 * 2 + 3
+
+
+def test_nothing_is_left_of_a_batch_that_breaks(full, tmp_path, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(batches, "CHUNK", 2)
+    signals = vm.Signals(TIMES, steering(8))
+    monkeypatch.setattr(batches._Work, "__call__", broken)
+    with pytest.raises(ZeroDivisionError):
+        vm.simulate_many(full, signals, path=tmp_path / "runs.nc", **KEPT)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_signals_are_a_sequence_of_signals():
+    signals = vm.Signals(TIMES, steering(5), "cubic", output_step=0.1)
+    assert len(signals) == 5
+    assert len(signals[1:4]) == 3
+    np.testing.assert_array_equal(signals[1:4][1].at(TIMES), signals[2].at(TIMES))
+    assert signals[0].samples == 41
+    assert repr(signals) == "Signals(runs=5, duration=4.0, hold='cubic', inputs=())"
+
+
+STATE = [0.0] * 27
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"signals": []}, "signals is [], not a list with a signal for each run"),
+        ({"signals": [1.0]}, "signals[0] is 1.0, not a signal or maneuver"),
+        ({"signals": [component("maneuver", "sine_travel")]}, "gives inputs z, s0"),
+        ({"starts": ["equilibrium"]}, "there are 1 starts for 2 runs"),
+        ({"starts": "above"}, "unknown start 'above'"),
+        ({"starts": STATE}, "start has shape (27,)"),
+        ({"outputs": ["yaww"]}, "unknown output 'yaww'; did you mean yaw"),
+        ({"times": [1.0, 5.0]}, "times must lie within all runs, 0 to 4 s"),
+        ({"times": [1.0, 0.5]}, "times must increase"),
+        ({"jobs": 0}, "jobs is 0"),
+        ({"parameters": {"mass": 1.0}}, "unknown parameter 'mass'"),
+        ({"parameters": {"sprung_mass": [1.0] * 3}}, "has shape (3,), not () or (2,)"),
+        ({"parameters": [{}]}, "not a mapping for each run"),
+        ({"path": "runs.txt"}, "ends neither in .nc nor in .zarr"),
+        ({"model": 3}, "model is 3"),
+    ],
+)
+def test_wrong_input_is_one_line(changes, line, full):
+    given = {"model": full, "signals": vm.Signals(TIMES, steering(2))} | changes
+    with pytest.raises(InputError) as error:
+        vm.simulate_many(**given)
+    assert line in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
+    signals = vm.Signals(TIMES, steering(2))
+    with pytest.raises(InputError, match="guarded was fitted to one parameter set"):
+        vm.simulate_many(reduced, signals, parameters={"sprung_mass": 1400.0})
+    (tmp_path / "runs.nc").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        vm.simulate_many(full, signals, path=tmp_path / "runs.nc")
+    monkeypatch.setattr(batches, "LARGEST", 1000)
+    with pytest.raises(InputError, match="GB of memory: choose outputs= and times="):
+        vm.simulate_many(full, signals)
+    with pytest.raises(InputError, match=r"u \(3,\)"):
+        vm.Signals(TIMES, [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="run 1 holds what is not finite"):
+        vm.Signals(TIMES, [0.0 * TIMES, np.inf * np.ones(41)])
