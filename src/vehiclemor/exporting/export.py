@@ -23,7 +23,7 @@ TARGETS: tuple[str, ...] = Target.__args__
 # How the name of what is written ends; C is a folder.
 ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi", "jax": "_jax.py"}
 ENDINGS["sympy"] = "_sympy.py"
-# Step in s of the integrator in C: stable for modes of up to 2780 1/s; the vehicles' are at 530.
+# Step in s of the integrator in C: stable for modes of up to 2780 1/s; see the handbook.
 STEP = 1e-3
 # A folder with this file is one of ours.
 OURS = "vehiclemor_model.h"

@@ -1,6 +1,7 @@
 """Exported C, compiled as a user would, and what it must give."""
 
 import subprocess
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -53,6 +54,7 @@ def runge_kutta(rates, state, inputs, step, held=1) -> np.ndarray:
     return np.array(states)
 
 
+@cache
 def in_use(name: str, kind: str) -> ReducedOrderModel:
     """The full model behind the names of a reduced one, or the reduced one that ships."""
     return vm.rom(name) if kind == "reduced" else vm.reduce(name, "full_order")
