@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
+    from vehiclemor.study.scenario import Scenario
 
 RESULTS = Path("results")
 
@@ -169,30 +170,20 @@ def simulate(
         diverges is a result: its status says so.
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
-    from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.build import kept_build
-    from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
     from vehiclemor.study.method_settings import complete_settings
-    from vehiclemor.study.scenario import Scenario, check, training_scenarios
+    from vehiclemor.study.scenario import training_scenarios
 
     ready = model if isinstance(model, Model) else kept_build(model)
-    if maneuver is None:
-        maneuver = ready.definition.maneuver
-    base = maneuver if isinstance(maneuver, Maneuver) else component("maneuver", maneuver)
-    base = checked_maneuver(base, ready.definition)
     if rtol is not None:
         if "tolerance" in settings:
             raise InputError("rtol and tolerance are the same setting: give one of them")
         settings["tolerance"] = number("rtol", rtol)
     chosen = complete_settings(ready, method, settings, preset)
-    if start is None:
-        start = ready.starts[0]
-    own = start if isinstance(start, str) else tuple(ready.start(start).tolist())
-    test = Scenario(base.perturbed(frequency, amplitude), own)
-    check(ready, test)
+    test = _scenario(ready, maneuver, start, (frequency, amplitude))
     trained = training_scenarios(test, training, _pairs(training_set))
     experiment = make_experiment(ready, method, chosen, trained, (test,))
     dataset = evaluate(experiment, ready, errors=errors)
@@ -201,6 +192,29 @@ def simulate(
         error = UnreachableError if status == "unreachable" else InputError
         raise error(str(dataset["message"].item()))
     return dataset
+
+
+def _scenario(
+    model: Model,
+    maneuver: str | Maneuver | None,
+    start: Start | None,
+    factors: tuple[float, float],
+) -> Scenario:
+    """What is simulated, checked."""
+    from vehiclemor.maneuver import Maneuver
+    from vehiclemor.simulation.maneuver_checks import checked_maneuver
+    from vehiclemor.study.scenario import Scenario, check
+
+    if maneuver is None:
+        maneuver = model.definition.maneuver
+    base = maneuver if isinstance(maneuver, Maneuver) else component("maneuver", maneuver)
+    base = checked_maneuver(base, model.definition)
+    if start is None:
+        start = model.starts[0]
+    own = start if isinstance(start, str) else tuple(model.start(start).tolist())
+    scenario = Scenario(base.perturbed(*factors), own)
+    check(model, scenario)
+    return scenario
 
 
 def _pairs(training_set: Any) -> list[tuple[float, float]]:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, number, quoted, real_array, within
-from vehiclemor.errors import FileError, InputError, blamed, one_line
+from vehiclemor.errors import InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.piecewise import HOLDS, Pieces, through
 from vehiclemor.registry import unknown
+from vehiclemor.signal_columns import array_columns, csv_columns
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -253,18 +254,8 @@ class Signal(Maneuver):
         FileError
             If there is no such file, or it is none.
         """
-        import pandas as pd
-
         file = file_path("path", path)
-        try:
-            table = pd.read_csv(file, skipinitialspace=True)
-        except FileNotFoundError:
-            raise FileError(f"{file}: no such file") from None
-        except OSError as error:
-            raise FileError(f"{file}: can't be read ({error.strerror})") from None
-        except ValueError as error:
-            raise FileError(f"{file}: no CSV file: {one_line(error)}") from None
-        columns = {str(name): table[name].to_numpy() for name in table.columns}
+        columns = csv_columns(file)
         return cls._of_columns(str(file), columns, time, inputs, hold, further)
 
     @classmethod
@@ -291,18 +282,7 @@ class Signal(Maneuver):
         **further
             As of `from_samples`, which tells the rest.
         """
-        import xarray as xr
-
-        if not isinstance(data, xr.DataArray | xr.Dataset):
-            raise InputError(f"data is {quoted(data)}, neither a DataArray nor a Dataset of xarray")
-        if time not in data.coords or data[time].dims != (time,):
-            raise InputError(f"the data have no times: a coordinate {time!r} is needed")
-        if isinstance(data, xr.DataArray):
-            others = [name for name in data.dims if name != time]
-            data = data.to_dataset(dim=others[0]) if others else data.to_dataset(name=data.name)
-        own = {name: array for name, array in data.data_vars.items() if array.dims == (time,)}
-        columns = {str(name): array.to_numpy() for name, array in own.items()}
-        columns[time] = data[time].to_numpy()
+        columns = array_columns(data, time)
         return cls._of_columns("the data", columns, time, inputs, hold, further)
 
     @classmethod

@@ -48,7 +48,8 @@ def test_a_run_read_at_few_points_is_the_run_at_its_samples(name, maneuver, solv
     few = model.simulate(given, start, **arguments)
     # Times that are given are recorded one by one.
     each = model.simulate(given, start, given.times, **arguments)
-    np.testing.assert_array_equal(few.inputs, given.at(given.times))
+    # Those of another amplitude are scaled.
+    np.testing.assert_allclose(few.inputs, given.at(given.times), rtol=1e-15)
     assert few.counts == each.counts
     assert few.remark == each.remark
     scale = 1.0 + np.abs(each.states).max(axis=0)
