@@ -102,7 +102,7 @@ class Controller:
         found = least_squares(
             lambda steering: both(steering)[0],
             np.clip(guess, -0.99 * LIMIT, 0.99 * LIMIT),
-            lambda steering: both(steering)[1],
+            lambda steering: both(steering)[1],  # type: ignore[arg-type]
             bounds=(-LIMIT, LIMIT),
             ftol=1e-4,
             xtol=1e-4,

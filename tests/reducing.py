@@ -10,7 +10,10 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.steering_maneuvers import lane_change, rack_lane_change
 
+# Vehicle -> its lane change.
+CARS = {"independent_suspension_vehicle": lane_change, "high_fidelity_vehicle": rack_lane_change}
 FIGURES = ("spindle_y", "second_euler_angle")
 
 

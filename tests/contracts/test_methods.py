@@ -346,7 +346,11 @@ def test_jacobians_are_the_slopes_of_rates_and_outputs(pair: Pair, by: str) -> N
         far, near = (moved[0] - moved[1]) / 2e-4, (moved[2] - moved[3]) / 1e-4
         difference = (4.0 * near - far) / 3.0
         largest = np.abs(found) @ np.abs(along)
-        assert (np.abs(found @ along - difference) <= 1e-6 * largest + 1e-6).all(), of
+        right = np.abs(found @ along - difference) <= 1e-6 * largest + 1e-6
+        if of == "outputs":
+            # Norms of what is zero but for rounding.
+            right |= [output.endswith("_drift") for output in pair.model.outputs]
+        assert right.all(), of
 
 
 def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> None:

@@ -134,6 +134,7 @@ PAGES_WITH_CODE = (
     "export",
     "keep-a-model",
     "my-loop",
+    "my-signal",
     "predictive-control",
     "ten-thousand-maneuvers",
 )

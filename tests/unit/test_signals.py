@@ -2,12 +2,17 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
-from vehiclemor.errors import InputError
+from vehiclemor.errors import InputError, VehiclemorError
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.registry import component
+from vehiclemor.simulation import build, input_polynomials
+from vehiclemor.simulation.dynamic import DynamicModel
 
 GAPS = st.lists(st.floats(1e-3, 0.5), min_size=3, max_size=30)
 
@@ -59,11 +64,229 @@ def test_unknown_hold_is_refused():
         vm.Signal.from_samples([0.0, 1.0], [0.0, 1.0], "cubics")
 
 
-def test_a_signal_is_run_wherever_a_maneuver_is():
-    car = vm.model("independent_suspension_vehicle")
+def straight(t: np.ndarray) -> np.ndarray:
+    """Steering angle (rad) on straight lines: held, turned within 0.4 s, held, turned back."""
+    return np.interp(t, [0.0, 1.0, 1.4, 3.0, 3.5, 6.0], [0.0, 0.0, 0.012, 0.012, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def car():
+    return vm.model("independent_suspension_vehicle")
+
+
+def test_break_points_are_corners_and_ends_of_quiet():
+    t = np.linspace(0.0, 6.0, 601)
+    assert vm.Signal.from_samples(t, np.sin(t)).break_points == ()
+    corners = vm.Signal.from_samples(t, straight(t)).break_points
+    np.testing.assert_allclose(corners, [1.0, 1.4, 3.0, 3.5], atol=1e-12)
+    triangle = np.abs((t + 0.5) % 2.0 - 1.0)
+    turns = vm.Signal.from_samples(t, triangle, "cubic").break_points
+    np.testing.assert_allclose(turns, np.arange(0.5, 6.0, 1.0), atol=1e-12)
+    # A pulse without a kink, but after a time in which a step may grow to any length.
+    pulse = np.where(t > 4.0, np.clip(t - 4.0, 0.0, 1.0) ** 3, 0.0)
+    assert vm.Signal.from_samples(t, pulse).break_points[0] == pytest.approx(4.0)
+    noise = np.random.default_rng(0).normal(size=601)
+    assert len(vm.Signal.from_samples(t, np.sin(t) + 0.02 * noise).break_points) > 550
+    assert vm.Signal.from_samples([0.0, 1.0, 3.0], [0.0, 2.0, 2.0], "zero").break_points == (1.0,)
+
+
+def test_straight_lines_are_run_as_a_maneuver_of_the_same_lines(car):
+    def lines(times, frequency, amplitude):
+        return amplitude * straight(frequency * times)[:, None]
+
+    corners = (1.0, 1.4, 3.0, 3.5)
+    maneuver = Maneuver("lines", "", lines, ("delta",), 6.0, 301, lambda _: corners)
+    wanted = car.simulate(maneuver, "equilibrium", solver="ros34pw2", tolerance=1e-4)
+    fine = np.linspace(0.0, 6.0, 601)
+    uneven = np.unique(np.concatenate([corners, [0.0, 0.31, 0.3100001, 2.2, 6.0]]))
+    for t in (fine, uneven):
+        signal = vm.Signal.from_samples(t, straight(t))
+        found = car.simulate(signal, "equilibrium", solver="ros34pw2", tolerance=1e-4)
+        assert found.counts == wanted.counts
+        # The maneuver's lines are found to 1e-11; step sizes follow what is left.
+        np.testing.assert_allclose(found.states, wanted.states, rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(found.inputs, wanted.inputs, atol=1e-15)
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
+def test_what_is_noisy_is_run_as_accurately_as_what_is_smooth(car, hold):
+    t = np.linspace(0.0, 6.0, 301)
+    u = 0.01 * np.sin(t) + 2e-4 * np.random.default_rng(1).normal(size=len(t))
+    signal = vm.Signal.from_samples(t, u, hold)
+    exact = car.simulate(signal, "equilibrium", tolerance=1e-9)
+    found = car.simulate(signal, "equilibrium", solver="ros34pw2", tolerance=2e-3)
+    place = car.outputs.index("lateral_position")
+    assert np.abs(found.outputs - exact.outputs)[:, place].max() < 0.01
+
+
+def test_the_run_begins_with_the_first_sample(car):
+    t = np.linspace(0.0, 4.0, 129)
+    u = 0.01 * np.sin(t) ** 3
+    runs = [car.simulate(vm.Signal.from_samples(times, u), "dropped") for times in (t, t + 1024.0)]
+    np.testing.assert_array_equal(runs[0].states, runs[1].states)
+    assert runs[1].time[0] == 0.0
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
+def test_factors_scale_time_and_values(hold):
+    t, u = samples([0.1] * 20 + [0.3] * 7)
+    signal = vm.Signal.from_samples(t, u, hold, inputs=["delta"])
+    scaled = signal.perturbed(2.0, -3.0)
+    wanted = vm.Signal.from_samples(t / 2.0, -3.0 * u, hold)
+    assert scaled.duration == pytest.approx(signal.duration / 2.0)
+    places = np.linspace(0.0, scaled.duration, 333)
+    np.testing.assert_allclose(scaled.at(places), wanted.at(places), atol=1e-12)
+    # They are set, and don't pile up.
+    assert scaled.perturbed() == signal
+    assert scaled.perturbed(2.0, -3.0) is scaled
+    with pytest.raises(InputError, match="frequency factor: 0 is not positive"):
+        signal.perturbed(0.0)
+
+
+def test_columns_are_named_and_what_is_not_given_is_zero_or_a_derivative():
+    t = np.linspace(0.0, 3.0, 61)
+    rack = vm.Signal.from_samples(t, np.sin(t), "cubic", inputs=["s"])
+    complete = rack.for_inputs(("s", "s_dot", "s_ddot"))
+    spline, places = CubicSpline(t, np.sin(t)), np.linspace(0.0, 3.0, 101)
+    wanted = np.column_stack([spline(places, order) for order in range(3)])
+    np.testing.assert_allclose(complete.at(places), wanted, atol=1e-11)
+    # Twice as fast: rates are twice as large.
+    faster = complete.perturbed(2.0).at(places / 2.0)
+    np.testing.assert_allclose(faster, wanted * [1.0, 2.0, 4.0], atol=1e-10)
+    height = vm.Signal.from_samples(t, np.sin(t), inputs=["z"]).for_inputs(("s0", "z"))
+    np.testing.assert_allclose(height.at(t)[:, 0], 0.0)
+    np.testing.assert_allclose(height.at(t)[:, 1], np.sin(t), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"inputs": ["s"]}, "derivatives of s follow from a cubic hold alone"),
+        ({"inputs": ["angle"]}, "gives input 'angle', the model needs s, s_dot, s_ddot"),
+        ({}, "1 columns without names, the model needs s, s_dot, s_ddot"),
+    ],
+)
+def test_signals_of_other_inputs_are_refused(given, told):
+    signal = vm.Signal.from_samples([0.0, 1.0], [0.0, 1.0], **given)
+    with pytest.raises(InputError, match=told):
+        signal.for_inputs(("s", "s_dot", "s_ddot"))
+
+
+def test_inputs_beyond_the_bounds_of_a_model_are_refused(car):
+    with pytest.raises(InputError, match=r"input delta is 1\.08 rad at t = 0\.54 s"):
+        car.simulate(vm.Signal.from_samples([0.0, 1.0], [0.0, 2.0]))
+
+
+def test_a_table_gives_its_signal_back(tmp_path, car):
+    t = np.linspace(0.0, 2.0, 101)
+    u = np.column_stack([0.01 * np.sin(t), np.cos(t)])
+    wanted = vm.Signal.from_samples(t, u[:, 0], inputs=["delta"])
+    table = xr.Dataset({"delta": ("time", u[:, 0]), "other": ("time", u[:, 1])}, coords={"time": t})
+    table.to_dataframe().to_csv(tmp_path / "log.csv")
+    array = xr.DataArray(u, {"time": t, "input": ["delta", "other"]}, ("time", "input"))
+    renamed = {"delta": "steering angle"}
+    found = [
+        vm.Signal.from_xarray(table, inputs=["delta"]),
+        vm.Signal.from_xarray(table["delta"]),
+        vm.Signal.from_xarray(array, inputs=["delta"]),
+        vm.Signal.from_xarray(table.rename(renamed), inputs=renamed),
+        vm.Signal.from_csv(tmp_path / "log.csv", inputs=["delta"]),
+        vm.Signal.from_function(lambda t: 0.01 * np.sin(t), 2.0, "linear", step=0.02),
+    ]
+    for signal in found:
+        np.testing.assert_allclose(signal.pieces.coefficients, wanted.pieces.coefficients, 1e-12)
+        np.testing.assert_allclose(car.simulate(signal).inputs, car.simulate(wanted).inputs)
+
+
+@pytest.mark.parametrize(
+    ("content", "given", "told"),
+    [
+        (None, {}, "no such file"),
+        ("", {}, "no CSV file"),
+        ("t,delta\n0,1\n1,2\n", {}, "no column 'time' among t, delta"),
+        ("time,delta\n0,1\n1,2\n", {"inputs": ["s"]}, "no column 's' among time, delta"),
+        ("time,delta\n0,1\n1,two\n", {}, "is not a number or a list of numbers"),
+        ("time,delta\n0,1\n1,\n", {}, r"u\[1\] is not finite"),
+    ],
+)
+def test_wrong_csv_files_are_refused_in_one_line(tmp_path, content, given, told):
+    path = tmp_path / "log.csv"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(VehiclemorError, match=told) as raised:
+        vm.Signal.from_csv(path, **given)
+    assert "\n" not in str(raised.value)
+
+
+def test_data_without_times_are_refused():
+    with pytest.raises(InputError, match="a coordinate 'time' is needed"):
+        vm.Signal.from_xarray(xr.DataArray([1.0, 2.0], dims="time"))
+    with pytest.raises(InputError, match="neither a DataArray nor a Dataset"):
+        vm.Signal.from_xarray([1.0, 2.0])
+
+
+def test_a_fresh_signal_is_neither_searched_nor_planned(car, monkeypatch):
+    t = np.linspace(0.0, 5.0, 251)
+
+    def run(size: float):
+        signal = vm.Signal.from_samples(t, size * np.sin(t))
+        return car.simulate(signal, "equilibrium", solver="ros34pw2", tolerance=2e-3)
+
+    first = run(0.01)
+    plans = len(car.system._plans)
+    for module, name in ((input_polynomials, "_segment"), (type(car.system), "_plan")):
+        monkeypatch.setattr(module, name, None)
+    second, again = run(-0.01), run(0.01)
+    assert len(car.system._plans) == plans
+    np.testing.assert_array_equal(first.states, again.states)
+    # The car is its own mirror image, to rounding.
+    yaw = car.outputs.index("yaw")
+    np.testing.assert_allclose(second.outputs[:, yaw], -first.outputs[:, yaw], atol=1e-9)
+
+
+def test_a_mechanism_is_moved_by_a_signal():
+    suspension = vm.model("double_wishbone")
+    nominal = component("maneuver", suspension.definition.maneuver)
+    t = nominal.times
+    signal = vm.Signal.from_samples(t, nominal.at(t)[:, 0], inputs=["z"], output_step=0.01)
+    found, wanted = suspension.simulate(signal), suspension.simulate(nominal)
+    np.testing.assert_allclose(found.coordinates, wanted.coordinates, atol=1e-12)
+
+
+def test_a_signal_is_run_wherever_a_maneuver_is(car):
     t = np.linspace(0.0, 4.0, 401)
     signal = vm.Signal.from_samples(t, 0.01 * np.sin(t) ** 3, "cubic")
     full = car.simulate(signal, "equilibrium")
     result = vm.simulate(car, "pod", maneuver=signal, amplitude=0.9, training="nominal")
     assert len(full.time) == 201
     np.testing.assert_allclose(result["inputs"][:, 0], 0.9 * full.inputs[:, 0], atol=1e-12)
+
+
+def test_by_name_nothing_is_built_or_solved_twice(monkeypatch):
+    solved = []
+    integrate = DynamicModel.integrate
+
+    def counted(self, maneuver, *arguments):
+        solved.append(maneuver.name)
+        return integrate(self, maneuver, *arguments)
+
+    monkeypatch.setattr(DynamicModel, "integrate", counted)
+    t = np.linspace(0.0, 3.0, 301)
+
+    def run(signal, **further):
+        name, method = "independent_suspension_vehicle", "linear_single_track"
+        return vm.simulate(name, method, maneuver=signal, training="matched", **further)
+
+    one, other = (vm.Signal.from_samples(t, 0.01 * np.sin(k * t), name=f"{k}") for k in (1, 2))
+    first = run(one)
+    assert solved.count("1") >= 1
+    monkeypatch.setattr(build, "load_parameters", None)
+    solved.clear()
+    second = run(one)
+    assert not solved
+    xr.testing.assert_identical(first.drop_vars("seconds"), second.drop_vars("seconds"))
+    without = run(other, errors=False)
+    assert not solved
+    assert "rms_error" not in without
+    np.testing.assert_array_equal(run(other)["outputs"], without["outputs"])
+    assert solved == ["2"]

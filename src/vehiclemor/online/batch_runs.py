@@ -48,12 +48,15 @@ class Begin(NamedTuple):
         What the start excites, see `Lifting.excited`.
     until
         Time (s) up to which points are samples, see `structures.Output`.
+    told
+        Of the start, see `lifting_loops.Known`.
     """
 
     state: np.ndarray
     full: np.ndarray
     excited: np.ndarray
     until: float
+    told: tuple[float, ...] = ()
 
 
 NOTHING_EXCITED = np.zeros((2, 0, 2))
@@ -161,9 +164,9 @@ class BatchRuns:
         """Where a run from a start begins."""
         if self.reduced is None:
             return Begin(self.model.start(start), np.empty(0), NOTHING_EXCITED, 0.0)
-        known = self.reduced.known(start)
+        known = self.reduced.known(start, inputs)
         state = self.reduced.equations.begin(start, inputs)
-        return Begin(state, known.state, known.excited, known.until)
+        return Begin(state, known.state, known.excited, known.until, known.told)
 
     def _of_kind(
         self, kind: Hashable, signal: Maneuver, given: Given, begins: Sequence[Begin]
@@ -180,6 +183,7 @@ class BatchRuns:
         starts = np.stack([begin.state for begin in begins])
         full = np.stack([begin.full for begin in begins])
         excited = np.stack([begin.excited for begin in begins])
+        of_start = np.array([begin.told for begin in begins])
         until = np.array([begin.until for begin in begins])
         # Ends of segments -> spans between them.
         ends = {edges.tobytes(): edges for edges in given.edges}
@@ -201,7 +205,10 @@ class BatchRuns:
         columns = addresses(starts), of_inputs, until.view(np.int64), given.words, spans
         told = self._told(len(begins), len(space.wanted.samples))
         loop = batch_loop("many_runs").prepared(
-            Stages(stage(call, places, columns), *self._lifting_stages(space, of_inputs, excited)),
+            Stages(
+                stage(call, places, columns),
+                *self._lifting_stages(space, of_inputs, excited, of_start),
+            ),
             space.recorded,
             space.lifted,
             given.inputs,
@@ -214,7 +221,7 @@ class BatchRuns:
         return self._judged(told, given.remarks, space.times, seconds / len(begins))
 
     def _lifting_stages(
-        self, space: Space, of_inputs: np.ndarray, excited: np.ndarray
+        self, space: Space, of_inputs: np.ndarray, excited: np.ndarray, of_start: np.ndarray
     ) -> tuple[Stage, Stage]:
         """Decay and lifting of runs; the first of them reads the inputs."""
         stages = []
@@ -226,6 +233,9 @@ class BatchRuns:
                 places += [call.address("rates"), call.address("amplitudes")]
                 rates = addresses(excited)
                 columns += [rates, rates + excited[0, 0].nbytes]
+            if k == len(space.stages) - 1:
+                places += [call.address("known.start")]
+                columns += [addresses(of_start)]
             stages.append(stage(call, places, columns, rows, len(of_inputs)))
         return (NO_STAGE, *stages)[-2:] if stages else (NO_STAGE, NO_STAGE)  # type: ignore[return-value]
 
@@ -279,7 +289,7 @@ class BatchRuns:
         )
 
     def _told(self, runs: int, times: int) -> Told:
-        watched = len(self.reduced.lift.features.watched) if self.reduced else 0
+        watched = self.reduced.lift.told if self.reduced else 0
         limits = len(self.model.limits[1])
 
         def integers(columns: int) -> np.ndarray:

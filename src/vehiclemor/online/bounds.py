@@ -21,6 +21,7 @@ from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualM
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.reduced_system import FullStates, ReducedSystem
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
@@ -97,6 +98,12 @@ def _check_vehicle(part: ReducedVehicle) -> None:
     _shaped("lifting", (part.lifting, len(lifted.terms), n))
     _shaped("encoding", (part.encoding, k, n), (part.feedthrough, k, inputs))
     _shaped("error_scale", (part.error_scale, k + PLANAR))
+    reach = part.reach
+    _require(own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
+    if len(reach.lasted):
+        modes, starts = len(part.transient.rates), len(reach.begun)
+        _shaped("lasted", (reach.lasted, 2 * lifted.lateral, LEVELS), (reach.decaying, modes))
+        _shaped("starts", (reach.left, n), (reach.starts, starts, n), (reach.begun, starts))
 
 
 def _check_system(part: System) -> None:

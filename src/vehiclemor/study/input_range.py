@@ -26,22 +26,27 @@ class InputRange:
         Absolute values of the inputs (inputs,), and of a dynamic model of their rates beside them.
     speed, reach
         Middle of the initial speeds in m/s, and how far they lie from it.
+    longest
+        Duration of the longest run in s; a kinematic model has no memory, and any is known.
     """
 
     largest: np.ndarray
     speed: float
     reach: float
+    longest: float
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""
         values = _values(model, scenario.maneuver)
         # An input that was zero in training may be nothing else.
         used = values / np.maximum(self.largest, 1e-12)
-        off = np.full((len(values), 1), (_speed(model, scenario) - self.speed) / self.reach)
+        times = scenario.maneuver.times
+        off = np.full(len(values), (_speed(model, scenario) - self.speed) / self.reach)
         names = [f"input {name}" for name in model.inputs]
         if model.kind != "ae":
             names += [f"rate of {name}" for name in names]
-        return trust_of(scenario.maneuver.times, np.hstack([used, off]), [*names, "initial speed"])
+        used = np.column_stack([used, off, times / self.longest])
+        return trust_of(times, used, [*names, "initial speed", "duration"])
 
     def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
         """How far inputs (samples, inputs) go in the range; their rates are not looked at."""
@@ -58,7 +63,10 @@ def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
     middle = 0.5 * (low + high)
     # One part in a million is rounding.
     reach = max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0
-    return InputRange(np.max(largest, axis=0) * (1.0 + 1e-6), middle, reach * (1.0 + 1e-6))
+    lasting = model.kind != "ae"
+    longest = max(scenario.maneuver.duration for scenario in training) if lasting else np.inf
+    edge = 1.0 + 1e-6
+    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge)
 
 
 def _values(model: Model, maneuver: Maneuver) -> np.ndarray:

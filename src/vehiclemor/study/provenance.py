@@ -15,6 +15,8 @@ LAYERS = ("multibody", "symbolic", "codegen", "simulation", "reduction")
 FILES = (
     "parameters.py",
     "maneuver.py",
+    "piecewise.py",
+    "signals.py",
     "steering_maneuvers.py",
     "metrics.py",
     "study/scenario.py",

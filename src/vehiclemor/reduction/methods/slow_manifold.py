@@ -33,6 +33,7 @@ from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
 from vehiclemor.reduction.vehicle.lifting_terms import fitted_lifting
 from vehiclemor.reduction.vehicle.pruning import pruned
+from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
@@ -112,6 +113,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
         reduced = _fitted_on_runs(reduced, table, goals, settings)
+    reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,
         offline=offline_cost(began, model, runs, len(samples.inputs)),

@@ -26,6 +26,7 @@ from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.mirror import mirror
+from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
@@ -127,6 +128,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         reduced = improved(reduced, goals, free, settings.sweeps, power=1.0)
         reduced = improved(reduced, goals, free, settings.sweeps)
         reduced = lifted_anew(reduced, training, samples)
+    reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,
         offline=offline_cost(began, model, runs, len(samples.inputs)),

@@ -40,6 +40,9 @@ class Features:
     watched
         (expression, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
         what the features were made for.
+    lateral
+        How many of these, the first ones, move when the vehicle is steered: how long they do
+        counts too.
     """
 
     states: int
@@ -49,6 +52,7 @@ class Features:
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
     diagonal: tuple[int, ...] = ()
     watched: tuple[tuple[str, str], ...] = ()
+    lateral: int = 0
 
     @property
     def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:

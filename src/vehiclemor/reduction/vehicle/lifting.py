@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -16,6 +16,8 @@ from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.reduction.reduced_system import full_state_slopes
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
 from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
+from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.run_plans import Run
@@ -64,6 +66,7 @@ class LiftingSpace(NamedTuple):
     states: np.ndarray
     largest: np.ndarray
     first: np.ndarray
+    start: np.ndarray
     calls: tuple[tuple[Prepared, tuple[int, ...]], ...]
 
 
@@ -83,6 +86,8 @@ class Lifting(ShortRepr):
         Where the shape stands in the states.
     transient
         What is added to the shapes.
+    reach
+        What the training runs have shown.
     """
 
     features: Features
@@ -91,6 +96,7 @@ class Lifting(ShortRepr):
     reference: np.ndarray
     layout: Layout
     transient: Transient
+    reach: TrainingReach = NOTHING_KNOWN
 
     @cached_property
     def _made(self) -> dict[int, tuple[Kernels, np.ndarray]]:
@@ -172,15 +178,19 @@ class Lifting(ShortRepr):
         return []
 
     def of_run(
-        self, run: Run, inputs: np.ndarray, excited: np.ndarray
+        self, run: Run, inputs: np.ndarray, excited: np.ndarray, start: Sequence[float]
     ) -> tuple[np.ndarray, Trust | None]:
-        """The same of a run and its inputs at the samples; of its rows only `run.rows` count."""
+        """The same of a run and its inputs at the samples; of its rows only `run.rows` count.
+
+        Of `start` see `lifting_loops.Known`.
+        """
         held = run.kept.get("lifted")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
             held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
             run.kept["lifted"] = held
         held.excited[:] = excited
+        held.start[:] = start
         return self._lifted(held, run.rows)
 
     def space(
@@ -203,15 +213,24 @@ class Lifting(ShortRepr):
         lanes = LANES if rows >= LANES else 1
         address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(times), self.layout.size + len(watched)))
-        largest, first = np.empty(len(watched)), np.empty(len(watched), dtype=np.int64)
+        largest, first = np.empty(self.told), np.empty(self.told, dtype=np.int64)
+        start = np.zeros(3)
+        lasted = self.reach.lasted
+        known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
         lifted = _loops()["lifted"].prepared(
-            path, inputs, address, constants, states, largest, first
+            path, inputs, address, constants, states, known, largest, first
         )
-        calls.append((lifted, ("path", "inputs", "states")))
+        calls.append((lifted, ("path", "inputs", "states", "known.times")))
         counted = tuple(
             (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
         )
-        return LiftingSpace(excited, times, states, largest, first, counted)
+        return LiftingSpace(excited, times, states, largest, first, start, counted)
+
+    @property
+    def told(self) -> int:
+        """How much is told of a run: what is watched, and what is told besides."""
+        watched = len(self.features.watched)
+        return watched + BESIDES if watched else 0
 
     def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
         for call, places in space.calls:
@@ -230,7 +249,8 @@ class Lifting(ShortRepr):
         Parameters
         ----------
         largest, first
-            Largest magnitude of each watched quantity, and the first row at which it is above 1.
+            Largest magnitude of each watched quantity and of what is told besides, and the first
+            row at which it is above 1.
         until
             Time (s) of the first of these rows; infinite if there is none.
         """
@@ -238,8 +258,13 @@ class Lifting(ShortRepr):
             return None
         if np.isinf(until):
             return Trust(max(largest))
-        name = self.features.watched[first.index(min(first))][1]
-        return Trust(max(largest), until, f"{name} leaves what the training runs have covered")
+        # Of what is left at once the start tells most.
+        column = len(first) - 1 - first[::-1].index(min(first))
+        watched = self.features.watched
+        if column >= len(watched):
+            return Trust(max(largest), until, REASONS[column - len(watched)])
+        reason = f"{watched[column][1]} leaves what the training runs have covered"
+        return Trust(max(largest), until, reason)
 
 
 def decayed(excited: np.ndarray) -> float:

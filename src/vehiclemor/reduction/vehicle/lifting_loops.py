@@ -1,13 +1,18 @@
 """What the lifting of a reduced vehicle does along time, compiled."""
 
 import math
+from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector
+from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.path_loops import kernel_path, lane_path
 
 # What has decayed to this part of what it was is nothing.
 NOTHING = 1e-14
+# Parts of a range in which time is counted, and below which nothing moves.
+LEVELS, MOVING = 8, 0.02
+# What is told besides, and a time (s) that is hardly after the start.
+BESIDES, SOON = 4, 1e-3
 
 
 def with_decay(
@@ -47,31 +52,126 @@ def with_decay(
     return 0
 
 
+class Known(NamedTuple):
+    """What is known of durations and of a run's start, see `training_reach`.
+
+    Attributes
+    ----------
+    times
+        Of the samples, s.
+    lasted, spent
+        Times (2 columns, levels) that are known, and scratch space alike.
+    start
+        When (s) what it excites has settled, how unlike known starts it is, and 1; all zero where
+        the first sample is no start.
+    sideways
+        How far known starts use the ranges of lateral motion.
+    """
+
+    times: Vector
+    lasted: Matrix
+    spent: Matrix
+    start: Vector
+    sideways: Float
+
+
 def lifted(
     path: Matrix,
     inputs: Matrix,
     kernel: IntVector,
     constants: Vector,
     states: Matrix,
+    known: Known,
     largest: Vector,
     first: IntVector,
 ) -> Int:
     """States by a kernel for `LANES` samples, or for one on shorter paths.
 
-    Of the columns behind the states also the largest magnitude, and the first sample above 1.
+    Of the columns behind the states also the largest magnitude, and the first sample above 1; and
+    behind these the same of what is known besides.
     """
     if len(path) < LANES:
         kernel_path(path, inputs, kernel, constants, states)
     else:
         lane_path(path, inputs, kernel, constants, states)
-    column = states.shape[1] - len(largest)
+    watched = max(len(largest) - BESIDES, 0)
+    column = states.shape[1] - watched
     for k in range(len(largest)):
         largest[k], first[k] = 0.0, len(states)
     for sample in range(len(states)):
-        for k in range(len(largest)):
+        for k in range(watched):
             size = abs(states[sample, column + k])
             if size > largest[k]:
                 if size > 1.0 and not largest[k] > 1.0:
                     first[k] = sample
                 largest[k] = size
+    if watched and len(known.lasted):
+        tell(states, column, known, largest[watched:], first[watched:])
     return 0
+
+
+def tell(states, column, known, largest, first):
+    """How far a run goes in durations and its start in known ones, and the first samples beyond."""
+    times, columns = known.times, len(known.spent) // 2
+    longest, moving = durations(times, states, column, known.lasted, known.spent)
+    largest[0] = longest
+    if longest > 1.0:
+        first[0] = overstayed(times, states, column, known.lasted, known.spent)
+    if moving < len(times):
+        largest[1] = known.start[0] / max(times[moving], SOON)
+        first[1] = moving if largest[1] > 1.0 else first[1]
+    if moving == 0 and known.start[2] > 0.0:
+        for k in range(columns):
+            largest[2] = max(largest[2], abs(states[0, column + k]) / known.sideways)
+        first[2] = 0 if largest[2] > 1.0 else first[2]
+    largest[3] = known.start[1]
+    first[3] = 0 if largest[3] > 1.0 else first[3]
+
+
+def durations(times, states, column, lasted, spent):
+    """Largest part of known times that columns, from one on, spend beyond levels; when they move.
+
+    Seconds beyond each level have a row for each column, and then so have their integrals.
+    """
+    columns, end, moving, longest = len(spent) // 2, times[len(times) - 1], len(times), 0.0
+    for row in range(2 * columns):
+        for level in range(LEVELS):
+            spent[row, level] = 0.0
+    for sample in range(len(times)):
+        span = times[sample] - times[sample - 1] if sample else 0.0
+        later = span * (end - times[sample] + span)
+        for k in range(columns):
+            size = abs(states[sample, column + k])
+            if size > MOVING:
+                moving = min(moving, sample)
+                level = int(LEVELS * size) if size < 1.0 else LEVELS - 1
+                spent[k, level] += span
+                spent[columns + k, level] += later
+    for row in range(2 * columns):
+        total = 0.0
+        for level in range(LEVELS - 1, -1, -1):
+            total += spent[row, level]
+            longest = max(longest, total / lasted[row, level])
+    return longest, moving
+
+
+def overstayed(times, states, column, lasted, spent):
+    """First sample at which a known time is over."""
+    columns = len(spent) // 2
+    for row in range(2 * columns):
+        for level in range(LEVELS):
+            spent[row, level] = 0.0
+    for sample in range(1, len(times)):
+        span = times[sample] - times[sample - 1]
+        for k in range(columns):
+            size = abs(states[sample, column + k])
+            for level in range(LEVELS):
+                if size > max(level / LEVELS, MOVING):
+                    spent[k, level] += span
+                spent[columns + k, level] += span * spent[k, level]
+                if (
+                    spent[k, level] > lasted[k, level]
+                    or spent[columns + k, level] > lasted[columns + k, level]
+                ):
+                    return sample
+    return len(times) - 1

@@ -14,6 +14,7 @@ from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
@@ -25,14 +26,25 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
+NOTHING_EXCITED = np.empty((2, 0, 2))
 
 
 class KnownStart(NamedTuple):
-    """A full state, what of the transient it excites, and until when (s)."""
+    """A full state and what is known of it as a start.
+
+    Attributes
+    ----------
+    excited, until
+        What of the transient it excites, and when (s) this is nothing.
+    told
+        When (s) this is as in training runs; how much else it leaves, 1 at the edge of what they
+        leave; 1.
+    """
 
     state: np.ndarray
     excited: np.ndarray
     until: float
+    told: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +69,8 @@ class ReducedVehicle(ShortRepr):
         What is added to the lifted shapes.
     lifted_features
         Features of the lifting, with the same parameters, if not those of the equations.
+    reach
+        What the training runs have shown of durations and starts.
     """
 
     model: DynamicModel
@@ -73,6 +87,7 @@ class ReducedVehicle(ShortRepr):
     tolerance: float
     transient: Transient = NO_TRANSIENT
     lifted_features: Features | None = None
+    reach: TrainingReach = NOTHING_KNOWN
 
     @property
     def effective_rank(self) -> int:
@@ -125,7 +140,7 @@ class ReducedVehicle(ShortRepr):
         return self.equations
 
     def _lifted(self, run: Run, inputs: np.ndarray) -> np.ndarray:
-        return self.lift.states(run.times, run.path, inputs, np.empty((2, 0, 2)))[0]
+        return self.lift.states(run.times, run.path, inputs, NOTHING_EXCITED)[0]
 
     def _judged(self, run: Run, inputs: np.ndarray) -> Trust | None:
         """Of states one by one: they tell neither how long a run has lasted nor of its start."""
@@ -135,10 +150,14 @@ class ReducedVehicle(ShortRepr):
 
     def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
-        deviation = self.shape.of(state[None])[0] - self.shape.reference
-        z = self.encoding @ deviation - self.feedthrough @ inputs
+        return self.encoded_path(state[None], inputs[None])[0]
+
+    def encoded_path(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Reduced states (samples, states + 3) of full ones at inputs (samples, inputs)."""
+        deviations = self.shape.of(states) - self.shape.reference
         x, y, heading = self.model.planar
-        return np.concatenate([z, state[[heading, x, y]]])
+        z = deviations @ self.encoding.T - inputs @ self.feedthrough.T
+        return np.hstack([z, states[:, [heading, x, y]]])
 
     @cached_property
     def lift(self) -> Lifting:
@@ -146,7 +165,13 @@ class ReducedVehicle(ShortRepr):
         shape, features = self.shape, self.lifted_features or self.features
         coefficients, reference = self.lifting, shape.reference
         return Lifting(
-            features, self.parameters, coefficients, reference, shape.layout, self.transient
+            features,
+            self.parameters,
+            coefficients,
+            reference,
+            shape.layout,
+            self.transient,
+            self.reach,
         )
 
     def path(
@@ -159,9 +184,10 @@ class ReducedVehicle(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
-        known, inputs = self.known(start), recorded_inputs(maneuver)[1]
+        inputs = recorded_inputs(maneuver)[1]
+        known = self.known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
-        states, trust = self.lift.of_run(run, inputs, known.excited)
+        states, trust = self.lift.of_run(run, inputs, known.excited, known.told)
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
@@ -169,20 +195,35 @@ class ReducedVehicle(ShortRepr):
         run.give_back()
         return found
 
-    def known(self, start: Start) -> KnownStart:
-        """A start with what it excites; kept by its name or its numbers."""
-        key = start if isinstance(start, str) else self.model.start(start).tobytes()
+    def excited(self, state: np.ndarray) -> np.ndarray:
+        """What of the transient a full state excites, see `Lifting.excited`."""
+        return self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+
+    def remainder(
+        self, states: np.ndarray, inputs: np.ndarray, excited: np.ndarray = NOTHING_EXCITED
+    ) -> np.ndarray:
+        """What of the shapes (samples, n) of full states their own reduced states don't give."""
+        path = self.encoded_path(states, inputs)
+        lifted, _ = self.lift.states(np.zeros(len(path)), path, inputs, excited)
+        return self.shape.of(states) - self.shape.of(lifted[:, : states.shape[1]])
+
+    def known(self, start: Start, inputs: np.ndarray) -> KnownStart:
+        """A start with what it excites, at inputs; kept by its name or its numbers."""
+        name = start if isinstance(start, str) else self.model.start(start).tobytes()
+        key = name, inputs.tobytes()
         found = self._starts.get(key)
         if found is None:
             state = self.model.start(start)
-            excited = self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+            excited = self.excited(state)
+            unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            found = self._starts[key] = KnownStart(state, excited, decayed(excited))
+            told = self.reach.settled(excited), unlike, 1.0
+            found = self._starts[key] = KnownStart(state, excited, decayed(excited), told)
         return found
 
     @cached_property
-    def _starts(self) -> dict[str | bytes, KnownStart]:
+    def _starts(self) -> dict[tuple[str | bytes, bytes], KnownStart]:
         return {}
 
     def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002

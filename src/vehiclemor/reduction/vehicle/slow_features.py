@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from vehiclemor.reduction.vehicle.features import Features, monomials
+from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
@@ -20,6 +21,8 @@ VARIABLES = ("front", "rear", "roll", "rolling", "steer")
 MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of roll", "steering")
 # Part of heave and pitch at the start that samples after the landing still show.
 AFTER_LANDING = 0.3
+# And how much of it, in parts of what samples show, a car may have that is steered.
+STEERED = 1.2
 
 
 @dataclass(frozen=True)
@@ -133,10 +136,16 @@ def feature_table(
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
     edge = f"{hull / trusted!r} * raw"
-    watched = [(edge, "change of speed"), *((f"{edge}{i}", m) for i, m in enumerate(MEANINGS))]
-    watched += [(f"{AFTER_LANDING!r} * {e}", "heave and pitch") for e in own[k:]]
+    steered = held(f"{1.0 / MOVING!r} * ({' + '.join(f'abs({x})' for x in v)})")
+    watched = [(f"{edge}{i}", meaning) for i, meaning in enumerate(MEANINGS)]
+    watched += [(edge, "change of speed")]
+    # More of it than corners make is known only where the car runs straight.
+    alive = f"({AFTER_LANDING!r} + {(1.0 / STEERED - AFTER_LANDING)!r} * ({steered}))"
+    watched += [(f"{alive} * {e}", "heave and pitch") for e in own[k:]]
     terms = (*odd, *even)
-    features = Features(n + 1, inputs, tuple(lines), terms, groups, modes.blocks, tuple(watched))
+    features = Features(
+        n + 1, inputs, tuple(lines), terms, groups, modes.blocks, tuple(watched), len(MEANINGS)
+    )
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
 

@@ -24,6 +24,7 @@ SPEED = 4
 LATERAL, SYMMETRIC = (0, 1, 2, 3, 5, 7), (SPEED, 6)
 AXLES = (WHEELS[:2], WHEELS[2:])
 NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering")
+OF_SPEED = "change of speed"
 DERIVATIVES = ("rate of steering", "acceleration of steering")
 ARGUMENTS = tuple(f"a{i}" for i in range(5))
 # Part of its static load that a wheel keeps, so that no force is divided by zero.
@@ -62,8 +63,12 @@ class Text:
         """Features of these terms; the first ones are the odd ones."""
         numbers = tuple(range(len(terms)))
         groups = ((numbers[:odd], LATERAL), (numbers[odd:], SYMMETRIC)) if odd else ()
-        lines, watched = tuple(self.lines), tuple(self.watched)
-        return Features(STATES, inputs, lines, tuple(terms), groups, (4, 1), watched)
+        # The change of speed comes last: alone it moves without steering.
+        watched = sorted(self.watched, key=lambda of: of[1] == OF_SPEED)
+        lines, lateral = tuple(self.lines), max(len(watched) - 1, 0)
+        return Features(
+            STATES, inputs, lines, tuple(terms), groups, (4, 1), tuple(watched), lateral
+        )
 
 
 def argument_values(speed: float, z: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -89,7 +94,7 @@ def arguments(speed: float, reach: np.ndarray, reversal: float) -> Text:
     text = Text()
     text.let("part", f"1.0 / ({text.parameter(speed)} + z{SPEED})")
     kinds = ("part * z0", "part * z1", "z2", "part * z3", "u0", f"z{SPEED}", "u1", "u2")
-    names = (*NAMES, "change of speed", *DERIVATIVES)
+    names = (*NAMES, OF_SPEED, *DERIVATIVES)
     held_names = (*ARGUMENTS, "m")
     for i, most in enumerate(reach):
         text.let(f"raw{i}", f"{text.parameter(1.0 / most)} * {kinds[i]}")

@@ -76,12 +76,10 @@ def targets(
     stride: int = STRIDE,
 ) -> list[Target]:
     """Training runs in reduced states; the variational equations take every `stride`th time."""
-    x, y, heading = reduced.model.planar
     k, result = reduced.features.states - 1, []
     for run, true in zip(training, runs, strict=True):
-        deviations = reduced.shape.of(true.states) - reduced.shape.reference
-        z = deviations @ reduced.encoding.T - true.inputs @ reduced.feedthrough.T
-        states = np.hstack([z, true.states[:, [heading, x, y]]])
+        states = reduced.encoded_path(true.states, true.inputs)
+        z = states[:, : k + 1]
         moved = np.abs(z[:, :k] - z[-1, :k]).max(axis=1)
         restless = np.flatnonzero(moved > REST * moved.max())
         last = len(z) - 1

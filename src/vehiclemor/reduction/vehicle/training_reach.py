@@ -1,0 +1,87 @@
+"""What training runs have shown: how long they stay where, and what their starts leave behind.
+
+Ranges tell where a run is.  But errors of the heading grow with the time that a run stays there,
+those of the place with the way that it drives on with them; and what a start excites, beside the
+slow motion, is known for the starts of the training alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING
+
+# A run may last so many times as long as any training run, and this (s) where none has been.
+LONGER, SHORTEST = 1.05, 0.1
+# A start may leave so many times what samples of training runs leave.
+UNLIKE = 3.0
+# Part of the steered motion's own amplitudes that a start's transient may have beside it.
+BESIDE = 0.3
+# Decay (1/s) that is none.
+SLOWEST = 1e-6
+# What is told besides ranges, in the order of the loop.
+REASONS = (
+    "it moves sideways for longer, or has longer ago, than any training run",
+    "it moves sideways before what its start excites has decayed",
+    "it starts sideways, as no training run does",
+    "its start leaves more than the slow motion, unlike any training run",
+)
+BEYOND = np.array([MOVING, *np.arange(1, LEVELS) / LEVELS])
+
+
+@dataclass(frozen=True)
+class TrainingReach:
+    """What is known of durations and starts.
+
+    Attributes
+    ----------
+    lasted
+        Seconds (2 columns, levels) that a run may be beyond each level of a range; below them
+        their integrals in s^2.
+    sideways
+        How far the starts use the ranges of these columns.
+    decaying
+        Amplitudes (modes,) that a start's transient may have in a run that is steered.
+    left
+        What lifting leaves of the states of the shape (n,).
+    starts, begun
+        Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
+    """
+
+    lasted: np.ndarray
+    sideways: float
+    decaying: np.ndarray
+    left: np.ndarray
+    starts: np.ndarray
+    begun: np.ndarray
+
+    def settled(self, excited: np.ndarray) -> float:
+        """Time in s from which on a start's transient, as `Lifting.excited` gives it, is known."""
+        rates, amplitudes = excited
+        if not len(rates) or not len(self.decaying):
+            return 0.0
+        larger = np.maximum(np.hypot(*amplitudes.T) / self.decaying, 1.0)
+        # What does not decay never settles.
+        return float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
+
+    def unlike(self, remainder: np.ndarray) -> float:
+        """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
+        if not len(self.left):
+            return 0.0
+        scaled = remainder / self.left
+        known = np.clip(self.starts @ scaled, -LONGER * self.begun, LONGER * self.begun)
+        return float(np.abs(scaled - known @ self.starts).max()) / UNLIKE
+
+
+NOTHING_KNOWN = TrainingReach(
+    np.zeros((0, LEVELS)), MOVING, np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros(0)
+)
+
+
+def durations(times: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Seconds (samples, 2 columns, levels) beyond each level so far, and their integrals."""
+    spans = np.diff(times, prepend=times[:1])[:, None, None]
+    spent = np.cumsum(spans * (sizes[:, :, None] > BEYOND), axis=0)
+    return np.concatenate([spent, np.cumsum(spans * spent, axis=0)], axis=1)
