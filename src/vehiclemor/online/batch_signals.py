@@ -167,7 +167,7 @@ class Signals(Sequence[Signal], ShortRepr):
         moves = np.diff(self.u, axis=1) != 0.0
         segments: dict[bytes, tuple[np.ndarray, list[int]]] = {}
         for run in range(runs):
-            bends = kinks[:, run].any(axis=1)
+            bends = np.logical_or.reduce(kinks[:, run], axis=1)
             moving = moves[run].any(axis=1)
             if not np.all(moving):
                 bends |= quiet_ends(times, moving)
