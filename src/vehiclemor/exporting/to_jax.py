@@ -48,7 +48,7 @@ def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:
         If JAX isn't installed.
     """
     needed("jax")
-    import jax.numpy as jnp
+    import jax.numpy as jnp  # pyright: ignore[reportMissingImports]  (an extra)
 
     functions = {name: getattr(jnp, RENAMED.get(name, name)) for name in FUNCTIONS}
     functions["select"] = jnp.where
