@@ -1,10 +1,10 @@
 """Whether a reduced vehicle warns where its steering or its start is unlike training.
 
-    python paper/other_steering.py independent_suspension_vehicle 200 7
+Usage: python paper/other_steering.py MODEL RUNS SEED
 
-draws so many runs of each kind from a seed: other steering of the amplitudes and speeds of the
-protocol's boxes, for 5 to 40 s and for 5 or 10 s, the latter also from starts with one state out of
-place.  A run is silent if it misses a bound and its status is `ok`.
+Draws so many runs of each kind: other steering of the amplitudes and speeds of the protocol's
+boxes, for 5 to 40 s and for 5 or 10 s, the latter also from starts with one state out of place.
+A run is silent if it misses a bound and its status is `ok`.
 """
 
 import sys

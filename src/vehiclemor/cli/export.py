@@ -1,7 +1,7 @@
 """`vehiclemor export`: a full or reduced model for another tool."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -9,6 +9,9 @@ import vehiclemor as vm
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.export import STEP, Target, destination, name_of
+
+# Method that stands for the model that ships.
+SHIPPED = "shipped"
 
 
 def export(
@@ -19,14 +22,9 @@ def export(
     settings: Annotated[
         tuple[str, ...], Parameter(name="--set", negative="", show_default=False)
     ] = (),
-    preset: str = "recommended",
-    training: str | None = None,
     parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
-    parameters: Path | None = None,
-    shipped: Annotated[bool, Parameter(negative="")] = False,
     out: Path | None = None,
     overwrite: Annotated[bool, Parameter(negative="")] = False,
-    fmi: Literal[2, 3] = 3,
     step: float = STEP,
 ) -> int:
     """Export a model, or a reduced one, for another tool.
@@ -36,46 +34,39 @@ def export(
     model
         Registered name, or file of a reduced model.
     to
-        c: a folder with C99 sources; fmu: a functional mock-up unit; casadi: a function that CasADi
-        loads; jax, sympy: a Python module.
+        c: a folder with C99 sources; fmu, fmu2: a functional mock-up unit by FMI 3.0 or 2.0;
+        casadi: a function that CasADi loads; jax, sympy: a Python module.
     method
-        Reduce the model by this method first; the full model by default.
+        Reduce the model by this method first; shipped: the reduced model that ships with the
+        package.  The full model by default.
     settings
-        key=value: a setting of the method; may be given several times.
-    preset
-        Preset of the method's settings.
-    training
-        nominal or protocol: what the method is trained on; its own by default.
+        key=value: a setting of the method, its preset or training (nominal, protocol); may be given
+        several times.
     parameter
         name=value: a parameter of the model in SI units; may be given several times.
-    parameters
-        Parameter file; the model's own public data by default.
-    shipped
-        The reduced model that ships with the package for this model.
     out
         Folder or file; under the model's name here by default.
     overwrite
         Replace an export that is there.
-    fmi
-        Version of the standard.
     step
         Step size in s of the integrator in C and FMU.
     """
-    given = key_values("--set", settings)
-    kept = Path(model).suffix == ".nc"
-    if (kept or shipped) and (method or given or parameter or parameters):
+    given: dict[str, Any] = key_values("--set", settings)
+    values = key_values("--parameter", parameter)
+    file = Path(model).suffix == ".nc"
+    kept = file or method == SHIPPED
+    if (file and method) or (kept and (given or values)):
         raise InputError("a reduced model that is kept has its method, settings and parameters")
     if given and method is None:
         raise InputError("--set is for a method: --method NAME")
-    if kept or shipped:
-        chosen = vm.load(model) if kept else vm.rom(model)
+    if kept:
+        chosen = vm.load(model) if file else vm.rom(model)
         out = destination(name_of(chosen.model.name, chosen.method), to, out, overwrite)
     else:
-        chosen = vm.model(model, key_values("--parameter", parameter), parameters)
+        chosen = vm.model(model, values)
         # Before anything is fitted.
         out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
-            chosen = vm.reduce(chosen, method, training=training, preset=preset, **given)
-    written = vm.export(chosen, to, out, overwrite=overwrite, fmi=fmi, step=step)
-    print(f"written: {written}")
+            chosen = vm.reduce(chosen, method, **given)
+    print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")
     return 0

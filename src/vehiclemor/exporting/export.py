@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
-Target = Literal["c", "fmu", "casadi", "jax", "sympy"]
+Target = Literal["c", "fmu", "fmu2", "casadi", "jax", "sympy"]
 TARGETS: tuple[str, ...] = Target.__args__
 # How the name of what is written ends; C is a folder.
-ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi", "jax": "_jax.py"}
+ENDINGS = {"c": "", "fmu": ".fmu", "fmu2": ".fmu", "casadi": ".casadi", "jax": "_jax.py"}
 ENDINGS["sympy"] = "_sympy.py"
 # Step in s of the integrator in C: stable for modes of up to 2780 1/s; see the handbook.
 STEP = 1e-3
+# What is always written.
+FILES = ("c", "fmu", "fmu2")
 # A folder with this file is one of ours.
 OURS = "vehiclemor_model.h"
 
@@ -35,7 +37,6 @@ def export(
     path: str | Path | None = None,
     *,
     overwrite: bool = False,
-    fmi: Literal[2, 3] = 3,
     step: float = STEP,
 ) -> Any:
     """A full or reduced model for another tool.
@@ -46,18 +47,16 @@ def export(
         Registered name, a model made by `model()`, or a reduced one: of `reduce()`, `load()` or
         `rom()`.
     to
-        `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit for model exchange and
-        co-simulation, with sources, and a binary for this platform where there is a C compiler.
-        `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a function (x, u, p) -> (dx, y).
-        `sympy`: expressions.
+        `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit by FMI 3.0 for model
+        exchange and co-simulation, with sources, and a binary for this platform where there is a C
+        compiler; `fmu2`: by FMI 2.0.  `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a
+        function (x, u, p) -> (dx, y).  `sympy`: expressions.
     path
         File or folder to write.  Without it C and FMU go under the model's name into the working
         folder; of the others the object is returned, and with it a file is written: CasADi's own
         for `Function.load`, or a Python module.
     overwrite
         Whether an export that is there is replaced.
-    fmi
-        Version of the standard.
     step
         Of the integrator that C and FMU bring along, in s (Runge-Kutta of order 4).
 
@@ -75,8 +74,6 @@ def export(
     if to not in TARGETS:
         hint = did_you_mean(to, TARGETS) or f"known: {', '.join(TARGETS)}"
         raise InputError(f"to: {quoted(to)} is no target; {hint}")
-    if fmi not in (2, 3):
-        raise InputError(f"fmi: {quoted(fmi)} is no version; 2 or 3")
     if not number("step", step) > 0.0:
         raise InputError(f"step: {step:g} s is not above 0")
     if isinstance(model, str):
@@ -84,7 +81,7 @@ def export(
 
         model = build(model)
     system = system_of(model)
-    kept = path is not None or to in ("c", "fmu")
+    kept = path is not None or to in FILES
     place = destination(system.name, to, path, overwrite) if kept else None
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
@@ -94,7 +91,7 @@ def export(
         from vehiclemor.exporting.c import c_files
 
         return _write_folder(place, c_files(system, step))
-    return write_whole(place, _writer(system, to, fmi, step))
+    return write_whole(place, _writer(system, to, step))
 
 
 def destination(name: str, to: str, path: str | Path | None, overwrite: bool) -> Path:
@@ -154,12 +151,12 @@ def _object(system: ExportedSystem, to: str) -> Any:
     return sympy_expressions(system)
 
 
-def _writer(system: ExportedSystem, to: str, fmi: int, step: float) -> Callable[[Path], object]:
+def _writer(system: ExportedSystem, to: str, step: float) -> Callable[[Path], object]:
     """What writes a file; all of its content is made before."""
-    if to == "fmu":
+    if to in FILES:
         from vehiclemor.exporting.fmu import fmu_files, write_archive
 
-        files = fmu_files(system, step, fmi)
+        files = fmu_files(system, step, 2 if to == "fmu2" else 3)
         return lambda path: write_archive(files, path)
     if to == "casadi":
         function = _object(system, to)

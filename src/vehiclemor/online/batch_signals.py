@@ -167,7 +167,10 @@ class Signals(Sequence[Signal], ShortRepr):
         moves = np.diff(self.u, axis=1) != 0.0
         segments: dict[bytes, tuple[np.ndarray, list[int]]] = {}
         for run in range(runs):
-            bends = kinks[:, run].any(axis=1) | quiet_ends(times, moves[run].any(axis=1))
+            bends = np.logical_or.reduce(kinks[:, run], axis=1)
+            moving = moves[run].any(axis=1)
+            if not np.all(moving):
+                bends |= quiet_ends(times, moving)
             segments.setdefault(bends.tobytes(), (bends, []))[1].append(run)
         pieces = [
             (alike, joined(times, bends, coefficients[alike[0]]))

@@ -15,7 +15,6 @@ CAR = "independent_suspension_vehicle"
     ("arguments", "words"),
     [
         ({"to": "matlab"}, "'matlab' is no target"),
-        ({"to": "fmu", "fmi": 1}, "1 is no version; 2 or 3"),
         ({"to": "c", "step": 0.0}, "step: 0 s is not above 0"),
         ({"to": "c", "step": float("nan")}, "nan is not finite"),
         ({"to": "c", "path": "no-such-folder/car"}, "does not exist"),
@@ -63,7 +62,7 @@ def test_a_compiler_that_fails(tmp_path, monkeypatch):
 
 def test_nothing_is_replaced_unasked(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    command = ["export", CAR, "--shipped", "--to", "c"]
+    command = ["export", CAR, "--method", "shipped", "--to", "c"]
     assert main(command) == 0
     folder = tmp_path / f"{CAR}_guarded"
     assert capsys.readouterr().out == f"written: {folder.name}\n"
@@ -100,7 +99,7 @@ def test_a_failure_on_the_way_leaves_what_was_there(tmp_path, monkeypatch):
 
 
 def test_a_kept_model_has_its_method(capsys):
-    assert main(["export", CAR, "--shipped", "--method", "pod", "--to", "c"]) == 2
+    assert main(["export", "car.nc", "--method", "pod", "--to", "c"]) == 2
     assert "has its method" in capsys.readouterr().err
     assert main(["export", CAR, "--set", "rank=3", "--to", "c"]) == 2
     assert "--method NAME" in capsys.readouterr().err
