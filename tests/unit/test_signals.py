@@ -290,3 +290,18 @@ def test_by_name_nothing_is_built_or_solved_twice(monkeypatch):
     assert "rms_error" not in without
     np.testing.assert_array_equal(run(other)["outputs"], without["outputs"])
     assert solved == ["2"]
+
+
+@pytest.mark.parametrize("solver", ["ros34pw2", "dopri5"])
+def test_nothing_of_a_signal_is_left_for_the_next(car, solver):
+    t = np.linspace(0.0, 6.0, 301)
+    turns = 0.01 * np.abs((t + 0.5) % 2.0 - 1.0)
+    for k, u in enumerate((straight(t), turns, 0.01 * np.sin(t), -straight(t))):
+        signal = vm.Signal.from_samples(t, u)
+        how = {"solver": solver, "tolerance": 1e-4}
+        shared = car.simulate(signal, "equilibrium", **how)
+        # With a bound of its own, which is never reached, a run has a plan and space of its own.
+        alone = car.simulate(signal, "equilibrium", longest_step=1e3 + k, **how)
+        assert shared.counts == alone.counts
+        for name in ("inputs", "states", "outputs"):
+            np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
