@@ -1,6 +1,5 @@
 """Checks at the border of a model that is ready to run, and of what its runs give."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,11 +20,7 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
         If the shape is another one or an entry isn't finite.
     """
     try:
-        array = loop_array(value)
-        # In a third of the time: a product that is finite has finite factors.
-        if array.shape == (size,) and math.isfinite(array.dot(array)):
-            return array
-        array = np.atleast_1d(array)
+        array = np.atleast_1d(loop_array(value))
     except (TypeError, ValueError):
         raise InputError(f"{name} is {quoted(value)}, {model} needs {size} numbers") from None
     if array.shape != (size,):
