@@ -11,7 +11,7 @@ import pytest
 import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative, runge_kutta, steering
 from vehiclemor.exporting import fmu
-from vehiclemor.exporting.units import base_units
+from vehiclemor.units import base_units
 
 fmpy = pytest.importorskip("fmpy")
 validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
