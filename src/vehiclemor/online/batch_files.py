@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.errors import FileError, InputError, one_line
-from vehiclemor.files import temporary_path, write_whole
+from vehiclemor.files import not_written, temporary_path, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,5 +95,7 @@ def _write_zarr(path: Path, parts: Iterator[xr.Dataset]) -> None:
             }
             part.assign(texts).to_zarr(temporary, consolidated=False, **further)  # type: ignore[call-overload]
         os.replace(temporary, path)
+    except OSError as error:
+        raise not_written(path, error) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

@@ -108,8 +108,6 @@ def simulate_many(
     threads = _cores() if jobs is None else count("jobs", jobs)
     about = _attributes(reduced, runs)
     work = _Work(reduced, chosen, signals, begins, sets)
-    if isinstance(work.own, SingleRuns):
-        work.own.check(signals)
 
     def labelled(found: Found, first: int) -> xr.Dataset:
         return dataset(reduced.model, chosen, kept, found, first).assign_attrs(about)
@@ -172,6 +170,8 @@ class _Work:
         self.reduced, self.chosen, self.signals = reduced, chosen, signals
         self.starts, self.sets = starts, sets
         self.own = runner_of(reduced, chosen)
+        if isinstance(self.own, SingleRuns):
+            self.own.check(signals)
         self._runners: dict[tuple, Runner] = {}
         self._lock = Lock()
 
