@@ -311,8 +311,8 @@ def test_rates_are_those_of_the_steps(pair: Pair) -> None:
     np.testing.assert_allclose((later - state) / dt, mean, rtol=1e-6, atol=1e-6)
 
 
-# Tangents of the high-fidelity vehicle's longest kernels take a quarter of a minute to compile each;
-# the 14-DOF vehicle stands for them.
+# Tangents of the high-fidelity vehicle's longest kernels take a quarter of a minute each to
+# compile; the 14-DOF vehicle stands for them.
 LONG_TO_COMPILE = {
     **dict.fromkeys(("fixed_basis", "global_pod", "pod"), ("state", "inputs")),
     **dict.fromkeys(("balanced_pod", "independent_coordinates"), ("inputs",)),
