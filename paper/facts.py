@@ -20,6 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import in_use
 from fragments import ROOT, manifest, printed_numbers, rendered, rewritten
 
 from vehiclemor import VehiclemorError
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FACTS = ROOT / "paper" / "facts.json"
+# Kinds of sources that one file of the results folder holds.
+FILES = {"benchmark": "benchmark.json", "in_use": in_use.FILE}
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")
 # What an expression may call; everything else is arithmetic.
@@ -99,12 +102,14 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     if kind == "operations":
         return operation_table(model).set_index("kernel").to_xarray()
     if kind == "benchmark":
-        path = folder / "benchmark.json"
+        path = folder / FILES[kind]
         if not path.exists():
             raise VehiclemorError(f"{path}: no such file; `tox -e bench` makes it")
         rows = json.loads(path.read_text(encoding="utf-8"))["benchmarks"]
         values = {_benchmark(row["fullname"]): row["stats"] | row["extra_info"] for row in rows}
         return pd.DataFrame.from_dict(values, "index").rename_axis("name").to_xarray()
+    if kind == "in_use":
+        return in_use.measured(folder)
     if kind == "published":
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
@@ -127,8 +132,8 @@ def stored_files(source: str, folder: Path) -> list[Path]:
     kind, _, model = source.partition(" ")
     if kind in ("operations", "published"):
         return []
-    if kind == "benchmark":
-        return [folder / "benchmark.json"]
+    if kind in FILES:
+        return [folder / FILES[kind]]
     studies = [source]
     if kind == "costs":
         studies = [f"timing-{model}"]
@@ -146,6 +151,7 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
     commands |= {
         "operations": "python paper/regenerate.py",
         "predictive": "vehiclemor compare predictive",
+        "in_use": "python paper/in_use.py",
     }
     written = max((path.stat().st_mtime for path in files), default=None)
     when = datetime.now(UTC) if written is None else datetime.fromtimestamp(written, UTC)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ static double entry(double row, int place)
 {
     return vehiclemor_table[(long)row + place];
 }"""
+# Parameters have their places whether anything here depends on them or not.
+START_ALONE = "of the start alone, no effect here"
 HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
 STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
 
@@ -54,6 +57,10 @@ def _header(system: ExportedSystem, step: float) -> str:
         return [f"   {title}:", *rows]
 
     sizes = system.sizes
+    parameters = [
+        q if i in system.acting else replace(q, long_name=f"{q.long_name}; {START_ALONE}")
+        for i, q in enumerate(system.parameters)
+    ]
     counts = {
         "STATES": sizes["x"],
         "INPUTS": sizes["u"],
@@ -70,7 +77,7 @@ def _header(system: ExportedSystem, step: float) -> str:
         *listed("States x", system.states),
         *listed("Inputs u", system.inputs),
         *listed("Outputs y", system.outputs),
-        *listed("Parameters p", system.parameters),
+        *listed("Parameters p", parameters),
         f"   Starts: {', '.join(starts)} */",
         "",
         "#ifndef VEHICLEMOR_MODEL_H",

@@ -6,7 +6,7 @@ Value references count time, states, their derivatives, inputs, outputs and para
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -36,8 +36,8 @@ class Variable(NamedTuple):
     derivative_of: int | None = None
 
 
-def variables(system: ExportedSystem) -> list[Variable]:
-    """All variables, at the places of their value references."""
+def variables(system: ExportedSystem) -> dict[int, Variable]:
+    """Variables by value reference, in order; without parameters that nothing depends on."""
     start = next(iter(system.starts.values()))
     found = [Variable("time", "s", "time", "independent", "continuous")]
     for quantity, value in zip(system.states, start.tolist(), strict=True):
@@ -54,10 +54,14 @@ def variables(system: ExportedSystem) -> list[Variable]:
         Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated")
         for q in system.outputs
     ]
-    for q, value in zip(system.parameters, system.values.tolist(), strict=True):
+    every, first = dict(enumerate(found)), len(found)
+    for place in sorted(system.acting):
+        q, value = system.parameters[place], float(system.values[place])
         name = f"parameter.{q.name}"
-        found.append(Variable(name, q.unit, q.long_name, "parameter", "tunable", "exact", value))
-    return found
+        every[first + place] = Variable(
+            name, q.unit, q.long_name, "parameter", "tunable", "exact", value
+        )
+    return every
 
 
 def _local(name: str, quantity: Quantity, initial: str, start: float | None = None) -> Variable:
@@ -100,7 +104,7 @@ def model_description(system: ExportedSystem, token: str, step: float, fmi: int)
             files = ElementTree.SubElement(kind, "SourceFiles")
             for name in sources(fmi):
                 ElementTree.SubElement(files, "File", name=name)
-    _units(root, (v.unit for v in every))
+    _units(root, (v.unit for v in every.values()))
     ElementTree.SubElement(
         root,
         "DefaultExperiment",
@@ -109,7 +113,7 @@ def model_description(system: ExportedSystem, token: str, step: float, fmi: int)
         stepSize=repr(COMMUNICATION),
     )
     listed = ElementTree.SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(every):
+    for reference, variable in every.items():
         _variable(listed, variable, reference, fmi)
     _structure(ElementTree.SubElement(root, "ModelStructure"), every, fmi)
     ElementTree.indent(root)
@@ -161,9 +165,9 @@ def _variable(listed: ElementTree.Element, variable: Variable, reference: int, f
         ElementTree.SubElement(scalar, "Real", typed)
 
 
-def _structure(structure: ElementTree.Element, every: list[Variable], fmi: int) -> None:
-    outputs = [i for i, v in enumerate(every) if v.causality == "output"]
-    rates = [i for i, v in enumerate(every) if v.derivative_of is not None]
+def _structure(structure: ElementTree.Element, every: Mapping[int, Variable], fmi: int) -> None:
+    outputs = [i for i, v in every.items() if v.causality == "output"]
+    rates = [i for i, v in every.items() if v.derivative_of is not None]
     kinds = (
         ("Outputs", "Output", outputs),
         ("Derivatives", "ContinuousStateDerivative", rates),

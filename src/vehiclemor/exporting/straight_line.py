@@ -62,6 +62,16 @@ class StraightLine(NamedTuple):
                 needed |= {n.id for n in ast.walk(expression) if isinstance(n, ast.Name)}
         return StraightLine(dict(reversed(kept.items())), self.results)
 
+    def read(self, array: str) -> set[int]:
+        """Places of the entries of an array that the results depend on."""
+        used = self.pruned()
+        return {
+            places(node)[0]
+            for expression in (*used.assignments.values(), *used.results)
+            for node in ast.walk(expression)
+            if isinstance(node, ast.Subscript) and ast.unparse(node.value) == array
+        }
+
 
 def straight_line(
     text: str, given: Mapping[str, Sequence[ast.expr]], before: StraightLine | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
@@ -71,3 +72,11 @@ class ExportedSystem(ShortRepr):
         constants = len(self.functions["constants"].results)
         counts = len(self.states), len(self.inputs), constants, len(self.parameters)
         return dict(zip("xucp", counts, strict=True))
+
+    @cached_property
+    def acting(self) -> set[int]:
+        """Numbers of the parameters that rates or outputs depend on; others shape the start."""
+        constants, rates, outputs = (self.functions[name] for name in SIGNATURES)
+        used = sorted(rates.read("c") | outputs.read("c"))
+        of_these = [constants.results[place] for place in used]
+        return StraightLine(constants.assignments, of_these).read("p")

@@ -19,6 +19,7 @@ FILES = (
     "signal_columns.py",
     "signals.py",
     "steering_maneuvers.py",
+    "suspension_maneuvers.py",
     "metrics.py",
     "study/scenario.py",
     "study/input_range.py",

@@ -11,7 +11,11 @@ import pytest
 import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative, runge_kutta, steering
 from vehiclemor.exporting import fmu
+from vehiclemor.exporting.c import START_ALONE, c_files
+from vehiclemor.exporting.export import system_of
+from vehiclemor.exporting.model_description import variables
 from vehiclemor.exporting.units import base_units
+from vehiclemor.simulation.constants import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")
 validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
@@ -189,6 +193,59 @@ def test_a_parameter_that_is_set_is_the_parameter(started):
     wanted = lighter.derivative(unit.get(states), [0.0])
     assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
     assert np.abs(found - model.rhs(unit.get(states), [0.0])).max() > 0.1
+
+
+@pytest.mark.parametrize("name", ["independent_suspension_vehicle", "high_fidelity_vehicle"])
+def test_parameters_are_those_that_rates_or_outputs_change_with(name, rng):
+    model = vm.model(name)
+    driven = model.start() + 1e-3 * rng.standard_normal(len(model.start()))
+    u = 0.01 * rng.standard_normal(len(model.inputs))
+    system = system_of(model)
+
+    def found(values):
+        constants = hoisted_constants(model.equations, values, ())
+        rates, outputs = np.empty((2, len(driven))), np.empty((2, len(model.outputs)))
+        # At rest slips have other parameters.
+        for x, *results in zip((driven, 1e-3 * driven), rates, outputs, strict=True):
+            for kernel, result in zip(("derivative", "outputs"), results, strict=True):
+                model.kernels.call(kernel, x, u, constants, result)
+        return np.hstack([rates, outputs])
+
+    own, acting = found(system.values), set()
+    for i, q in enumerate(system.parameters):
+        values = system.values.copy()
+        values[i] += 0.01 * max(abs(values[i]), 1.0)
+        if not np.array_equal(found(values), own):
+            acting.add(f"parameter.{q.name}")
+    listed = [v.name for v in variables(system).values() if v.causality == "parameter"]
+    # Where on the axis of the rear arms their pivot lies is in the equations, and cancels.
+    assert set(listed) - acting <= {"parameter.rear_arm_pivot.y"}
+    assert acting <= set(listed)
+    assert "parameter.initial_speed" not in acting
+    header = c_files(system, STEP)["vehiclemor_model.h"]
+    assert header.count(START_ALONE) == len(system.parameters) - len(listed) > 0
+
+
+@pytest.mark.parametrize("case", CASES[:2])
+def test_what_cant_be_set_leaves_all_as_it_was(started, case):
+    _, unit = started(*case)
+    state, output = next(n for n in unit.number if n.startswith("state.")), unit.outputs[0]
+    every = [state, *unit.outputs]
+    before = unit.get(every)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        unit.set([state, output], [before[0] + 5.0, 1.0])
+    assert np.array_equal(unit.get(every), before)
+
+
+@pytest.mark.parametrize("case", CASES[:2])
+@pytest.mark.parametrize("length", [np.inf, np.nan, -0.01, 0.0, 1e7, 1e300])
+def test_a_step_that_no_run_has_is_refused(started, case, length):
+    _, unit = started(*case)
+    every = ["time", *unit.outputs]
+    before = unit.get(every)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        unit.slave.doStep(0.0, length)
+    assert np.array_equal(unit.get(every), before)
 
 
 @pytest.mark.parametrize("case", [CASES[0], CASES[1]])

@@ -225,7 +225,7 @@ STATUS fmi2GetEventIndicators(fmi2Component m, fmi2Real v[], size_t n)
 
 STATUS fmi2DoStep(fmi2Component m, fmi2Real time, fmi2Real length, fmi2Boolean final)
 {
-    return length > 0.0 && advance(m, time, length) ? fmi2OK : fmi2Error;
+    return advance(m, time, length) ? fmi2OK : fmi2Error;
 }
 
 STATUS fmi2GetDirectionalDerivative(fmi2Component m, REFERENCES, const fmi2ValueReference on[],

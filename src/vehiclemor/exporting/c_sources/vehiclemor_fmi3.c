@@ -278,7 +278,7 @@ STATUS fmi3DoStep(fmi3Instance m, fmi3Float64 time, fmi3Float64 length, fmi3Bool
                   fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early,
                   fmi3Float64 *reached)
 {
-    const int fine = length > 0.0 && advance(m, time, length);
+    const int fine = advance(m, time, length);
     *event = *terminate = *early = false;
     *reached = ((Instance *)m)->time;
     return fine ? fmi3OK : fmi3Error;

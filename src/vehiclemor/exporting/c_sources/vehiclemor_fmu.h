@@ -12,6 +12,9 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
+/* Between two exchanges; `long` holds as many everywhere. */
+#define MOST_STEPS 1e9
+
 /* First value reference of each array. */
 enum {
     TIME,
@@ -82,6 +85,7 @@ static int get(Instance *m, const unsigned *numbers, size_t count, double *value
     return 1;
 }
 
+/* All values or, where one can't be set, none. */
 static int set(Instance *m, const unsigned *numbers, size_t count, const double *values)
 {
     size_t i;
@@ -90,9 +94,10 @@ static int set(Instance *m, const unsigned *numbers, size_t count, const double 
         const unsigned n = numbers[i];
         if (!((n >= X && n < DX) || (n >= U && n < Y) || (n >= P && n < END)))
             return 0;
-        *variable(m, n) = values[i];
         changed |= n >= P;
     }
+    for (i = 0; i < count; i++)
+        *variable(m, numbers[i]) = values[i];
     if (changed)
         vehiclemor_constants(m->p, m->c);
     m->known = 0;
@@ -121,12 +126,16 @@ static int directional(Instance *m, const unsigned *unknown, size_t unknowns, co
     return 1;
 }
 
-/* Equal steps, none longer than VEHICLEMOR_STEP, with the inputs held; 0 if the motion diverges. */
+/* Equal steps, none longer than VEHICLEMOR_STEP, with the inputs held; 0 if the motion diverges,
+   and for a length that is no number, not above zero or more than any run has. */
 static int advance(Instance *m, double time, double length)
 {
-    const long steps = 1 + (long)(length / VEHICLEMOR_STEP - 1e-9);
-    long n;
+    const double count = length / VEHICLEMOR_STEP;
+    long steps, n;
     int i;
+    if (!(length > 0.0 && count <= MOST_STEPS))
+        return 0;
+    steps = 1 + (long)(count - 1e-9);
     for (n = 0; n < steps; n++)
         vehiclemor_step(m->x, m->u, m->u, m->c, length / (double)steps);
     m->time = time + length;

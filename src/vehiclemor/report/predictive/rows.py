@@ -68,7 +68,8 @@ def method_rows(
 
     `runs` are judged; of these `misses` miss a bound, `silent` ones with the status ok; `flagged`
     are those of which the model says that it has left what it knows.  `rate_bound`: largest rate of
-    misses that is not excluded at 95 %, of this draw, and `pooled_bound` of all of the ledger.
+    misses that is not excluded at 95 %, of this draw, and `pooled_bound` of all of the ledger; of
+    the chosen row of what each draw had chosen.
     `score` is the largest error of a bounded output as a multiple of its bound (infinite if a run
     has failed), `seconds` the mean of whole calls, `loop_seconds` of their compiled loops, with the
     `spread` of the rounds (interquartile range over median).  `ratio_equal` and `ratio_equal_loop`
@@ -85,7 +86,8 @@ def method_rows(
     ]
     for row in rows:
         row.update(_against(row, full, ladders))
-        misses, silent, runs = pooled(draws or (), row["method"], dataset.attrs.get("rules", ""))
+        label = None if row["winner"] else row["method"]
+        misses, silent, runs = pooled(draws or (), dataset.attrs.get("rules", ""), label)
         row |= {"pooled_misses": misses, "pooled_silent": silent, "pooled_runs": runs}
         row["pooled_bound"] = upper_bound(misses, runs) if runs else math.nan
     return rows

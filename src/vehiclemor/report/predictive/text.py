@@ -138,7 +138,7 @@ def _draw_text(draws: list[Row], winner: Row | None) -> str:
     text = (
         f"{runs} runs drawn on {str(last['date'])[:10]} (seal {str(last['digest'])[:10]}), {apart} "
         f"more apart, on which the full order is sensitive. {len(same)} draws under these rules "
-        f"stand in the ledger, {silent} of them not finished; in all together {winner['method']} "
+        f"stand in the ledger, {silent} of them not finished; in all together what was chosen then "
         f"has {missed} misses, {unsaid} of them silent, of {of} runs: a rate below "
         f"{short(100.0 * winner['pooled_bound'])} %."
     )

@@ -12,6 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vehiclemor.codegen.process_lock import locked
 from vehiclemor.errors import FileError
 from vehiclemor.files import write_text
@@ -115,14 +117,28 @@ class Ledger:
                 write_text(path, "\n".join(lines) + "\n")
 
 
-def pooled(entries: Iterable[Drawn], row: str, rules: str) -> tuple[int, int, int]:
-    """Misses, silent misses and runs of a row in all draws under the same rules."""
-    rows = [(e.rows[row], e.runs) for e in entries if row in e.rows and e.rules == rules]
-    return (
-        sum(found.misses for found, _ in rows),
-        sum(found.silent for found, _ in rows),
-        sum(runs for _, runs in rows),
+def pooled(entries: Iterable[Drawn], rules: str, row: str | None = None) -> tuple[int, int, int]:
+    """Misses, silent misses and runs in all draws under the same rules.
+
+    Parameters
+    ----------
+    row
+        Label of a row; by default what each draw had chosen, whatever its label.
+
+    Notes
+    -----
+    A draw counts once, with the worst of its results.
+    """
+    worst: dict[str, tuple[int, int, int]] = {}
+    for entry in entries:
+        for label, shown in entry.rows.items():
+            if entry.rules == rules and (shown.winner if row is None else label == row):
+                result = shown.misses, shown.silent, entry.runs
+                worst[entry.digest] = max(result, worst.get(entry.digest, result))
+    misses, silent, runs = (
+        np.array([*worst.values()], dtype=int).reshape(-1, 3).sum(axis=0).tolist()
     )
+    return misses, silent, runs
 
 
 def _files(name: str, folder: Path, data: Path | None) -> Sequence[Path]:

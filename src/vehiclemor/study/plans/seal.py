@@ -18,8 +18,10 @@ from vehiclemor.study.scenario import Scenario, parameters_of
 
 # Sets that models have learned from or were chosen by.
 LEARNED = ("training", "validation")
-# Source that decides what is drawn and how it is judged.
-JUDGING = ("boxes", "seal", "sensitive", "choice", "calibration", "protocol_results")
+# Source that decides what is drawn, run and timed, and how it is judged.
+PLANS = ("boxes", "calibration", "choice", "protocol", "protocol_file", "protocol_results")
+RUNS = ("plans/protocol_run", "plans/seal", "plans/sensitive", "experiment", "timing", "workers")
+JUDGING = (*(f"plans/{name}" for name in PLANS), *RUNS)
 
 
 def rules(protocol: Protocol) -> str:
@@ -49,7 +51,7 @@ def seal(protocol: Protocol, rows: Sequence[Row]) -> str:
         ],
         "validation": [scenario.content for scenario in protocol.sets["validation"]],
         "protocol": [protocol.path.stem, protocol.own],
-        "judging": source_digest((), [f"study/plans/{name}.py" for name in JUDGING], ()),
+        "judging": source_digest((), [f"study/{name}.py" for name in JUDGING], ()),
         "rules": rules(protocol),
     }
     text = json.dumps(content, sort_keys=True)
