@@ -51,6 +51,10 @@ class Signal(Maneuver):
     def __post_init__(self) -> None:
         """The constructors have checked."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy takes along: addresses are its own."""
+        return super().__getstate__() | {"kept": {}}
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Signal) and self._identity == other._identity
 
