@@ -56,6 +56,28 @@ def test_the_full_model_answers_as_the_model_itself(full):
     np.testing.assert_array_equal(full.outputs(path, inputs), rows)
 
 
+def test_the_order_of_named_columns_changes_no_trust():
+    t = np.linspace(0.0, 2.0, 101)
+    u = np.column_stack([0.1 * np.sin(t), 0.01 * np.cos(t)])
+    trained = vm.reduce(
+        WISHBONE, "polynomial_residual", training=[vm.Signal.from_samples(t, 1.01 * u)]
+    )
+    steered = np.column_stack([0.0 * t, 0.02 * np.sin(t)])
+    named = trained.inputs[::-1]
+    one = trained.simulate(vm.Signal.from_samples(t, steered))
+    other = trained.simulate(vm.Signal.from_samples(t, steered[:, ::-1], inputs=named))
+    assert one.trust == other.trust
+    assert one.trust.indicator > 1.5
+    first = vm.Signal.from_samples(t, u[:, 0], inputs=trained.inputs[:1])
+    assert trained.simulate(first).trust.indicator < 1.0
+    again = vm.reduce(
+        WISHBONE,
+        "polynomial_residual",
+        training=[vm.Signal.from_samples(t, 1.01 * u[:, ::-1], inputs=named)],
+    )
+    np.testing.assert_array_equal(again.input_range.largest, trained.input_range.largest)
+
+
 def test_a_run_is_a_dataset_when_asked(linear):
     run = linear.simulate("step_steer", start="dropped")
     dataset = linear.dataset(run)
