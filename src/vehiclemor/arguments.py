@@ -84,4 +84,9 @@ def file_path(name: str, value: object) -> Path:
     """
     if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in str(value):
         raise InputError(f"{name}: {quoted(value)} is not a path")
-    return Path(value)
+    path = Path(value)
+    try:
+        path.exists()
+    except OSError as error:
+        raise InputError(f"{name}: {quoted(value)} is not a path ({error.strerror})") from None
+    return path

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from vehiclemor.errors import InputError
 
 # Times that differ by so little, relative to what they are, are one.
 ROUNDING = 1e-12
@@ -120,7 +123,17 @@ def through(times: np.ndarray, values: np.ndarray, hold: str) -> Pieces:
     """Polynomials through samples (n, inputs) by one of `HOLDS`."""
     if hold == "zero":
         return held(times, values)
-    return joined(times, bent(times, values), CONTINUOUS[hold](times, values))
+    coefficients = polynomials(times, values, hold)
+    return joined(times, bent(times, values), coefficients)
+
+
+def polynomials(times: np.ndarray, values: np.ndarray, hold: str) -> np.ndarray:
+    """Coefficients by one of `CONTINUOUS`; `InputError` if they overflow."""
+    with np.errstate(all="ignore"), suppress(ValueError):
+        coefficients = CONTINUOUS[hold](times, values)
+        if np.isfinite(coefficients).all():
+            return coefficients
+    raise InputError("samples of a signal: the polynomials through them are not finite")
 
 
 def joined(times: np.ndarray, bends: np.ndarray, coefficients: np.ndarray) -> Pieces:
@@ -137,6 +150,7 @@ def bent(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return bent_by_column(times, values).any(axis=1) | quiet_ends(times, moves)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def bent_by_column(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     """At which of the inner samples (n - 2, inputs) the slope changes otherwise than beside it.
 

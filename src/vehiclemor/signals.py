@@ -15,6 +15,7 @@ from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checke
 from vehiclemor.piecewise import HOLDS, Pieces, through
 from vehiclemor.registry import unknown
 from vehiclemor.signal_columns import array_columns, csv_columns
+from vehiclemor.units import base_units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,6 +52,10 @@ class Signal(Maneuver):
     def __post_init__(self) -> None:
         """The constructors have checked."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy takes along: addresses are its own."""
+        return super().__getstate__() | {"kept": {}}
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Signal) and self._identity == other._identity
 
@@ -69,7 +74,7 @@ class Signal(Maneuver):
         u: Any,
         hold: str = "linear",
         *,
-        inputs: Sequence[str] = (),
+        inputs: str | Sequence[str] = (),
         output_step: float = OUTPUT_STEP,
         name: str = "signal",
     ) -> Signal:
@@ -100,6 +105,8 @@ class Signal(Maneuver):
             raise unknown("hold", hold, HOLDS)
         times, values = _samples(t, u)
         names = _names(inputs, values.shape[1])
+        if not isinstance(name, str) or not name:
+            raise InputError(f"name is {quoted(name)}, not a text")
         duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
         samples = _output_samples(duration, output_step)
         pieces = through(times, values, hold)
@@ -205,7 +212,7 @@ class Signal(Maneuver):
         duration: float,
         hold: str = "cubic",
         *,
-        inputs: Sequence[str] = (),
+        inputs: str | Sequence[str] = (),
         step: float = FUNCTION_STEP,
         **further: Any,
     ) -> Signal:
@@ -235,7 +242,7 @@ class Signal(Maneuver):
         hold: str = "linear",
         *,
         time: str = "time",
-        inputs: Sequence[str] | Mapping[str, str] = (),
+        inputs: str | Sequence[str] | Mapping[str, str] = (),
         **further: Any,
     ) -> Signal:
         """A signal through the rows of a CSV file, whose first line names its columns.
@@ -255,7 +262,7 @@ class Signal(Maneuver):
             If there is no such file, or it is none.
         """
         file = file_path("path", path)
-        columns = csv_columns(file)
+        columns = csv_columns(file), {}
         return cls._of_columns(str(file), columns, time, inputs, hold, further)
 
     @classmethod
@@ -265,7 +272,7 @@ class Signal(Maneuver):
         hold: str = "linear",
         *,
         time: str = "time",
-        inputs: Sequence[str] | Mapping[str, str] = (),
+        inputs: str | Sequence[str] | Mapping[str, str] = (),
         **further: Any,
     ) -> Signal:
         """A signal through labelled data.
@@ -274,7 +281,7 @@ class Signal(Maneuver):
         ----------
         data
             Dataset with one variable an input, array of one input, or array of several whose second
-            dimension names them, as the `inputs` of a result.
+            dimension names them, as the `inputs` of a result.  If they tell `units`, these are of SI.
         time
             Dimension of the times in s.
         inputs
@@ -289,21 +296,26 @@ class Signal(Maneuver):
     def _of_columns(
         cls,
         where: str,
-        columns: Mapping[str, np.ndarray],
+        table: tuple[Mapping[str, np.ndarray], Mapping[str, str]],
         time: str,
-        inputs: Sequence[str] | Mapping[str, str],
+        inputs: str | Sequence[str] | Mapping[str, str],
         hold: str,
         further: Mapping[str, Any],
     ) -> Signal:
-        """A signal of named columns, one of which holds the times."""
+        """A signal of named columns, one of which holds the times, with units where they tell."""
+        columns, units = table
         chosen = inputs or [name for name in columns if name != time]
-        chosen = chosen if isinstance(chosen, Mapping) else dict(zip(chosen, chosen, strict=True))
-        for name in (time, *chosen.values()):
+        named = chosen if isinstance(chosen, Mapping) else {name: name for name in _listed(chosen)}
+        for name in _listed([time, *named.values()]):
             if name not in columns:
                 known = ", ".join(columns)
                 raise InputError(f"{where}: there is no column {quoted(name)} among {known}")
-        values = np.column_stack([columns[name] for name in chosen.values()] or [np.empty(0)])
-        return cls.from_samples(columns[time], values, hold, inputs=[*chosen], **further)
+            powers = base_units(units.get(name, ""))
+            if powers is None or (name == time and powers not in ({}, {"s": 1})):
+                wanted = "s" if name == time else "SI units such as m, rad or m/s"
+                raise InputError(f"{where}: {quoted(name)} is in {units[name]}, not in {wanted}")
+        values = np.column_stack([columns[name] for name in named.values()] or [np.empty(0)])
+        return cls.from_samples(columns[time], values, hold, inputs=[*named], **further)
 
 
 def _no_function(*_: Any) -> np.ndarray:
@@ -345,13 +357,18 @@ def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _names(inputs: Any, columns: int) -> tuple[str, ...]:
     """Names of the columns, or none."""
-    whole = isinstance(inputs, Sequence) and not isinstance(inputs, str)
-    if not whole or not all(isinstance(name, str) for name in inputs):
-        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
-    names = tuple(inputs)
+    names = _listed(inputs)
     if len(set(names)) < len(names) or len(names) not in (0, columns):
         raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
     return names
+
+
+def _listed(inputs: Any) -> tuple[str, ...]:
+    """Names, of which one may stand alone."""
+    names = (inputs,) if isinstance(inputs, str) else inputs
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
+    return tuple(names)
 
 
 def _output_samples(duration: float, step: Any) -> int:

@@ -207,6 +207,13 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         ("time,delta\n0,1\n1,2\n", {"inputs": ["s"]}, "no column 's' among time, delta"),
         ("time,delta\n0,1\n1,two\n", {}, "is not a number or a list of numbers"),
         ("time,delta\n0,1\n1,\n", {}, r"u\[1\] is not finite"),
+        ("time,delta\n0,1,2\n1,2,3\n", {}, "no CSV file: .* in line 2, saw 3"),
+        ("time,delta\n0,1,\n1,2,\n", {}, "no CSV file"),
+        ("time,delta\n0,1\n1,2,3\n", {}, "no CSV file"),
+        ("time,delta,delta\n0,1,2\n1,2,3\n", {"inputs": ["delta"]}, "columns have the same name"),
+        ("time,delta\n0,1\n1,2\n", {"inputs": 3}, "inputs is 3, not a list of names"),
+        ("time,delta\n0,1\n1,2\n", {"inputs": {"d": ["delta"]}}, "not a list of names"),
+        ("time,delta\n0,1\n1,2\n", {"inputs": "d"}, "no column 'd' among"),
     ],
 )
 def test_wrong_csv_files_are_refused_in_one_line(tmp_path, content, given, told):
@@ -216,6 +223,56 @@ def test_wrong_csv_files_are_refused_in_one_line(tmp_path, content, given, told)
     with pytest.raises(VehiclemorError, match=told) as raised:
         vm.Signal.from_csv(path, **given)
     assert "\n" not in str(raised.value)
+
+
+def test_one_name_may_stand_alone(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,delta,speed\n0,1,2\n1,2,3\n")
+    assert vm.Signal.from_csv(path, inputs="delta").inputs == ("delta",)
+    assert vm.Signal.from_samples([0.0, 1.0], [0.0, 1.0], inputs="delta").inputs == ("delta",)
+
+
+@pytest.mark.parametrize(
+    ("time", "unit", "told"),
+    [
+        ("s", "rad", ""),
+        ("s", "m s-2", ""),
+        (None, None, ""),
+        ("ms", "rad", "'time' is in ms, not in s"),
+        ("rad", "rad", "'time' is in rad, not in s"),
+        ("s", "deg", "'a' is in deg, not in SI units such as"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["array", "set", "columns"])
+def test_units_are_those_of_si(kind, time, unit, told):
+    attributes = [{"units": text} if text else {} for text in (time, unit)]
+    times = ("time", [0.0, 1.0], attributes[0])
+    data = xr.DataArray([1.0, 2.0], {"time": times}, "time", "a", attributes[1])
+    if kind == "set":
+        data = xr.Dataset({"a": data, "other": data.assign_attrs(units="km/h")})
+    elif kind == "columns":
+        data = data.expand_dims(input=["a"])
+    if not told:
+        assert vm.Signal.from_xarray(data, inputs="a").inputs == ("a",)
+        return
+    with pytest.raises(InputError, match=told):
+        vm.Signal.from_xarray(data, inputs="a")
+
+
+@pytest.mark.parametrize("name", [None, "time"])
+def test_arrays_need_a_name_of_their_own(name):
+    with pytest.raises(InputError, match="the data: ValueError") as raised:
+        vm.Signal.from_xarray(xr.DataArray([1.0, 2.0], {"time": [0.0, 1.0]}, "time", name))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("hold", ["linear", "cubic"])
+def test_polynomials_that_overflow_are_refused(hold):
+    with pytest.raises(InputError, match="polynomials through them are not finite"):
+        vm.Signal.from_samples([0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0], hold)
+    with pytest.raises(InputError, match="name is None"):
+        vm.Signal.from_samples([0.0, 1.0], [0.0, 1.0], name=None)
 
 
 def test_data_without_times_are_refused():

@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 from vehiclemor.exporting.c import MODEL, STEPPER, TANGENT
 from vehiclemor.exporting.system import TOOL, ExportedSystem
-from vehiclemor.exporting.units import base_units
 from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.units import base_units
 
 CAPABILITIES = {
     2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"),

@@ -96,26 +96,43 @@ def parameter_sets(
             f"parameters: {reduced.method} was fitted to one parameter set; "
             f"other ones are for the full model"
         )
+    declared = reduced.model.definition.parameters
     if isinstance(parameters, Mapping):
-        declared = reduced.model.definition.parameters
-        columns = {}
-        for name, value in parameters.items():
-            if name not in declared:
-                raise unknown("parameter", name, declared)
-            try:
-                array = real_array(value)
-            except (TypeError, ValueError):
-                raise InputError(f"parameter {name}: {quoted(value)} is not a number") from None
-            own = () if declared[name].size == 1 else (declared[name].size,)
-            if array.shape not in (own, (runs, *own)):
-                raise InputError(
-                    f"parameter {name} has shape {array.shape}, not {own} or {(runs, *own)}"
-                )
-            columns[name] = np.broadcast_to(array, (runs, *own)).tolist()
+        columns = {
+            name: [*map(_plain, _parameter(name, value, declared, runs))]
+            for name, value in parameters.items()
+        }
         names = [*columns]
         return [
             tuple(zip(names, values, strict=True)) for values in zip(*columns.values(), strict=True)
         ] or None
-    if not isinstance(parameters, Sequence) or len(parameters) != runs:
+    whole = isinstance(parameters, Sequence) and len(parameters) == runs
+    if not whole or not all(isinstance(own, Mapping) for own in parameters):
         raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
-    return [tuple(own.items()) for own in parameters]
+    return [
+        tuple((name, _plain(_parameter(name, value, declared))) for name, value in own.items())
+        for own in parameters
+    ]
+
+
+def _parameter(
+    name: str, value: Any, declared: Mapping[str, Any], runs: int | None = None
+) -> np.ndarray:
+    """Value (size,) of a parameter, or values (runs, size) of all runs; no axis for size 1."""
+    if name not in declared:
+        raise unknown("parameter", name, declared)
+    try:
+        array = real_array(value)
+    except (TypeError, ValueError):
+        raise InputError(f"parameter {name}: {quoted(value)} is not a number") from None
+    own = () if declared[name].size == 1 else (declared[name].size,)
+    shapes = [own] if runs is None else [own, (runs, *own)]
+    if array.shape not in shapes:
+        wanted = " or ".join(map(str, shapes))
+        raise InputError(f"parameter {name} has shape {array.shape}, not {wanted}")
+    return np.broadcast_to(array, shapes[-1])
+
+
+def _plain(value: np.ndarray) -> Any:
+    """A number or a tuple of numbers, which can be a key."""
+    return tuple(value.tolist()) if value.ndim else value.item()

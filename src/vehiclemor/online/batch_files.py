@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.errors import FileError, InputError, one_line
-from vehiclemor.files import make_folder, temporary_path, write_whole
+from vehiclemor.files import not_written, temporary_path, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,18 +22,17 @@ def checked_target(path: Path) -> Path:
     """A path that batches can be written to; `InputError` or `FileError` if it is none."""
     if path.suffix not in (NETCDF, ZARR):
         raise InputError(f"path: {path} ends neither in {NETCDF} nor in {ZARR}")
+    if path.exists():
+        raise FileError(f"{path}: exists already; move it away")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: there is no such folder")
     if path.suffix == ZARR:
-        if path.exists():
-            raise FileError(f"{path}: exists already; move it away")
         try:
             import zarr  # noqa: F401
         except ImportError:
             raise InputError(
                 f"path: {path} needs the package zarr: pip install 'vehiclemor[zarr]'"
             ) from None
-    elif path.is_dir():
-        raise FileError(f"{path}: is a folder, not a file")
-    make_folder(path.parent)
     return path
 
 
@@ -96,5 +95,7 @@ def _write_zarr(path: Path, parts: Iterator[xr.Dataset]) -> None:
             }
             part.assign(texts).to_zarr(temporary, consolidated=False, **further)  # type: ignore[call-overload]
         os.replace(temporary, path)
+    except OSError as error:
+        raise not_written(path, error) from None
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

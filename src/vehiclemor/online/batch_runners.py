@@ -85,17 +85,22 @@ class SingleRuns:
     def __init__(self, reduced: ReducedOrderModel, chosen: Selection) -> None:
         self.reduced, self.chosen = reduced, chosen
 
+    def check(self, signals: Sequence[Maneuver]) -> None:
+        """Raise `InputError` if times are chosen that aren't the signals' own."""
+        distinct = [signals.first] if isinstance(signals, Signals) else signals
+        if self.chosen.times is None or all(self.chosen.samples(s)[0] is None for s in distinct):
+            return
+        raise InputError(f"times: {self.reduced.method} gives only the signals' own")
+
     def found(self, signals: Sequence[Maneuver], starts: Sequence[Start]) -> Found:
         """Results of the runs in their order."""
         if isinstance(signals, Signals):
             signals = signals.apart()
-        times, rows = self.chosen.samples(signals[0])
+        _, rows = self.chosen.samples(signals[0])
         columns, counts = self.chosen.columns, self.reduced.model.counts
         found = Found.empty(len(signals), (len(rows), len(columns)), len(counts))
         for run, (signal, start) in enumerate(zip(signals, starts, strict=True)):
-            times, rows = self.chosen.samples(signal)
-            if times is not None:
-                raise InputError(f"times: {self.reduced.method} gives only the signals' own")
+            _, rows = self.chosen.samples(signal)
             done = attempt(lambda: self.reduced.simulate(signal, start))  # noqa: B023
             if isinstance(done, Failure):
                 found.refuse({run: done.message}, done.status)

@@ -13,7 +13,7 @@ from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_stages import addresses, batch_loop, stage
-from vehiclemor.piecewise import CONTINUOUS, Pieces, bent_by_column, joined, quiet_ends
+from vehiclemor.piecewise import CONTINUOUS, Pieces, bent_by_column, joined, polynomials, quiet_ends
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
 from vehiclemor.simulation.input_polynomials import SIGNAL_LOOPS, recorded_inputs, signal_of
@@ -80,7 +80,8 @@ class Signals(Sequence[Signal], ShortRepr):
         output_step: float = OUTPUT_STEP,
     ) -> None:
         try:
-            times, values = real_array(t), real_array(u)
+            # Copies, which nobody else can change after the checks.
+            times, values = real_array(t).copy(), real_array(u).copy()
         except (TypeError, ValueError) as error:
             raise InputError(f"samples of signals: {one_line(error)}") from None
         if values.ndim not in (2, 3) or not len(values) or values.shape[1:2] != times.shape:
@@ -88,6 +89,7 @@ class Signals(Sequence[Signal], ShortRepr):
                 f"samples of signals: t has shape {times.shape} and u {values.shape}, "
                 f"not (n,) and (runs, n) or (runs, n, inputs)"
             )
+        times.flags.writeable = values.flags.writeable = False
         self.u, self.hold = values.reshape(*values.shape[:2], -1), hold
         self._given = {"inputs": inputs, "output_step": output_step}
         # One of them is checked with all that they share.
@@ -161,7 +163,7 @@ class Signals(Sequence[Signal], ShortRepr):
         runs, n, columns = self.u.shape
         times = self.t - self.t[0]
         side_by_side = self.u.swapaxes(0, 1).reshape(n, runs * columns)
-        found = CONTINUOUS[self.hold](times, side_by_side).reshape(n - 1, runs, columns, -1)
+        found = polynomials(times, side_by_side, self.hold).reshape(n - 1, runs, columns, -1)
         coefficients = np.ascontiguousarray(found.swapaxes(0, 1))
         kinks = bent_by_column(times, side_by_side).reshape(n - 2, runs, columns)
         moves = np.diff(self.u, axis=1) != 0.0

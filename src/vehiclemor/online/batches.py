@@ -24,7 +24,7 @@ from vehiclemor.online.batch_arguments import (
 )
 from vehiclemor.online.batch_files import checked_target, opened, written
 from vehiclemor.online.batch_result import Found, Selection, dataset, selected
-from vehiclemor.online.batch_runners import Runner, runner_of
+from vehiclemor.online.batch_runners import Runner, SingleRuns, runner_of
 from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.simulation.build import reparametrised
@@ -78,11 +78,12 @@ def simulate_many(
         Names of outputs, coordinates or speeds to be kept; all outputs by default.
     times
         Times in s at which they are kept; the output times of the signals by default.  A run is
-        watched at its own output times whatever is kept.
+        watched at its own output times whatever is kept.  Models whose runs are done one by one
+        give only some of these.
     jobs
         Number of threads; by default as many as there are cores.
     path
-        File (`.nc`) or new folder (`.zarr`) to which the runs are written chunk by chunk, so that
+        New file (`.nc`) or folder (`.zarr`) to which the runs are written chunk by chunk, so that
         memory stays bounded; it is there once all are done.
 
     Returns
@@ -168,14 +169,17 @@ class _Work:
     ) -> None:
         self.reduced, self.chosen, self.signals = reduced, chosen, signals
         self.starts, self.sets = starts, sets
-        self._runners: dict[tuple, Runner] = {(): runner_of(reduced, chosen)}
+        self.own = runner_of(reduced, chosen)
+        if isinstance(self.own, SingleRuns):
+            self.own.check(signals)
+        self._runners: dict[tuple, Runner] = {}
         self._lock = Lock()
 
     def __call__(self, part: slice) -> Found:
         """Results of the runs in a slice."""
         signals, starts = self.signals[part], self.starts[part]
         if self.sets is None:
-            return self._runners[()].found(signals, starts)
+            return self.own.found(signals, starts)
         sets = self.sets[part]
         # In the order in which they come, so that equal neighbours share a model.
         bounds = [k for k in range(1, len(sets)) if sets[k] != sets[k - 1]]

@@ -72,7 +72,7 @@ def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
 def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
     """Inputs, and of a dynamic model their rates, at the output times."""
     times = maneuver.times
-    values = maneuver.at(times)
+    values = maneuver.for_inputs(model.inputs).at(times)
     if model.kind == "ae":
         return values
     rates = np.gradient(values, times, axis=0) if len(times) > 1 else np.zeros_like(values)

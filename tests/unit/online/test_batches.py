@@ -221,6 +221,41 @@ def test_signals_are_a_sequence_of_signals():
     assert repr(signals) == "Signals(runs=5, duration=4.0, hold='cubic', inputs=())"
 
 
+def test_what_a_caller_does_to_the_samples_later_is_not_seen():
+    t, u = TIMES.copy(), steering(2)
+    signals = vm.Signals(t, u)
+    t *= 2.0
+    u[1, 5] = np.nan
+    np.testing.assert_array_equal(signals.t, TIMES)
+    np.testing.assert_array_equal(signals.u[:, :, 0], steering(2))
+    with pytest.raises(ValueError, match="read-only"):
+        signals.u[0] = 0.0
+
+
+def test_times_between_those_of_runs_one_by_one_are_refused_before_the_first(monkeypatch):
+    mechanism = vm.reduce(MECHANISM, "full_order")
+    signals = vm.Signals(TIMES, np.zeros((2, 41, 2)))
+    own = vm.simulate_many(mechanism, signals, times=[0.5, 1.0])
+    assert own.time.values.tolist() == [0.5, 1.0]
+    monkeypatch.setattr(batches, "_chunks", None)
+    for chosen in (signals, list(signals)):
+        with pytest.raises(InputError, match="full_order gives only the signals' own"):
+            vm.simulate_many(mechanism, chosen, times=[0.505])
+
+
+def test_points_are_parameters_by_run():
+    model = vm.model(MECHANISM)
+    name = next(n for n, q in model.definition.parameters.items() if q.size == 3)
+    point = np.asarray(model.parameters[name])
+    points = [point.tolist(), (point + 1e-3).tolist()]
+    signals = vm.Signals(TIMES, np.zeros((2, 41, 2)))
+    found = vm.simulate_many(model, signals, parameters={name: points})
+    listed = vm.simulate_many(model, signals, parameters=[{name: p} for p in points])
+    np.testing.assert_array_equal(found["values"], listed["values"])
+    other = vm.model(MECHANISM, parameters={name: points[1]}).simulate(signals[1])
+    np.testing.assert_array_equal(found["values"][1], other.outputs)
+
+
 STATE = [0.0] * 27
 
 
@@ -240,6 +275,10 @@ STATE = [0.0] * 27
         ({"parameters": {"mass": 1.0}}, "unknown parameter 'mass'"),
         ({"parameters": {"sprung_mass": [1.0] * 3}}, "has shape (3,), not () or (2,)"),
         ({"parameters": [{}]}, "not a mapping for each run"),
+        ({"parameters": [None] * 2}, "not a mapping for each run"),
+        ({"parameters": [{"mass": 1.0}] * 2}, "unknown parameter 'mass'"),
+        ({"parameters": [{"sprung_mass": np.ones(1)}] * 2}, "has shape (1,), not ()"),
+        ({"path": f"{'x' * 300}.nc"}, "is not a path (File name too long)"),
         ({"path": "runs.txt"}, "ends neither in .nc nor in .zarr"),
         ({"model": 3}, "model is 3"),
     ],
@@ -257,8 +296,14 @@ def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
     with pytest.raises(InputError, match="guarded was fitted to one parameter set"):
         vm.simulate_many(reduced, signals, parameters={"sprung_mass": 1400.0})
     (tmp_path / "runs.nc").mkdir()
-    with pytest.raises(FileError, match="is a folder"):
+    with pytest.raises(FileError, match="exists already"):
         vm.simulate_many(full, signals, path=tmp_path / "runs.nc")
+    with pytest.raises(FileError, match="there is no such folder"):
+        vm.simulate_many(full, signals, path=tmp_path / "new" / "runs.nc")
+    (tmp_path / "mine.nc").write_text("mine")
+    with pytest.raises(FileError, match="exists already"):
+        vm.simulate_many(full, signals, path=tmp_path / "mine.nc")
+    assert (tmp_path / "mine.nc").read_text() == "mine"
     monkeypatch.setattr(batches, "LARGEST", 1000)
     with pytest.raises(InputError, match="GB of memory: choose outputs= and times="):
         vm.simulate_many(full, signals)

@@ -14,12 +14,12 @@ DERIVED = {
 
 
 def base_units(unit: str) -> dict[str, int] | None:
-    """Powers of base units in a unit such as `N s/m`; none where a name is unknown."""
+    """Powers of base units in a unit such as `N s/m` or `m s-1`; none where a name is unknown."""
     powers: dict[str, int] = {}
     numerator, *denominators = unit.split("/")
     for sign, part in ((1, numerator), *((-1, part) for part in denominators)):
         for factor in part.split():
-            match = re.fullmatch(r"([A-Za-z]+)(?:\^(-?\d+))?", factor)
+            match = re.fullmatch(r"([A-Za-z]+)(?:\^?(-?\d+))?", factor)
             if factor == "1":
                 continue
             if match is None or match[1] not in DERIVED:
