@@ -281,7 +281,7 @@ class Signal(Maneuver):
         ----------
         data
             Dataset with one variable an input, array of one input, or array of several whose second
-            dimension names them, as the `inputs` of a result.  If they tell `units`, these are of SI.
+            dimension names them, as the `inputs` of a result.  If they tell `units`, these are SI.
         time
             Dimension of the times in s.
         inputs
