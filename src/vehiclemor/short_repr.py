@@ -26,6 +26,10 @@ class ShortRepr:
         # A dataclass makes its own where a class has none in itself.
         cls.__repr__ = ShortRepr.__repr__
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy takes along: not what is kept for runs, which points into memory."""
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
+
     def __repr__(self) -> str:
         fields = self.repr_fields or [f.name for f in dataclasses.fields(self)]  # type: ignore[arg-type]
         texts = (f"{name}={_short(getattr(self, name))}" for name in fields)

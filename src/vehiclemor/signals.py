@@ -52,6 +52,10 @@ class Signal(Maneuver):
     def __post_init__(self) -> None:
         """The constructors have checked."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy takes along: addresses are its own."""
+        return super().__getstate__() | {"kept": {}}
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Signal) and self._identity == other._identity
 
@@ -277,7 +281,7 @@ class Signal(Maneuver):
         ----------
         data
             Dataset with one variable an input, array of one input, or array of several whose second
-            dimension names them, as the `inputs` of a result.  Units that they tell are of SI.
+            dimension names them, as the `inputs` of a result.  If they tell `units`, these are SI.
         time
             Dimension of the times in s.
         inputs

@@ -298,6 +298,23 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
         np.testing.assert_allclose(found / scale, run.states[sample] / scale, rtol=1e-6, atol=1e-6)
 
 
+def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
+    fit = pair.fit()
+    if not hasattr(fit, "state_space"):
+        pytest.skip(f"{pair.name} gives whole runs alone")
+    rom, run = ReducedOrderModel(pair.model, pair.name, {}, (), fit), pair.run(fit)
+    for start in pair.model.starts[::-1]:
+        state = rom.state(start, run.inputs[0])
+        after = rom.step(state, run.inputs[0], 1e-9)
+        np.testing.assert_allclose(after, state, rtol=1e-6, atol=1e-6)
+    # The last one is the run's.
+    found = rom.outputs(state, run.inputs[0])
+    if pair.name in TRAINED_ON:
+        # Their runs are recorded from the start itself, of which a state is the slow part.
+        found = pair.model.outputs_at(pair.model.start()[None], run.inputs[:1])[0]
+    np.testing.assert_allclose(found, run.outputs[0], rtol=1e-6, atol=1e-6)
+
+
 def test_rates_are_those_of_the_steps(pair: Pair) -> None:
     reduced = pair.fit()
     if pair.model.kind == "ae" or not hasattr(reduced, "state_space"):

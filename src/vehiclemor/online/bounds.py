@@ -103,6 +103,7 @@ def _check_vehicle(part: ReducedVehicle) -> None:
     if len(reach.lasted):
         modes, starts = len(part.transient.rates), len(reach.begun)
         _shaped("lasted", (reach.lasted, 2 * lifted.lateral, LEVELS), (reach.decaying, modes))
+        _shaped("steered", (reach.steered, modes))
         _shaped("starts", (reach.left, n), (reach.starts, starts, n), (reach.begun, starts))
 
 

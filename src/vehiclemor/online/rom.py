@@ -18,7 +18,7 @@ from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_positive, checked_array, checked_path, limits_of
+from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
@@ -134,7 +134,11 @@ class ReducedOrderModel(ShortRepr):
         return trajectory_dataset(self.model, run)
 
     def state(self, start: Start | None = None, inputs: Any = None) -> np.ndarray:
-        """State (dim,) of a start of the full model.
+        """State (dim,) of a start of the full model, as `simulate` begins with it.
+
+        Of a projected model it lies in the subspace, and so does what a step gives; `outputs` and
+        `full_state` take a state as it is.  Of a method that fits slow motion (`slow_manifold`,
+        `two_track`, `guarded`) it is the slow part; runs are recorded from the start itself.
 
         Parameters
         ----------
@@ -231,7 +235,8 @@ class ReducedOrderModel(ShortRepr):
         """How far a state, or states (samples, dim), go in what the model knows.
 
         A model that does not judge itself knows the inputs that it was trained on, and the full
-        one the ranges of validity that it declares.  Where a run came from is not in a state.
+        one the ranges of validity of inputs and outputs that it declares.  Where a run came from is
+        not in a state.
         """
         states, u, _ = self._samples(state, inputs)
         found = self.state_space.trust(states, u)
@@ -241,13 +246,14 @@ class ReducedOrderModel(ShortRepr):
         return Trust(np.inf, 0.0, left) if left else found or Trust(0.0)
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
-        """Which output is beyond what the full model declares, if one is."""
-        names, places, ranges = limits_of(self.model.definition)
-        if not names:
-            return ""
-        outputs = self.outputs(states, inputs)
-        for name, place, (low, high) in zip(names, places, ranges, strict=False):
-            values = outputs[:, place]
+        """Which input or output is beyond what the full model declares, if one is."""
+        validity = self.model.definition.validity
+        columns = dict(zip(self.inputs, inputs.T, strict=True))
+        if not validity.keys() <= columns.keys():
+            outputs = self.outputs(states, inputs).T
+            columns = dict(zip(self.output_names, outputs, strict=True)) | columns
+        for name, (low, high) in validity.items():
+            values = columns[name]
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
@@ -270,15 +276,24 @@ class ReducedOrderModel(ShortRepr):
         """
         from vehiclemor.online.model_file import Saved, write
 
-        training = [run.content if isinstance(run, Scenario) else run for run in self.training]
-        how = self.method, self.settings, tuple(training)
+        how = self.method, self.settings, self._content
         return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
+
+    @property
+    def _content(self) -> tuple[Mapping[str, Any], ...]:
+        return tuple(run.content if isinstance(run, Scenario) else run for run in self.training)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy takes along: of the training what a file keeps, a maneuver may be local."""
+        return super().__getstate__() | {"training": self._content, "known": self.input_range}
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""
         if np.ndim(state) < 2:
             return self._state(state)[None], self._inputs(inputs)[None], True
         states = checked_path(state, self._dim, "states")
+        if not len(states):
+            raise InputError("states are none: one sample is needed at least")
         return states, checked_path(inputs, len(self.inputs), "inputs", len(states)), False
 
     def _state(self, state: Any) -> np.ndarray:

@@ -113,8 +113,8 @@ class ReducedSystem(ShortRepr):
         return self.names or tuple(self.model.definition.states)
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
-        """State (dim,) of a start."""
-        return self._encoded(start, inputs).copy()
+        """State (dim,) of a start, as `simulate` begins with it: in the first window's subspace."""
+        return self.stepper.projected(self._encoded(start, inputs), inputs).copy()
 
     @cached_property
     def stepper(self) -> Stepper:

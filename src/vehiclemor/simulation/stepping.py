@@ -173,29 +173,45 @@ class Stepper:
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (n,) of a state; of a projected one where its subspace is nearest."""
-        spaces, n = self.windows, len(state)
-        rates = self._evaluated("derivative", state, inputs, n)
-        if spaces.formulation == "full":
+        n, half = len(state), len(state) // 2
+        place = self.projected(state, inputs, time)
+        rates = self._evaluated("derivative", place, inputs, n)
+        if self.windows.formulation == "full":
             return rates
-        window = next(self._parts(time, 2.0 * SHORTEST))[2]
-        rank, mean = int(spaces.ranks[window]), state if self.moved else spaces.means[window]
-        trial, test = spaces.trial_basis[window, :rank], spaces.test_basis[window, :rank]
-        if spaces.formulation == "state":
-            place = mean + test @ (state - mean) @ trial
-            return test @ self._evaluated("derivative", place, inputs, n) @ trial
-        half = n // 2
-        trial, test = trial[: rank // 2, :half], test[: rank // 2, :half]
-        q = mean[:half] + test @ (state[:half] - mean[:half]) @ trial
-        moved = test @ rates[:half] @ trial
-        speeds = self._evaluated("speeds", np.concatenate([q, moved]), inputs, half)
-        place = np.concatenate([q, speeds])
+        _, trial, test = self._subspace(state, time)
+        if self.windows.formulation == "state":
+            return test @ rates @ trial
+        q, moved = place[:half], test @ rates[:half] @ trial
         table = self._evaluated("second_order", place, inputs, half * (half + 1))
         mass, force = np.split(table.reshape(half, half + 1), [half], axis=1)
         projected = np.linalg.solve(trial @ mass @ trial.T, trial @ force)[:, 0] @ trial
         # Speeds are linear in the rates, so their change is too in what projection takes away.
         change = np.concatenate([q, projected - np.linalg.solve(mass, force)[:, 0]])
-        free = self._evaluated("derivative", place, inputs, n)[half:]
-        return np.concatenate([moved, free + self._evaluated("speeds", change, inputs, half)])
+        change = self._evaluated("speeds", change, inputs, half)
+        return np.concatenate([moved, rates[half:] + change])
+
+    def projected(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
+        """State (n,) where the subspace of its time is nearest: there a step begins."""
+        if self.windows.formulation == "full":
+            return state
+        mean, trial, test = self._subspace(state, time)
+        n, half = len(state), trial.shape[1]
+        q = mean[:half] + test @ (state[:half] - mean[:half]) @ trial
+        if half == n:
+            return q
+        rates = test @ self._evaluated("derivative", state, inputs, n)[:half] @ trial
+        moved = np.concatenate([q, rates])
+        return np.concatenate([q, self._evaluated("speeds", moved, inputs, half)])
+
+    def _subspace(self, state: np.ndarray, time: float) -> tuple[np.ndarray, ...]:
+        """Origin (n,) and bases by rows: of states (r, n), or of coordinates (r / 2, n / 2)."""
+        spaces, window = self.windows, next(self._parts(time, 2.0 * SHORTEST))[2]
+        rows, columns = int(spaces.ranks[window]), len(state)
+        if spaces.formulation == "coordinates":
+            rows, columns = rows // 2, columns // 2
+        mean = state if self.moved else spaces.means[window]
+        trial, test = (b[window, :rows, :columns] for b in (spaces.trial_basis, spaces.test_basis))
+        return mean, trial, test
 
     def derivatives(
         self, state: np.ndarray, inputs: np.ndarray, time: float, by: Along

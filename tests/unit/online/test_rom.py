@@ -1,5 +1,7 @@
 """A model in use: what it is made of, what it gives, and what it refuses with one clear line."""
 
+import copy
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -126,6 +128,56 @@ def test_nothing_is_trusted_where_the_full_model_means_nothing(full):
     assert "the model holds" in full.trust(lying, [0.0]).reason
 
 
+@pytest.mark.parametrize("delta", [1e10, -1.1])
+def test_inputs_that_a_run_refuses_are_not_trusted(full, delta):
+    assert full.trust(full.state(), [1.0]).reason == ""
+    assert "delta is" in full.trust(full.state(), [delta]).reason
+    with pytest.raises(InputError, match="holds from"):
+        full.simulate(vm.Signal.from_samples([0.0, 1.0], [0.0, delta]))
+
+
+def answers(rom: ReducedOrderModel) -> list[np.ndarray]:
+    """What it gives to all kinds of questions, which fills all that it keeps."""
+    x, u = rom.state(), np.zeros(len(rom.inputs))
+    signal = vm.Signal.from_samples([0.0, 0.5, 1.0], np.outer([0.0, 0.01, 0.0], u + 1.0))
+    return [rom.simulate(run).outputs for run in (signal, None)] + [
+        rom.step(x, u, 0.01),
+        rom.outputs(x, u),
+        np.array(rom.trust(x, u).indicator),
+    ]
+
+
+@pytest.mark.parametrize("name", ["full", "linear", "wishbone"])
+def test_a_copy_of_a_used_model_is_the_same(request, name):
+    rom = request.getfixturevalue(name)
+    known = answers(rom)
+    for copied in (copy.deepcopy(rom), pickle.loads(pickle.dumps(rom))):  # noqa: S301
+        for found, expected in zip(answers(copied), known, strict=True):
+            np.testing.assert_array_equal(found, expected)
+        assert copied.input_range.longest == rom.input_range.longest
+
+
+def test_a_copied_signal_does_not_point_into_the_first_one(linear):
+    signal = vm.Signal.from_samples([0.0, 0.5, 1.0], [0.0, 0.01, 0.0])
+    expected = linear.simulate(signal).outputs
+    copied = pickle.loads(pickle.dumps(signal))  # noqa: S301
+    assert signal.kept
+    assert not copied.kept
+    np.testing.assert_array_equal(linear.simulate(copied).outputs, expected)
+
+
+def test_slopes_of_a_path_map_are_those_of_its_outputs(wishbone):
+    u, h = np.array([0.03, 0.002]), 1e-4
+    found = wishbone.jacobian(wishbone.state(inputs=u), u, "inputs", of="outputs")
+
+    def outputs(v):
+        return wishbone.outputs(wishbone.state(inputs=v), v)
+
+    slopes = [(outputs(u + e) - outputs(u - e)) / (2.0 * h) for e in h * np.eye(2)]
+    # Those of the outputs' own polynomials, which `simulate` records, are off by interpolation.
+    np.testing.assert_allclose(found.T, slopes, rtol=1e-6, atol=1e-6)
+
+
 def test_outside_of_its_training_a_path_map_tells_so(wishbone):
     q = wishbone.state(inputs=[0.05, 0.01])
     solved = wishbone.model.solve([0.05, 0.01])
@@ -209,6 +261,9 @@ def test_a_wrong_sample_is_refused(linear):
     states = np.zeros((3, 6))
     with pytest.raises(InputError, match=r"inputs have shape \(2, 1\), not \(3, 1\)"):
         linear.outputs(states, np.zeros((2, 1)))
+    for function in (linear.outputs, linear.full_state, linear.trust):
+        with pytest.raises(InputError, match="states are none"):
+            function(states[:0], np.zeros((0, 1)))
     with pytest.raises(InputError, match=r"states have shape \(3, 5\)"):
         linear.outputs(states[:, :5], np.zeros((3, 1)))
 

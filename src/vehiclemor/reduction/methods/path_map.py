@@ -134,18 +134,20 @@ class PathMapModel(ShortRepr):
         return tangent(source, source.arguments[0], len(self.columns), len(self.ranges))
 
     def _slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
-        """Derivatives of coordinates or outputs by the inputs."""
+        """Derivatives of coordinates, or of the model's outputs there, by the inputs."""
         if by != "inputs" or of not in ("coordinates", "outputs"):
             raise InputError("path_map: derivatives are of coordinates or outputs, by inputs")
-        del state
         cells = self.cells
         place = ((inputs - cells.centres) * cells.scales + 1.0) * cells.halves
         numbers = np.clip(place, 0.0, cells.tops).astype(int)
         cell = np.ravel_multi_index(tuple(numbers), tuple(cells.numbers))
         arrays = 2.0 * (place - numbers) - 1.0, cells.coefficients[cell].ravel()
         table = self._tangent.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
-        n = len(self.model.coordinates)
-        return table[:n] if of == "coordinates" else table[n:]
+        moved = table[: len(self.model.coordinates)]
+        if of == "coordinates":
+            return moved
+        own, along = (self.model.derivatives(of, state, inputs, by) for by in ("inputs", "state"))
+        return own + along @ moved
 
     def _along(self, times: np.ndarray, inputs: np.ndarray, given: Ready) -> Trajectory:
         """Polynomials at inputs (samples, inputs), also as the loop takes them."""

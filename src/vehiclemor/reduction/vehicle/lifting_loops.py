@@ -9,8 +9,9 @@ from vehiclemor.simulation.path_loops import kernel_path, lane_path
 
 # What has decayed to this part of what it was is nothing.
 NOTHING = 1e-14
-# Parts of a range in which time is counted, and below which nothing moves.
-LEVELS, MOVING = 8, 0.02
+# Parts of a range in which time is counted, and what of it is hardly moving, and not at all.
+PARTS, MOVING, STILL = 8, 0.02, 1e-4
+LEVELS = PARTS + 1
 # What is told besides, and a time (s) that is hardly after the start.
 BESIDES, SOON = 4, 1e-3
 
@@ -142,9 +143,11 @@ def durations(times, states, column, lasted, spent):
         later = span * (end - times[sample] + span)
         for k in range(columns):
             size = abs(states[sample, column + k])
-            if size > MOVING:
-                moving = min(moving, sample)
-                level = int(LEVELS * size) if size < 1.0 else LEVELS - 1
+            if size > STILL:
+                level = 0
+                if size > MOVING:
+                    moving = min(moving, sample)
+                    level = 1 + int(PARTS * size) if size < 1.0 else PARTS
                 spent[k, level] += span
                 spent[columns + k, level] += later
     for row in range(2 * columns):
@@ -166,7 +169,7 @@ def overstayed(times, states, column, lasted, spent):
         for k in range(columns):
             size = abs(states[sample, column + k])
             for level in range(LEVELS):
-                if size > max(level / LEVELS, MOVING):
+                if size > (max((level - 1) / PARTS, MOVING) if level else STILL):
                     spent[k, level] += span
                 spent[columns + k, level] += span * spent[k, level]
                 if (

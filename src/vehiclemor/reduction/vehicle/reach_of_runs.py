@@ -28,6 +28,7 @@ def training_reach(
     shape, features, transient = reduced.shape, reduced.features, reduced.transient
     lateral = features.lateral
     lasted, sideways, decaying, left, starts = [], [MOVING], [], [], []
+    faded, amplitudes = [], []
     for given, run in zip(training, runs, strict=True):
         path = reduced.path(given.maneuver, given.start)
         if path is None:
@@ -36,21 +37,30 @@ def training_reach(
         sizes = np.abs(sizes[:, shape.layout.size :])[:, :lateral]
         lasted.append(durations(run.time, sizes)[-1])
         sideways.append(float(sizes[0].max(initial=0.0)))
+        excited = reduced.excited(run.states[0])
+        at = run.time[(sizes > MOVING).any(axis=1)]
+        if excited.size and len(at):
+            faded.append(float(at[0]))
+            amplitudes.append(np.hypot(*excited[1].T))
         later = after_landing(transient, shape, run)
         moving = (sizes[-len(later.time) :] > MOVING).any(axis=1)
         deviations = shape.of(later.states) - shape.reference
         decaying.append(np.abs(deviations[moving] @ transient.left.T).max(axis=0, initial=0.0))
         left.append(np.abs(reduced.remainder(later.states, later.inputs)).max(axis=0))
-        starts.append(
-            reduced.remainder(run.states[:1], run.inputs[:1], reduced.excited(run.states[0]))[0]
-        )
+        starts.append(reduced.remainder(run.states[:1], run.inputs[:1], excited)[0])
     leaves, steered = np.max(left, axis=0), np.max(decaying, axis=0)
     _, sizes, directions = np.linalg.svd(np.array(starts) / leaves, full_matrices=False)
     directions = directions[sizes > UNLIKE]
+    lasted, longest = np.max(lasted, axis=0), max(run.time[-1] for run in runs)
+    # A little may last as long as any run does, and no longer.
+    lasted[:lateral, 0], lasted[lateral:, 0] = longest, longest**2
+    amplitudes = np.max(amplitudes or [np.zeros_like(steered)], axis=0)
     return TrainingReach(
-        LONGER * np.maximum(np.max(lasted, axis=0), SHORTEST),
+        LONGER * np.maximum(lasted, SHORTEST),
         max(sideways),
         BESIDE * np.maximum(steered, ROUNDING * steered.max(initial=1.0)),
+        min(faded, default=0.0) / LONGER,
+        np.maximum(amplitudes, ROUNDING * amplitudes.max(initial=0.0)),
         leaves,
         directions,
         np.abs(np.array(starts) / leaves @ directions.T).max(axis=0),

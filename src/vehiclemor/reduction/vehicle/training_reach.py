@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING
+from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING, PARTS, STILL
 
 # A run may last so many times as long as any training run, and this (s) where none has been.
 LONGER, SHORTEST = 1.05, 0.1
@@ -19,6 +19,8 @@ LONGER, SHORTEST = 1.05, 0.1
 UNLIKE = 3.0
 # Part of the steered motion's own amplitudes that a start's transient may have beside it.
 BESIDE = 0.3
+# What is left, beside its modes, of a start's motion when training runs begin to be steered.
+FADED = 0.01
 # Decay (1/s) that is none.
 SLOWEST = 1e-6
 # What is told besides ranges, in the order of the loop.
@@ -28,7 +30,7 @@ REASONS = (
     "it starts sideways, as no training run does",
     "its start leaves more than the slow motion, unlike any training run",
 )
-BEYOND = np.array([MOVING, *np.arange(1, LEVELS) / LEVELS])
+BEYOND = np.array([STILL, MOVING, *np.arange(1, PARTS) / PARTS])
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,9 @@ class TrainingReach:
         How far the starts use the ranges of these columns.
     decaying
         Amplitudes (modes,) that a start's transient may have in a run that is steered.
+    faded, steered
+        When (s) known starts that excite modes were steered first, 0 if none was, and their
+        amplitudes (modes,).
     left
         What lifting leaves of the states of the shape (n,).
     starts, begun
@@ -53,6 +58,8 @@ class TrainingReach:
     lasted: np.ndarray
     sideways: float
     decaying: np.ndarray
+    faded: float
+    steered: np.ndarray
     left: np.ndarray
     starts: np.ndarray
     begun: np.ndarray
@@ -62,9 +69,15 @@ class TrainingReach:
         rates, amplitudes = excited
         if not len(rates) or not len(self.decaying):
             return 0.0
-        larger = np.maximum(np.hypot(*amplitudes.T) / self.decaying, 1.0)
+        sizes = np.hypot(*amplitudes.T)
+        larger = np.maximum(sizes / self.decaying, 1.0)
         # What does not decay never settles.
-        return float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
+        settled = float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
+        if not self.faded:
+            return settled
+        # Slower motion of the start is in the reduced states; it is as large as that of the modes.
+        larger = max(float((sizes / self.steered).max()) / FADED, 1.0)
+        return max(settled, self.faded * np.log(larger) / -np.log(FADED))
 
     def unlike(self, remainder: np.ndarray) -> float:
         """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
@@ -76,7 +89,14 @@ class TrainingReach:
 
 
 NOTHING_KNOWN = TrainingReach(
-    np.zeros((0, LEVELS)), MOVING, np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros(0)
+    np.zeros((0, LEVELS)),
+    MOVING,
+    np.zeros(0),
+    0.0,
+    np.zeros(0),
+    np.zeros(0),
+    np.zeros((0, 0)),
+    np.zeros(0),
 )
 
 
