@@ -18,8 +18,7 @@ def csv_columns(path: Path) -> dict[str, np.ndarray]:
     try:
         # A longer row, of which an index would be made, is refused here; names are not yet altered.
         names = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str).iloc[0]
-        # Numbers to the last digit, as they were written.
-        table = pd.read_csv(path, skipinitialspace=True, float_precision="round_trip")
+        table = pd.read_csv(path, skipinitialspace=True)
     except FileNotFoundError:
         raise FileError(f"{path}: no such file") from None
     except OSError as error:
