@@ -198,7 +198,13 @@ def test_a_power_law_is_interpolated_exactly(error):
 def test_the_fastest_ladder_counts_that_reaches_the_error():
     slow, fast = ladder("slow", 3.0, [1.0, 0.001], 2.0), ladder("fast", 3.0, [1.0, 0.1])
     assert at_error([slow, fast], 0.2, "seconds").rows == ("fast 1.0", "fast 0.1")
-    assert at_error([slow, fast], 0.05, "seconds").rows == ("slow 1.0", "slow 0.001")
+    assert at_error([slow, fast], 0.04, "seconds").rows == ("slow 1.0", "slow 0.001")
+    # Just beyond its end the fast one is continued by its own law, not replaced by the slow one.
+    (first, last), continued = fast, at_error([slow, fast], 0.06, "seconds")
+    law = math.log(last["seconds"] / first["seconds"]) / math.log(last["score"] / first["score"])
+    expected = last["seconds"] * (0.06 / last["score"]) ** law
+    assert continued.rows == ("fast 1.0", "fast 0.1")
+    assert continued.seconds == pytest.approx(expected, rel=1e-12)
     assert at_error([slow, fast], 5.0, "seconds") == (1.0, ("fast 1.0",))
     assert math.isnan(at_error([slow, fast], 1e-6, "seconds").seconds)
 

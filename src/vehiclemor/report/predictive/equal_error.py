@@ -2,6 +2,8 @@
 
 A ladder is one integrator at several tolerances.  Its useful rows form a curve of time over error;
 between two of them it is taken as a power law, which is what an integrator of fixed order gives.
+A ladder that ends just above the error is continued by the law of its last two rows: else a slower
+integrator would stand in for it.
 """
 
 import math
@@ -10,6 +12,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from vehiclemor.report.predictive.targets import Row
+
+# Smallest part of the error of its last row to which a ladder is continued.
+CONTINUED = 0.5
 
 
 class Equal(NamedTuple):
@@ -20,7 +25,7 @@ class Equal(NamedTuple):
     seconds
         Of a run; NaN if no ladder reaches the error.
     rows
-        The rows between which it lies, or the one that is used.
+        The rows between which it lies or which are continued, or the one that is used.
     """
 
     seconds: float
@@ -45,11 +50,12 @@ def _useful(ladder: Sequence[Row], clock: str) -> list[Row]:
 
 
 def _on(curve: Sequence[Row], error: float, clock: str) -> Equal:
-    if not curve or not error >= curve[-1]["score"]:
+    if not curve or not error >= curve[-1]["score"] * (CONTINUED if len(curve) > 1 else 1.0):
         return Equal(math.nan)
     if error >= curve[0]["score"]:
         return Equal(curve[0][clock], (curve[0]["method"],))
-    loose, tight = next(pair for pair in pairwise(curve) if error >= pair[1]["score"])
+    further = (pair for pair in pairwise(curve) if error >= pair[1]["score"])
+    loose, tight = next(further, (curve[-2], curve[-1]))
     if tight["score"] <= 0.0:
         return Equal(tight[clock], (tight["method"],))
     part = math.log(error / loose["score"]) / math.log(tight["score"] / loose["score"])
