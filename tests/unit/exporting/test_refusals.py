@@ -64,7 +64,7 @@ def test_nothing_is_replaced_unasked(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     command = ["export", CAR, "--method", "shipped", "--to", "c"]
     assert main(command) == 0
-    folder = tmp_path / f"{CAR}_guarded"
+    folder = tmp_path / f"{CAR}_{vm.rom(CAR).method}"
     assert capsys.readouterr().out == f"written: {folder.name}\n"
     written = {path.name: path.read_text() for path in folder.iterdir()}
     assert main(command) == 2

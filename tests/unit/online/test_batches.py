@@ -12,6 +12,7 @@ import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.online import batches
 from vehiclemor.registry import component
+from vehiclemor.simulation.trajectory import FINISHED
 
 CAR, MECHANISM = "independent_suspension_vehicle", "double_wishbone"
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -66,7 +67,7 @@ def test_runs_are_those_alone(which, start, kept, request):
     model = request.getfixturevalue(which)
     signals = vm.Signals(TIMES, steering(6), "cubic")
     found = vm.simulate_many(model, signals, start, **kept)
-    assert (found.status == "ok").all()
+    assert found.status.isin(FINISHED).all()
     check_alone(model, signals, found, start)
 
 
@@ -103,10 +104,13 @@ def test_what_fails_is_a_result_beside_the_others(reduced, full):
     starts = ["equilibrium", thrown, *["equilibrium"] * 3]
     for model in (reduced, full):
         found = vm.simulate_many(model, signals, starts, **KEPT)
-        assert found.status.values.tolist() == ["ok", "diverged", "ok", "rejected", "ok"]
+        # A reduced car that comes to its end says that it does not know such a start.
+        failed = "diverged" if model is full else "untrusted"
+        assert found.status.values.tolist() == ["ok", failed, "ok", "rejected", "ok"]
         assert "delta is" in found.message.item(3)
-        assert "roll is" in found.message.item(1)
-        assert np.isnan(found["values"][[1, 3]]).all()
+        assert ("roll is" if model is full else "start") in found.message.item(1)
+        assert np.isnan(found["values"][3]).all()
+        assert np.isnan(found["values"][1]).all() == (model is full)
         others = [0, 2, 4]
         alone = vm.simulate_many(model, vm.Signals(TIMES, u[others], "cubic"), **KEPT)
         np.testing.assert_array_equal(found["values"][others], alone["values"])
@@ -293,7 +297,7 @@ def test_wrong_input_is_one_line(changes, line, full):
 
 def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
     signals = vm.Signals(TIMES, steering(2))
-    with pytest.raises(InputError, match="guarded was fitted to one parameter set"):
+    with pytest.raises(InputError, match="was fitted to one parameter set"):
         vm.simulate_many(reduced, signals, parameters={"sprung_mass": 1400.0})
     (tmp_path / "runs.nc").mkdir()
     with pytest.raises(FileError, match="exists already"):
