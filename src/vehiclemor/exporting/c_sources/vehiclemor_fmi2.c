@@ -187,28 +187,17 @@ STATUS fmi2SetTime(fmi2Component m, fmi2Real time)
 
 STATUS fmi2SetContinuousStates(fmi2Component m, const fmi2Real x[], size_t n)
 {
-    if (n != VEHICLEMOR_STATES)
-        return fmi2Error;
-    memcpy(((Instance *)m)->x, x, n * sizeof *x);
-    ((Instance *)m)->known = 0;
-    return fmi2OK;
+    return set_states(m, x, n) ? fmi2OK : fmi2Error;
 }
 
 STATUS fmi2GetContinuousStates(fmi2Component m, fmi2Real x[], size_t n)
 {
-    if (n != VEHICLEMOR_STATES)
-        return fmi2Error;
-    memcpy(x, ((Instance *)m)->x, n * sizeof *x);
-    return fmi2OK;
+    return get_states(m, x, n) ? fmi2OK : fmi2Error;
 }
 
 STATUS fmi2GetDerivatives(fmi2Component m, fmi2Real dx[], size_t n)
 {
-    if (n != VEHICLEMOR_STATES)
-        return fmi2Error;
-    evaluate(m);
-    memcpy(dx, ((Instance *)m)->dx, n * sizeof *dx);
-    return fmi2OK;
+    return get_rates(m, dx, n) ? fmi2OK : fmi2Error;
 }
 
 STATUS fmi2GetNominalsOfContinuousStates(fmi2Component m, fmi2Real v[], size_t n)

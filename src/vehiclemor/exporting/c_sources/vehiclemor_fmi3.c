@@ -226,28 +226,17 @@ STATUS fmi3SetTime(fmi3Instance m, fmi3Float64 time)
 
 STATUS fmi3SetContinuousStates(fmi3Instance m, const fmi3Float64 x[], size_t n)
 {
-    if (n != VEHICLEMOR_STATES)
-        return fmi3Error;
-    memcpy(((Instance *)m)->x, x, n * sizeof *x);
-    ((Instance *)m)->known = 0;
-    return fmi3OK;
+    return set_states(m, x, n) ? fmi3OK : fmi3Error;
 }
 
 STATUS fmi3GetContinuousStates(fmi3Instance m, fmi3Float64 x[], size_t n)
 {
-    if (n != VEHICLEMOR_STATES)
-        return fmi3Error;
-    memcpy(x, ((Instance *)m)->x, n * sizeof *x);
-    return fmi3OK;
+    return get_states(m, x, n) ? fmi3OK : fmi3Error;
 }
 
 STATUS fmi3GetContinuousStateDerivatives(fmi3Instance m, fmi3Float64 dx[], size_t n)
 {
-    if (n != VEHICLEMOR_STATES)
-        return fmi3Error;
-    evaluate(m);
-    memcpy(dx, ((Instance *)m)->dx, n * sizeof *dx);
-    return fmi3OK;
+    return get_rates(m, dx, n) ? fmi3OK : fmi3Error;
 }
 
 STATUS fmi3GetNominalsOfContinuousStates(fmi3Instance m, fmi3Float64 v[], size_t n)

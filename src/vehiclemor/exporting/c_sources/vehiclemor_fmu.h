@@ -145,3 +145,30 @@ static int advance(Instance *m, double time, double length)
             return 0;
     return 1;
 }
+
+/* Continuous states and their rates as a tool's integrator has them: 0 if their number is wrong. */
+static int set_states(Instance *m, const double x[], size_t n)
+{
+    if (n != VEHICLEMOR_STATES)
+        return 0;
+    memcpy(m->x, x, n * sizeof *x);
+    m->known = 0;
+    return 1;
+}
+
+static int get_states(const Instance *m, double x[], size_t n)
+{
+    if (n != VEHICLEMOR_STATES)
+        return 0;
+    memcpy(x, m->x, n * sizeof *x);
+    return 1;
+}
+
+static int get_rates(Instance *m, double dx[], size_t n)
+{
+    if (n != VEHICLEMOR_STATES)
+        return 0;
+    evaluate(m);
+    memcpy(dx, m->dx, n * sizeof *dx);
+    return 1;
+}
