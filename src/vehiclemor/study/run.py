@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+import logging
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,9 +21,11 @@ from vehiclemor.study.workers import Workers
 if TYPE_CHECKING:
     import xarray as xr
 
+_LOG = logging.getLogger("vehiclemor")
 MOST_JOBS = 1024
-# Points of a grid that take their time before the first is computed.
-LARGE = 10_000
+# A grid of so many points is told of before it is expanded; and so many experiments are made and
+# given to workers at a time.
+LARGE, AT_ONCE = 10_000, 5_000
 
 
 def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
@@ -50,23 +53,26 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
     results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
     for path, grid in grids:
         cells = grid.unique
-        workers = Workers(grid.name, folder, jobs)
-        workers([[cell] for cell in cells.values()])
+        workers = Workers(grid.name, folder, jobs, asked=set(cells))
+        experiments = iter(cells.values())
+        while part := [[cell] for cell in islice(experiments, AT_ONCE)]:
+            workers(part)
         results[grid.name] = stored(
             folder / "studies" / f"{grid.name}.nc",
             "cells",
             cells_digest(grid),
             partial(grid_dataset, grid, folder),
-            [result_path(folder, key) for key in cells],
+            (result_path(folder, key) for key in cells),
             file_as_stored(path, folder),
         )
     return results
 
 
 def _expanded(name: str, definition: StudyFile) -> Grid:
-    large = definition.points >= LARGE
-    with telling(f"{name}: a grid of {definition.points} points") if large else nullcontext():
+    if definition.points < LARGE:
+        return expand(name, definition)
+    _LOG.info("%s: %d grid points", name, definition.points)
+    with telling(f"{name}: checking all of them"):
         grid = expand(name, definition)
-        # Made here: the keys take most of the time.
-        assert grid.unique
-        return grid
+    _LOG.info("%s: %d cells; an interrupted run is resumed", name, len(grid.unique))
+    return grid

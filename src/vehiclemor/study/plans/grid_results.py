@@ -25,8 +25,7 @@ def cells_digest(grid: Grid) -> str:
     """Hash of a study and its cells at their places, for a combined dataset to be current."""
     digest = hashlib.sha256(grid.definition.model_dump_json().encode())
     digest.update(layout_digest().encode())
-    for place, cell in grid.cells.items():
-        digest.update(f"{place} {cell.key}".encode())
+    digest.update(grid.keys.tobytes())
     return digest.hexdigest()[:20]
 
 
