@@ -191,7 +191,7 @@ def _integrated(
 
 
 def _implicit(model: AlgebraicModel, run: Trajectory, directions: np.ndarray) -> np.ndarray:
-    """Derivatives (samples, components, n) of a mechanism's coordinates: dq = -Phi_q^-1 Phi_p dp."""
+    """Derivatives (samples, components, n) of coordinates: dq = -Phi_q^-1 Phi_p dp."""
     samples, n = run.coordinates.shape
     held = np.hstack((run.coordinates, np.zeros((samples, n * len(directions)))))
     change = _tangents(model, "residual", held, run.inputs, directions)
