@@ -10,7 +10,7 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
-from vehiclemor.study.scenario import Scenario, own_speed
+from vehiclemor.study.scenario import Scenario, car_of, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
 SPEED_SLACK = 0.01
@@ -81,4 +81,4 @@ def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
 
 def _speed(model: Model, scenario: Scenario) -> float:
     """Initial speed in m/s; zero of a model that has none."""
-    return scenario.speed or own_speed(model) or 0.0
+    return scenario.speed or own_speed(car_of(model, scenario)) or 0.0
