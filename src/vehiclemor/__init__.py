@@ -26,7 +26,10 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.online.sensitivities import sensitivities as sensitivities
     from vehiclemor.signals import Signal as Signal
+    from vehiclemor.study.objectives import objective as objective
+    from vehiclemor.study.objectives import objectives as objectives
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -42,6 +45,8 @@ _DEFINED_IN = {
     "export": "vehiclemor.exporting.export",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
+    **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
+    "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
@@ -57,10 +62,13 @@ __all__ = [
     "methods",
     "model",
     "models",
+    "objective",
+    "objectives",
     "plot",
     "reduce",
     "rom",
     "run_study",
+    "sensitivities",
     "simulate",
     "simulate_many",
     "studies",

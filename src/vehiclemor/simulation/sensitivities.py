@@ -14,12 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.arguments import quoted
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import unknown
+from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.constants import SMALLEST, constants_along, starts_along
+from vehiclemor.simulation.constants import components as numbers_of
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.kernel_derivatives import address_of_tangent, lanes_of
@@ -30,8 +32,6 @@ from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.run_plans import Solver
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
-AXES = "xyz"
-
 
 class Component(NamedTuple):
     """A number among a model's parameters.
@@ -39,7 +39,7 @@ class Component(NamedTuple):
     Attributes
     ----------
     label
-        The parameter's name, of a point's coordinate with `_x`, `_y` or `_z`.
+        The parameter's name, of a point's component with its axis (`joint.z`).
     unit
         SI unit.
     number
@@ -91,38 +91,35 @@ class Sensitivities(NamedTuple):
     outputs: np.ndarray
 
 
-def components(model: Model, names: Sequence[str]) -> tuple[Component, ...]:
-    """Components of parameters by name, of a point all or that which is named (`..._z`).
+def components(model: Model, names: str | Sequence[str]) -> tuple[Component, ...]:
+    """Numbers of parameters by name: all three of a point, or one (`joint.z`).
 
     Raises
     ------
     InputError
         If a name is none of the model's parameters, or there is none.
     """
-    wanted = [names] if isinstance(names, str) else list(names)
-    known: dict[str, list[Component]] = {}
-    flat = model.parameters.flat()
-    for name, declared in model.definition.parameters.items():
-        number = sum(map(len, known.values()))
-        labels = [name] if declared.size == 1 else [f"{name}_{axis}" for axis in AXES]
-        known[name] = [
-            Component(label, declared.unit, number + k, float(flat[number + k]))
-            for k, label in enumerate(labels)
-        ]
-    single = {own.label: [own] for group in known.values() for own in group}
-    for name in wanted:
-        if name not in known and name not in single:
-            raise unknown("parameter", name, known)
-    found = dict.fromkeys(own for name in wanted for own in known.get(name) or single[name])
+    wanted = (names,) if isinstance(names, str) else names
+    if not isinstance(wanted, Sequence) or not all(isinstance(name, str) for name in wanted):
+        raise InputError(f"parameters is {quoted(names)}, no list of names")
+    declared, flat = model.definition.parameters, model.parameters.flat()
+    found: dict[int, Component] = {}
+    for given in wanted:
+        name, axis = parameter_and_axis(model.name, declared, given)
+        for k, number in enumerate(numbers_of(model.definition, name)):
+            if axis in (None, k):
+                label = name if declared[name].size == 1 else f"{name}.{AXES[k]}"
+                unit = declared[name].unit
+                found[number] = Component(label, unit, number, float(flat[number]))
     if not found:
-        raise InputError(f"parameters are none: {model.name} has {', '.join(known)}")
-    return tuple(found)
+        raise InputError(f"parameters are none: {model.name} has {', '.join(declared)}")
+    return tuple(found.values())
 
 
 def sensitivities(
     model: Model,
     maneuver: Maneuver,
-    names: Sequence[str],
+    names: str | Sequence[str],
     start: Start | None = None,
     tolerance: float | None = None,
 ) -> Sensitivities:
