@@ -340,7 +340,7 @@ def reduce(
         If a name or value is wrong, or the method can't reduce the model.
     """
     from vehiclemor.progress import first_use
-    from vehiclemor.reduction.validation import checked_fit, validated
+    from vehiclemor.reduction.validation import fitted, validated
     from vehiclemor.simulation.build import build
     from vehiclemor.study.linear_algebra import one_thread
     from vehiclemor.study.scenario import training_run
@@ -355,5 +355,5 @@ def reduce(
     scenarios = training_set(ready, method, training)
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
-        fitted = checked_fit(method, definition.fit(ready, runs, complete))
-    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, fitted)
+        reduced = fitted(definition, ready, runs, complete)
+    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced)

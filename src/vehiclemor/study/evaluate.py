@@ -14,7 +14,7 @@ from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
-from vehiclemor.reduction.validation import checked_fit, checked_run
+from vehiclemor.reduction.validation import checked_run, fitted
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
@@ -208,8 +208,7 @@ def _fit(
     def fit() -> ReducedModel:
         runs = [training_run(model, scenario) for scenario in training]
         complete = for_method(model, method_name, json.loads(settings))
-        more = (others,) if others and method.fits_others else ()
-        return checked_fit(method_name, method.fit(model, runs, complete, *more))
+        return fitted(method, model, runs, complete, others)
 
     with one_thread():
         return attempt(fit)
@@ -225,7 +224,7 @@ def _kept_fit(
         if isinstance(found, Failure):
             # Fitted again it fails as it does alone.
             method: Method = component("method", name)
-            return method.fit(model, [training_run(model, s) for s in training], given)
+            return fitted(method, model, [training_run(model, s) for s in training], given)
         return found
 
     return _unless_bug(_fit(model, method_name, settings, training, other))
