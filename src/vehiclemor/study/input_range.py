@@ -7,10 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.cars import Cars, cars_of
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trust
-from vehiclemor.study.scenario import Scenario, own_speed
+from vehiclemor.simulation.trajectory import Trajectory, Trust
+from vehiclemor.study.scenario import Scenario, car_of, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
 SPEED_SLACK = 0.01
@@ -28,12 +30,29 @@ class InputRange:
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
         Duration of the longest run in s; a kinematic model has no memory, and any is known.
+    cars
+        Those of the training runs.
     """
 
     largest: np.ndarray
     speed: float
     reach: float
     longest: float
+    cars: Cars
+
+    def judged(
+        self, method: Method, model: Model, scenario: Scenario, run: Trajectory
+    ) -> Trajectory:
+        """A run with what is known of its car, and of its inputs if its model judges nothing."""
+        if run.trust and run.trust.reason:
+            return run
+        if method.learns_from != "inputs":
+            car = self.cars.trust(car_of(model, scenario))
+            if car.reason:
+                return run.judged(car)
+        if run.trust or method.own_limits:
+            return run
+        return run.judged(self.trust(model, scenario))
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""
@@ -66,7 +85,8 @@ def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
     lasting = model.kind != "ae"
     longest = max(scenario.maneuver.duration for scenario in training) if lasting else np.inf
     edge = 1.0 + 1e-6
-    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge)
+    cars = cars_of(car_of(model, scenario) for scenario in training)
+    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge, cars)
 
 
 def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
@@ -81,4 +101,4 @@ def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
 
 def _speed(model: Model, scenario: Scenario) -> float:
     """Initial speed in m/s; zero of a model that has none."""
-    return scenario.speed or own_speed(model) or 0.0
+    return scenario.speed or own_speed(car_of(model, scenario)) or 0.0

@@ -71,6 +71,11 @@ class StudyFile(FileSchema):
         default_factory=list,
         description="of training = set: pairs [frequency factor, amplitude factor]",
     )
+    cars: Literal["own", "nominal"] | list[dict[str, float | list[float]]] = Field(
+        "own",
+        description="cars that are trained on: own (the tested one, a fit each), nominal (the "
+        "study's), or a list of tables parameter -> value",
+    )
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
