@@ -330,9 +330,14 @@ def _tested(
 
 
 def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
-    """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
+    """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
+    if run.trust and run.trust.reason:
+        return run
+    method: Method = component("method", experiment.method)
     known = input_range(model, trained_for(experiment.training, test))
-    return known.judged(component("method", experiment.method), model, test, run)
+    if outside := known.outside(method, car_of(model, test)):
+        return run.judged(outside)
+    return run if run.trust or method.own_limits else run.judged(known.trust(model, test))
 
 
 def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:

@@ -11,7 +11,7 @@ from vehiclemor.reduction.cars import Cars, cars_of
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory, Trust
+from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.study.scenario import Scenario, car_of, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
@@ -31,28 +31,24 @@ class InputRange:
     longest
         Duration of the longest run in s; a kinematic model has no memory, and any is known.
     cars
-        Those of the training runs.
+        Those of the training runs; nothing is told of them where None.
     """
 
     largest: np.ndarray
     speed: float
     reach: float
     longest: float
-    cars: Cars
+    cars: Cars | None = None
 
-    def judged(
-        self, method: Method, model: Model, scenario: Scenario, run: Trajectory
-    ) -> Trajectory:
-        """A run with what is known of its car, and of its inputs if its model judges nothing."""
-        if run.trust and run.trust.reason:
-            return run
-        if method.learns_from != "inputs":
-            car = self.cars.trust(car_of(model, scenario))
-            if car.reason:
-                return run.judged(car)
-        if run.trust or method.own_limits:
-            return run
-        return run.judged(self.trust(model, scenario))
+    def outside(self, method: Method, car: Model) -> Trust | None:
+        """What is told of a car that lies beyond those of the training, of which the method learns.
+
+        A method that is exact for every car has none that lie beyond.
+        """
+        if self.cars is None or method.learns_from == "inputs":
+            return None
+        found = self.cars.trust(car)
+        return found if found.reason else None
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""

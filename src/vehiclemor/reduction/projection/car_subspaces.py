@@ -1,12 +1,13 @@
 """Subspaces that cars share, or that are interpolated between cars, for the equations of each."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from vehiclemor.reduction.cars import Cars
 from vehiclemor.reduction.projection.bases import Basis
-from vehiclemor.reduction.projection.grassmann import interpolated, interpolation_weights
+from vehiclemor.reduction.projection.grassmann import along, interpolation_weights, tangent
 from vehiclemor.reduction.projection.inner_products import mass_weight
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation import linearisation
@@ -15,15 +16,44 @@ from vehiclemor.simulation.projection_windows import ProjectionWindows
 
 
 @dataclass(frozen=True)
-class LocalBasis(ShortRepr):
-    """POD basis of a time window: mean of the states (2 n,), vectors (m, r), singular values.
+class LocalBases(ShortRepr):
+    """POD bases of a time window, in coordinates times a root of the weight: orthonormal there.
 
-    The vectors are orthonormal: those of the states or coordinates times a root of the weight.
+    Attributes
+    ----------
+    means
+        Means of the states (m, 2 n), of all cars together or of each.
+    origin
+        Vectors (w, r) of the first.
+    tangents
+        Tangents (m, w, r) at their span, towards those of each.
+    singular_values
+        Of the first.
     """
 
-    mean: np.ndarray
-    vectors: np.ndarray
+    means: np.ndarray
+    origin: np.ndarray
+    tangents: np.ndarray
     singular_values: np.ndarray
+
+    def between(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (2 n,) and vectors (w, r) for weights (m,) of the cars."""
+        if len(weights) == 1:
+            return self.means[0], self.origin
+        return weights @ self.means, along(self.origin, np.tensordot(weights, self.tangents, 1))
+
+
+def local_bases(found: Sequence[Basis]) -> LocalBases:
+    """Bases of some cars, with the means of all states; as many vectors as all of them have."""
+    rank = min(basis.rank for basis in found)
+    origin = found[0].vectors[:, :rank]
+    tangents = [tangent(origin, basis.vectors[:, :rank]) for basis in found[1:]]
+    return LocalBases(
+        np.array([basis.mean for basis in found]),
+        origin,
+        np.array([np.zeros_like(origin), *tangents]),
+        found[0].singular_values,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +67,7 @@ class Subspaces(ShortRepr):
     edges
         Window edges (windows + 1,) in s.
     local
-        By window the basis of all cars, or one for each.
+        Bases of each window.
     formulation, inner_product
         As in the settings.
     weight
@@ -46,7 +76,7 @@ class Subspaces(ShortRepr):
 
     cars: Cars
     edges: np.ndarray
-    local: tuple[tuple[LocalBasis, ...], ...]
+    local: tuple[LocalBases, ...]
     formulation: str
     inner_product: str
     weight: np.ndarray
@@ -54,23 +84,23 @@ class Subspaces(ShortRepr):
     def of(self, model: DynamicModel) -> tuple[ProjectionWindows, tuple[Basis, ...]]:
         """Windows and bases of a car, orthonormal in its own inner product."""
         weights = np.ones(1)
-        if len(self.local[0]) > 1:
+        if len(self.local[0].means) > 1:
             places = self.cars.places(self.cars.values)
             weights = interpolation_weights(places, self.cars.place(model))
-        window = [_between(local, weights) for local in self.local]
         weight = self.weight
         if self.inner_product == "energy":
             period = float(self.edges[1] - self.edges[0])
             weight = mass_weight(model, period if self.formulation == "state" else None)
-        root = np.linalg.cholesky(self.weight)
-        bases = []
-        for found in window:
-            vectors = np.linalg.solve(root.T, found.vectors)
+        root, means, bases = np.linalg.cholesky(self.weight), [], []
+        for local in self.local:
+            mean, scaled = local.between(weights)
+            vectors = np.linalg.solve(root.T, scaled)
             if not np.array_equal(weight, self.weight):
                 gram = np.linalg.cholesky(vectors.T @ weight @ vectors)
                 vectors = np.linalg.solve(gram, vectors.T).T
-            bases.append(Basis(found.mean[: len(weight)], vectors, found.singular_values))
-        return self._spaces(model, [found.mean for found in window], bases, weight), tuple(bases)
+            means.append(mean)
+            bases.append(Basis(mean[: len(weight)], vectors, local.singular_values))
+        return self._spaces(model, means, bases, weight), tuple(bases)
 
     def _spaces(
         self,
@@ -100,13 +130,3 @@ class Subspaces(ShortRepr):
             ranks[k] = r if formulation == "state" else 2 * r
         form = "coordinates" if formulation == "coordinates" else "state"
         return ProjectionWindows(form, self.edges, np.array(means), trial, test, ranks)
-
-
-def _between(local: tuple[LocalBasis, ...], weights: np.ndarray) -> LocalBasis:
-    """The bases of some cars, weighted; as many vectors as all of them have."""
-    if len(local) == 1:
-        return local[0]
-    rank = min(basis.vectors.shape[1] for basis in local)
-    vectors = interpolated(np.array([basis.vectors[:, :rank] for basis in local]), weights)
-    mean = np.tensordot(weights, [basis.mean for basis in local], 1)
-    return replace(local[0], mean=mean, vectors=vectors)

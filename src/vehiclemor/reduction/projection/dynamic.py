@@ -18,7 +18,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.cars import cars_of
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
-from vehiclemor.reduction.projection.car_subspaces import LocalBasis, Subspaces
+from vehiclemor.reduction.projection.car_subspaces import Subspaces, local_bases
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.reduction.projection.windows import by_window
@@ -153,7 +153,7 @@ def fit_windows(
     root = np.linalg.cholesky(weight)
     windows = [slice(k * count, (k + 1) * count) for k in range(len(edges) - 1)]
     local = tuple(
-        tuple(_basis(states[group, window], root, settings) for group in groups)
+        local_bases([_basis(states[group, window], root, settings) for group in groups])
         for window in windows
     )
     subspaces = Subspaces(cars, edges, local, settings.formulation, settings.inner_product, weight)
@@ -163,11 +163,11 @@ def fit_windows(
     return replace(found, subspaces=subspaces)
 
 
-def _basis(states: np.ndarray, root: np.ndarray, settings: DynamicPodSettings) -> LocalBasis:
-    """POD basis of states (runs, samples, 2 n), in coordinates in which it is orthonormal."""
+def _basis(states: np.ndarray, root: np.ndarray, settings: DynamicPodSettings) -> Basis:
+    """POD basis of states (runs, samples, 2 n) times a root of the weight, and their own mean."""
     snapshots = states.reshape(-1, states.shape[-1])
     scaled = pod_basis((snapshots[:, : len(root)] @ root).T, settings.rank, settings.rank_tolerance)
-    return LocalBasis(snapshots.mean(axis=0), scaled.vectors, scaled.singular_values)
+    return Basis(snapshots.mean(axis=0), scaled.vectors, scaled.singular_values)
 
 
 def projected_equations(

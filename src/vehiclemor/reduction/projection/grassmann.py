@@ -38,9 +38,3 @@ def interpolation_weights(places: np.ndarray, at: np.ndarray) -> np.ndarray:
     kernel = "thin_plate_spline" if linear else "linear"
     interpolator = RBFInterpolator(places, np.eye(count), kernel=kernel, degree=int(linear))
     return interpolator(at[None])[0]
-
-
-def interpolated(bases: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Orthonormal basis (n, r) from those of some cars (m, n, r), with weights (m,)."""
-    origin = bases[0]
-    return along(origin, np.tensordot(weights, [tangent(origin, b) for b in bases], 1))
