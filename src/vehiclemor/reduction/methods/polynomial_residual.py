@@ -259,4 +259,5 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    learns_from="any",
 )
