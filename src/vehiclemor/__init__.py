@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
@@ -40,6 +41,7 @@ _DEFINED_IN = {
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
+    "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     "simulate_many": "vehiclemor.online.batches",
@@ -52,6 +54,7 @@ __all__ = [
     "describe",
     "export",
     "figures",
+    "leaderboard",
     "load",
     "maneuvers",
     "methods",
