@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -43,6 +44,7 @@ _DEFINED_IN = {
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
+    "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
@@ -57,6 +59,7 @@ __all__ = [
     "describe",
     "export",
     "figures",
+    "leaderboard",
     "load",
     "maneuvers",
     "methods",

@@ -316,7 +316,8 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     what
         `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
         not seen, beside full-order integrators.  The name of a model: every method that fits it,
-        nominal, perturbed and on unseen inputs, with costs.
+        nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
+        name or TOML file: errors of every method over the grid, or on the protocol's inputs.
     out
         Results folder.
     jobs
@@ -328,8 +329,8 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
         Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
         floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
         that the paper doesn't have), measure, reason, threshold_source; described at
-        `comparison.rows.Row`, those of the others at `predictive_comparison` and
-        `model_comparison` in `vehiclemor.report`.
+        `comparison.rows.Row`, those of the others at `predictive_comparison`,
+        `model_comparison` and `study_comparison` in `vehiclemor.report`.
     """
     from vehiclemor.report.comparison.kinds import comparison
 
