@@ -15,18 +15,17 @@ from vehiclemor.piecewise import Pieces
 from vehiclemor.registry import component
 from vehiclemor.simulation.input_polynomials import ACCURACY, recorded_inputs
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
-from vehiclemor.simulation.integrators.structures import Signal
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
 
 LANE_CHANGE = component("maneuver", "lane_change")
 
 
-def signal_of(maneuver: Maneuver) -> Signal:
+def signal_of(maneuver: Maneuver) -> Pieces:
     return ready_signal_of(maneuver).bundle
 
 
-def value(signal: Signal, t: float, segment: int | None = None) -> np.ndarray:
+def value(signal: Pieces, t: float, segment: int | None = None) -> np.ndarray:
     """Inputs at one time; at a break point those after it, unless a segment is given."""
     if segment is None:
         segment = int(np.searchsorted(signal.edges, t, side="right")) - 1
