@@ -1,14 +1,15 @@
 """Piecewise polynomials through samples, as the compiled time loops take their inputs."""
 
+from __future__ import annotations
+
 from functools import cache
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.loop_types import Cube, IntVector, Vector
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import InputError
-from vehiclemor.sample_loops import DISORDERED, NOT_FINITE, ROWS
+from vehiclemor.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 
 # Times that differ by so little, relative to what they are, are one.
 ROUNDING = 1e-12
@@ -16,70 +17,51 @@ ROUNDING = 1e-12
 HOLDS = {"linear": 1, "zero": 0, "cubic": 3}
 
 
-class Pieces(NamedTuple):
-    """Piecewise polynomials.
+def lengths(pieces: Pieces) -> np.ndarray:
+    """Lengths (pieces,) in s."""
+    if len(pieces.starts):
+        return np.diff(pieces.starts, append=pieces.edges[-1])
+    counts = np.diff(pieces.first)
+    return np.repeat(np.diff(pieces.edges) / counts, counts)
 
-    Attributes
-    ----------
-    edges
-        Ends of the smooth segments (segments + 1,) in s.
-    first
-        Number of the first piece of each segment (segments + 1,).
-    starts
-        Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
-    coefficients
-        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
-        power first.
-    """
 
-    edges: Vector
-    first: IntVector
-    starts: Vector
-    coefficients: Cube
+def scaled(pieces: Pieces, frequency: float, amplitudes: np.ndarray) -> Pieces:
+    """So much faster, and each input times its own amplitude (inputs,)."""
+    edges, starts = pieces.edges / frequency, pieces.starts / frequency
+    return pieces._replace(
+        edges=edges, starts=starts, coefficients=pieces.coefficients * amplitudes[:, None]
+    )
 
-    @property
-    def lengths(self) -> np.ndarray:
-        """Lengths (pieces,) in s."""
-        if len(self.starts):
-            return np.diff(self.starts, append=self.edges[-1])
-        pieces = np.diff(self.first)
-        return np.repeat(np.diff(self.edges) / pieces, pieces)
 
-    def scaled(self, frequency: float, amplitudes: np.ndarray) -> Self:
-        """So much faster, and each input times its own amplitude (inputs,)."""
-        edges, starts = self.edges / frequency, self.starts / frequency
-        return self._replace(
-            edges=edges, starts=starts, coefficients=self.coefficients * amplitudes[:, None]
-        )
+def derivative(pieces: Pieces) -> Pieces:
+    """By time; jumps have none."""
+    rates = np.zeros_like(pieces.coefficients)
+    rates[:, :, :-1] = pieces.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
+    return pieces._replace(coefficients=rates / lengths(pieces)[:, None, None])
 
-    def derivative(self) -> Self:
-        """By time; jumps have none."""
-        rates = np.zeros_like(self.coefficients)
-        rates[:, :, :-1] = self.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
-        return self._replace(coefficients=rates / self.lengths[:, None, None])
 
-    def at(self, times: np.ndarray) -> np.ndarray:
-        """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
-        edges, first, starts, coefficients = self
-        if len(starts):
-            rows = np.searchsorted(starts, times, side="right") - 1
-            rows = np.clip(rows, 0, len(starts) - 1)
-            parts = (times - starts[rows]) / self.lengths[rows]
-        else:
-            segments: Any = 0
-            if len(edges) > 2:
-                reached = times + ROUNDING * (1.0 + times)
-                segments = np.searchsorted(edges, reached, side="right") - 1
-                segments = np.clip(segments, 0, len(edges) - 2)
-            pieces, begin = first[segments + 1] - first[segments], edges[segments]
-            places = (times - begin) / (edges[segments + 1] - begin) * pieces
-            rows = np.clip(places.astype(np.int64), 0, pieces - 1)
-            parts, rows = places - rows, rows + first[segments]
-        own, parts = coefficients[rows], parts[:, None]
-        values = own[:, :, -1]
-        for power in range(own.shape[2] - 2, -1, -1):
-            values = own[:, :, power] + parts * values
-        return values
+def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
+    """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
+    edges, first, starts, coefficients = pieces
+    if len(starts):
+        rows = np.searchsorted(starts, times, side="right") - 1
+        rows = np.clip(rows, 0, len(starts) - 1)
+        parts = (times - starts[rows]) / lengths(pieces)[rows]
+    else:
+        segments: Any = 0
+        if len(edges) > 2:
+            reached = times + ROUNDING * (1.0 + times)
+            segments = np.searchsorted(edges, reached, side="right") - 1
+            segments = np.clip(segments, 0, len(edges) - 2)
+        counts, begin = first[segments + 1] - first[segments], edges[segments]
+        places = (times - begin) / (edges[segments + 1] - begin) * counts
+        rows = np.clip(places.astype(np.int64), 0, counts - 1)
+        parts, rows = places - rows, rows + first[segments]
+    own, parts = coefficients[rows], parts[:, None]
+    values = own[:, :, -1]
+    for power in range(own.shape[2] - 2, -1, -1):
+        values = own[:, :, power] + parts * values
+    return values
 
 
 def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:

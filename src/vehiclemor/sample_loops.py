@@ -1,6 +1,7 @@
 """Polynomials through samples, compiled: steps, lines or splines, and where they break."""
 
 import math
+from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntMatrix, IntVector, Matrix, Vector
 
@@ -17,6 +18,28 @@ QUIET = 0.1
 DISORDERED, NOT_FINITE = -1, -2
 # Rows of scratch space: lengths of intervals, slopes, what bends, pivots of the spline, marks.
 ROWS = 5
+
+
+class Pieces(NamedTuple):
+    """Piecewise polynomials.
+
+    Attributes
+    ----------
+    edges
+        Ends of the smooth segments (segments + 1,) in s.
+    first
+        Number of the first piece of each segment (segments + 1,).
+    starts
+        Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
+    coefficients
+        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
+        power first.
+    """
+
+    edges: Vector
+    first: IntVector
+    starts: Vector
+    coefficients: Cube
 
 
 def through(

@@ -13,8 +13,9 @@ import numpy as np
 from vehiclemor.arguments import file_path, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
-from vehiclemor.piecewise import HOLDS, Pieces, through
+from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
 from vehiclemor.registry import unknown
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.signal_columns import array_columns, csv_columns
 from vehiclemor.units import base_units
 
@@ -129,8 +130,8 @@ class Signal(Maneuver):
         if "polynomials" not in self.kept:
             inputs = self.pieces.coefficients.shape[1]
             orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
-            scaled = self.pieces.scaled(frequency, amplitude * frequency**orders)
-            self.kept["polynomials"] = scaled
+            amplitudes = amplitude * frequency**orders
+            self.kept["polynomials"] = scaled(self.pieces, frequency, amplitudes)
         return self.kept["polynomials"]
 
     def _with(self, **changes: Any) -> Signal:
@@ -146,7 +147,7 @@ class Signal(Maneuver):
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at the given times (n,) in s."""
-        return self.polynomials.at(np.asarray(times, dtype=float))
+        return at(self.polynomials, np.asarray(times, dtype=float))
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
@@ -200,7 +201,7 @@ class Signal(Maneuver):
         if order and self.hold != "cubic":
             raise InputError(f"{self}: derivatives of {name} follow from a cubic hold alone")
         for _ in range(order):
-            pieces = pieces.derivative()
+            pieces = derivative(pieces)
         return pieces.coefficients[:, self.inputs.index(name)]
 
     @classmethod

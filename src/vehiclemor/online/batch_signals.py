@@ -13,7 +13,8 @@ from vehiclemor.codegen.loops import Ready, address_of_array, loops, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_stages import addresses, batch_loop, stage
-from vehiclemor.piecewise import Pieces, through
+from vehiclemor.piecewise import through
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
 from vehiclemor.simulation.input_polynomials import SIGNAL_LOOPS, recorded_inputs, signal_of

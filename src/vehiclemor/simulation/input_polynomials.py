@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.piecewise import Pieces
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.signals import Signal
 from vehiclemor.simulation.checks import loop_array
 

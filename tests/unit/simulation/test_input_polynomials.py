@@ -11,8 +11,9 @@ from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver, smooth
-from vehiclemor.piecewise import Pieces
+from vehiclemor.piecewise import at
 from vehiclemor.registry import component
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.simulation.input_polynomials import ACCURACY, recorded_inputs
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
 from vehiclemor.simulation.projection_windows import whole_space
@@ -201,7 +202,7 @@ def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
         assert set(calls) == {-0.7}
         np.testing.assert_array_equal(scaled.edges, searched.edges)
         times = np.linspace(0.0, 3.0, 997)
-        found, wanted = (Pieces(*signal).at(times) for signal in (scaled, searched))
+        found, wanted = (at(signal, times) for signal in (scaled, searched))
         # Both round off in the powers of the pieces, far below the accuracy of these.
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=0.1 * ACCURACY)
 
@@ -210,5 +211,5 @@ def test_a_copy_with_another_signal_is_not_taken_for_linear():
     linear = component("maneuver", "lane_change").perturbed(1.0, 1.5)
     fixed = dataclasses.replace(linear, signal=lambda t, *_: np.sin(t)[:, None], corners=smooth)
     np.testing.assert_array_equal(recorded_inputs(fixed)[1][:, 0], np.sin(fixed.times))
-    found = Pieces(*signal_of(fixed)).at(fixed.times)[:, 0]
+    found = at(signal_of(fixed), fixed.times)[:, 0]
     np.testing.assert_allclose(found, np.sin(fixed.times), rtol=0.0, atol=1e-11)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vehiclemor.codegen.loop_types import Int, Matrix, Vector
-from vehiclemor.piecewise import Pieces
+from vehiclemor.sample_loops import Pieces
 
 INLINED = ("input_at", "signal_at")
 
