@@ -155,4 +155,5 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    exported=False,
 )

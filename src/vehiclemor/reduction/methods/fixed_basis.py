@@ -55,4 +55,5 @@ METHOD = Method(
     presets=PRESETS,
     check=check_subspaces,
     fit=fit,
+    exported=False,
 )

@@ -106,4 +106,5 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    exported=False,
 )

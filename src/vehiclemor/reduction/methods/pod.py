@@ -87,4 +87,5 @@ METHOD = Method(
     presets=PRESETS,
     check=check,
     fit=fit,
+    exported=False,
 )

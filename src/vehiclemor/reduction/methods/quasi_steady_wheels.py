@@ -64,4 +64,5 @@ METHOD = Method(
     settings=dict.fromkeys(("ode", "dae"), ProjectedSettings),
     refusal=refusal,
     fit=fit,
+    exported=False,
 )

@@ -91,5 +91,6 @@ METHOD = Method(
     summary="returns the training trajectory, whatever the input: the null hypothesis",
     settings=dict.fromkeys(KINDS, Settings),
     fit=fit,
+    exported=False,
     own_limits=True,
 )
