@@ -234,6 +234,7 @@ def run_study(
     jobs: int = 1,
     out: str | Path = RESULTS,
     progress: Callable[[str, int, int], None] | None = None,
+    scheduler: str = "",
 ) -> xr.Dataset:
     """Run a study, resuming where an earlier run stopped.
 
@@ -247,6 +248,9 @@ def run_study(
         Results folder.
     progress
         Called with (study, finished cells, all cells).
+    scheduler
+        Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
+        with so many processes.
 
     Returns
     -------
@@ -262,8 +266,11 @@ def run_study(
 
     if progress is not None and not callable(progress):
         raise InputError(f"progress is {quoted(progress)}, not a function")
+    if not isinstance(scheduler, str):
+        raise InputError(f"scheduler is {quoted(scheduler)}, not an address")
     with listening(progress):
-        results = run_studies(str(file_path("study", study)), file_path("out", out), jobs)
+        study, out = str(file_path("study", study)), file_path("out", out)
+        results = run_studies(study, out, jobs, scheduler)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
 
 
