@@ -15,6 +15,7 @@ from vehiclemor.cli.export import export
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.plot import plot
+from vehiclemor.cli.report import report
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
@@ -38,6 +39,7 @@ COMMANDS = {
     "run": run,
     "compare": compare,
     "figures": figures,
+    "report": report,
     "export": export,
     "cite": cite,
 }
