@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
+    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -39,7 +40,7 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    **dict.fromkeys(("run_study", "simulate", "studies", "write_report"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
@@ -75,6 +76,7 @@ __all__ = [
     "simulate",
     "simulate_many",
     "studies",
+    "write_report",
 ]
 
 
