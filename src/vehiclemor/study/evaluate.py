@@ -15,7 +15,7 @@ from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import checked_fit, checked_run
+from vehiclemor.reduction.validation import checked_run, fitted, of_car
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
@@ -72,6 +72,11 @@ class Fit(NamedTuple):
     method: str
     settings: str
     training: tuple[Scenario, ...]
+
+    @property
+    def shared(self) -> bool:
+        """Whether it is for another car than those that all of it is learnt from."""
+        return bool(self.car) and all(run.parameters != self.car for run in self.training)
 
 
 @dataclass
@@ -246,13 +251,16 @@ def _shared_fit(fit: Fit, settings: Settings) -> ReducedModel | Failure:
 def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
     method: Method = component("method", fit.method)
 
-    def fitted() -> ReducedModel:
+    def made() -> ReducedModel:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
-        more = (others,) if others and method.fits_others else ()
-        return checked_fit(fit.method, method.fit(*_given(fit), complete, *more))
+        if fit.shared:
+            of_all = _kept_fit(fit._replace(car=()))
+            if hasattr(of_all, "for_car"):
+                return of_car(method, of_all, with_parameters(fit.model, fit.car), complete)
+        return fitted(method, *_given(fit), complete, others)
 
     with one_thread():
-        return attempt(fitted)
+        return attempt(made)
 
 
 def _given(fit: Fit) -> tuple[Model, list[TrainingRun]]:
@@ -268,8 +276,7 @@ def _kept_fit(fit: Fit) -> ReducedModel | Failure:
         found = _shared_fit(fit._replace(method=name, settings=_text(settings)), settings)
         if isinstance(found, Failure):
             # Fitted again it fails as it does alone.
-            method: Method = component("method", name)
-            return method.fit(*_given(fit), given)
+            return fitted(component("method", name), *_given(fit), given)
         return found
 
     return _unless_bug(_fit(fit, other))
@@ -323,11 +330,14 @@ def _tested(
 
 
 def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
-    """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
-    if run.trust or component("method", experiment.method).own_limits:
+    """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
+    if run.trust and run.trust.reason:
         return run
+    method: Method = component("method", experiment.method)
     known = input_range(model, trained_for(experiment.training, test))
-    return run.judged(known.trust(model, test))
+    if outside := known.outside(method, car_of(model, test)):
+        return run.judged(outside)
+    return run if run.trust or method.own_limits else run.judged(known.trust(model, test))
 
 
 def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:

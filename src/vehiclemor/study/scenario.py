@@ -26,10 +26,14 @@ Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
     """Parameters of a car from a table of them; of which the order does not matter."""
-    return tuple(
-        (name, float(value) if isinstance(value, int | float) else tuple(map(float, value)))
-        for name, value in sorted(table.items())
-    )
+    return tuple((name, _plain(value)) for name, value in sorted(table.items()))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as floats and lists as tuples; what is neither is refused where it is used."""
+    if isinstance(value, list | tuple):
+        return tuple(map(_plain, value))
+    return float(value) if isinstance(value, int) else value
 
 
 @dataclass(frozen=True)
@@ -97,8 +101,9 @@ def input_hash(maneuver: Maneuver) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
     times = maneuver.times
     if isinstance(maneuver, Signal):
-        parts = (times, *maneuver.polynomials)
-        return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()[:16]
+        parts = [part.tobytes() for part in (times, *maneuver.polynomials)]
+        names = json.dumps(maneuver.inputs).encode()
+        return hashlib.sha256(b"".join([names, *parts])).hexdigest()[:16]
     # Adding zero makes -0 and 0 one input.
     inputs = np.ascontiguousarray(maneuver.at(times)) + 0.0
     return hashlib.sha256(times.tobytes() + inputs.tobytes()).hexdigest()[:16]
