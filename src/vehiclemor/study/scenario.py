@@ -1,6 +1,7 @@
 """Scenarios: what a reduced model is trained, chosen or tested on."""
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
