@@ -31,8 +31,8 @@ from vehiclemor.online.rom import ReducedOrderModel as Car
 from vehiclemor.online.saved import shipped_folder
 from vehiclemor.piecewise import quiet_ends
 from vehiclemor.registry import component
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.provenance import attributes
-from vehiclemor.study.store import read_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -24,8 +24,8 @@ from vehiclemor.report.figures.result_plot import _outputs, plot_result
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.regenerate import left_out
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.store import write_dataset
 
 FREQUENCY, AMPLITUDE = np.linspace(0.7, 1.3, 7), np.linspace(0.7, 1.3, 7)
 SCHEMATICS = {"1", "5", "8"}

@@ -13,8 +13,9 @@ from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import StudyFile, file_as_stored, studies_and_files
-from vehiclemor.study.store import result_path, stored
+from vehiclemor.study.plans.study_file import StudyFile, owner, studies_and_files
+from vehiclemor.study.progress import tell
+from vehiclemor.study.store import cell_path, combined_path, stored
 from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
@@ -40,8 +41,8 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
     Returns
     -------
     dict
-        Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
-        is `predictive-<protocol>`.
+        Study name -> combined dataset, stored too, see `combined_path`; of a protocol the name is
+        `predictive-<protocol>`.
     """
     within("jobs", count("jobs", jobs), (1, MOST_JOBS))
     files = studies_and_files(study)
@@ -49,18 +50,22 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
     grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
     results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
     for path, grid in grids:
-        cells = grid.unique
-        workers = Workers(grid.name, folder, jobs)
-        workers([[cell] for cell in cells.values()])
+        of = owner(grid.name, path, grid.definition, folder)
         results[grid.name] = stored(
-            folder / "studies" / f"{grid.name}.nc",
+            combined_path(folder, of),
             "cells",
             cells_digest(grid),
-            partial(grid_dataset, grid, folder),
-            [result_path(folder, key) for key in cells],
-            file_as_stored(path, folder),
+            partial(_combined, grid, folder, jobs),
+            [cell_path(folder, key) for key in grid.unique],
+            of,
         )
+        tell(grid.name, len(grid.unique), len(grid.unique))
     return results
+
+
+def _combined(grid: Grid, folder: Path, jobs: int) -> xr.Dataset:
+    Workers(grid.name, folder, jobs)([[cell] for cell in grid.unique.values()])
+    return grid_dataset(grid, folder)
 
 
 def _expanded(name: str, definition: StudyFile) -> Grid:

@@ -20,11 +20,10 @@ from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
-    cell_path,
+    finished_cells,
     prepare_folder,
-    read_dataset,
+    read_cell,
     remove_partial,
-    result_path,
     write_cell,
 )
 
@@ -61,7 +60,7 @@ class Workers:
         remove_partial(self.folder)
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
-        self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        self.finished |= finished_cells(self.folder, keys - self.finished)
         if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
@@ -84,8 +83,7 @@ class Workers:
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        path = result_path(self.folder, experiment.key)
-        return read_dataset(path, "cell", experiment.key)
+        return read_cell(self.folder, experiment.key)
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -134,6 +132,7 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> tuple
     """
     finished, fault = [], ""
     for experiment in experiments:
+        began = time.perf_counter()
         try:
             dataset = evaluate(experiment)
         except Exception as error:
@@ -141,7 +140,7 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> tuple
             if not fault:
                 raise
             continue
-        write_cell(dataset, folder, experiment.key)
+        write_cell(dataset, folder, experiment.key, time.perf_counter() - began)
         finished.append(experiment.key)
     return finished, fault
 
