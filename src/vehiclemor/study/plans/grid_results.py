@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.provenance import attributes, layout_digest, versions
-from vehiclemor.study.store import read_arrays, read_dataset, result_path
+from vehiclemor.study.store import read_arrays, read_cell
 from vehiclemor.study.variables import meaning_of, variables
 
 if TYPE_CHECKING:
@@ -47,12 +47,11 @@ def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
     arrays: dict[str, np.ndarray] = {}
     template: xr.Dataset | None = None
     for key, places in first_places.items():
-        path = result_path(folder, key)
         if template is None:
-            template = read_dataset(path, "cell", key)
+            template = read_cell(folder, key)
             for name, variable in template.data_vars.items():
                 arrays[str(name)] = _empty(sizes + variable.shape, variable.dtype)
-        found = read_arrays(path, "cell", key)
+        found = read_arrays(folder, key)
         for name, array in arrays.items():
             for place in places:
                 array[place] = found[name]
