@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import nullcontext
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,9 +25,11 @@ from vehiclemor.study.workers import Workers
 if TYPE_CHECKING:
     import xarray as xr
 
+_LOG = logging.getLogger("vehiclemor")
 MOST_JOBS = 1024
-# Points of a grid that take their time before the first is computed.
-LARGE = 10_000
+# A grid of so many points is told of before it is expanded; and so many experiments are made and
+# given to workers at a time.
+LARGE, AT_ONCE = 10_000, 5_000
 
 
 def run_studies(
@@ -60,7 +64,7 @@ def run_studies(
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
         for path, grid in grids:
             of = owner(grid.name, path, grid.definition, folder)
-            workers = Workers(grid.name, folder, jobs, elsewhere)
+            workers = Workers(grid.name, folder, jobs, elsewhere, set(grid.unique))
             results[grid.name] = stored(
                 combined_path(folder, of),
                 "cells",
@@ -74,14 +78,17 @@ def run_studies(
 
 
 def _combined(grid: Grid, workers: Workers) -> xr.Dataset:
-    workers([[cell] for cell in grid.unique.values()])
+    experiments = iter(grid.unique.values())
+    while part := [[cell] for cell in islice(experiments, AT_ONCE)]:
+        workers(part)
     return grid_dataset(grid, workers.folder)
 
 
 def _expanded(name: str, definition: StudyFile) -> Grid:
-    large = definition.points >= LARGE
-    with telling(f"{name}: a grid of {definition.points} points") if large else nullcontext():
+    if definition.points < LARGE:
+        return expand(name, definition)
+    _LOG.info("%s: %d grid points", name, definition.points)
+    with telling(f"{name}: checking all of them"):
         grid = expand(name, definition)
-        # Made here: the keys take most of the time.
-        assert grid.unique
-        return grid
+    _LOG.info("%s: %d cells; an interrupted run is resumed", name, len(grid.unique))
+    return grid
