@@ -8,15 +8,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.lines import COLORS, Results, Style, panels
+from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "H", "8")
-GREYS = (("#000000", "-"), ("#777777", "-"), ("#AAAAAA", "-"), ("#444444", "--"))
+# Colour, line and marker of a full-order integrator: of twelve no two look alike.
+GREYS = [
+    (color, line, marker)
+    for line, marker in (("-", "o"), ("--", "*"), (":", "X"))
+    for color in ("#000000", "#777777", "#AAAAAA", "#444444")
+]
 
 
-def figure_pareto(results: Results) -> Figure:
+def figure_pareto(results: Results, *, titled: bool = False) -> Figure:
     """Score (worst error over its bound) over the mean time of a whole call, one model."""
     (dataset,) = results.values()
     rows = method_rows(dataset, protocol_of(dataset))
@@ -38,7 +44,11 @@ def figure_pareto(results: Results) -> Figure:
     axis.set_ylim(top=top)
     axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
     axis.set_ylabel("worst error / bound, judged runs")
-    figure.legend(loc="outside right upper", fontsize=7)
+    tick_decades(axis.xaxis, *axis.get_xlim())
+    # Of what is chosen the mark is larger than a line of the legend.
+    figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
+    if titled:
+        figure.suptitle(str(dataset.attrs["title"]), wrap=True)
     return figure
 
 
@@ -49,8 +59,8 @@ def _draw_full_order(axis: Axes, rows: Sequence[Row]) -> None:
         points = families.setdefault(str(row["contestant"]), [])
         if np.isfinite(row["score"]) and row["score"] > 0.0:
             points.append((row["seconds"] * 1e6, row["score"], row["spread"]))
-    for (family, points), (color, line) in zip(families.items(), cycle(GREYS), strict=False):
-        style: Style = {"marker": "o", "markersize": 4, "linewidth": 0.8, "linestyle": line}
+    for (family, points), (color, line, mark) in zip(families.items(), cycle(GREYS), strict=False):
+        style: Style = {"marker": mark, "markersize": 4, "linewidth": 0.8, "linestyle": line}
         times, scores, spreads = np.array(sorted(points)).reshape(-1, 3).T
         bars = {"xerr": 0.5 * spreads * times, "elinewidth": 0.8, "capsize": 1.5}
         axis.errorbar(times, scores, color=color, label=f"full order, {family}", **style, **bars)
