@@ -17,9 +17,9 @@ from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.accessor import ResultAccessor
 from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.figures.error_map import luminance, two_digits
 from vehiclemor.report.figures.lines import panels
 from vehiclemor.report.figures.pareto import figure_pareto
-from vehiclemor.report.figures.perturbations import luminance, two_digits
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import readable_unit
