@@ -27,7 +27,11 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
+    from vehiclemor.study.objectives import objective as objective
+    from vehiclemor.study.objectives import objectives as objectives
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -41,8 +45,11 @@ _DEFINED_IN = {
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
+    "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
+    **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
+    "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
@@ -53,15 +60,19 @@ __all__ = [
     "describe",
     "export",
     "figures",
+    "leaderboard",
     "load",
     "maneuvers",
     "methods",
     "model",
     "models",
+    "objective",
+    "objectives",
     "plot",
     "reduce",
     "rom",
     "run_study",
+    "sensitivities",
     "simulate",
     "simulate_many",
     "studies",

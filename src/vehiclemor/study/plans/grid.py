@@ -16,7 +16,13 @@ from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.method_settings import Settings, complete_settings, default_settings
 from vehiclemor.study.plans.study_file import FACTORS, StudyFile, values
-from vehiclemor.study.scenario import Scenario, check, training_scenarios
+from vehiclemor.study.scenario import (
+    Overrides,
+    Scenario,
+    check,
+    overrides,
+    training_scenarios,
+)
 
 
 @dataclass(frozen=True)
@@ -124,8 +130,15 @@ def _tests(
     for run in itertools.product(*(dimensions[d] for d in (*FACTORS, "start"))):
         test = Scenario(maneuver.perturbed(*run[:-1]), run[-1])
         check(model, test)
-        found[run] = training_scenarios(test, study.training, pairs), test
+        found[run] = training_scenarios(test, study.training, pairs, _trained(study)), test
     return found
+
+
+def _trained(study: StudyFile) -> list[Overrides] | None:
+    """Cars that are trained on; None for the tested one."""
+    if isinstance(study.cars, str):
+        return None if study.cars == "own" else [()]
+    return [overrides(table) for table in study.cars]
 
 
 def _some_fits(model: Model, cells: list[Experiment]) -> None:
