@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
+    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -38,11 +40,12 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    **dict.fromkeys(("run_study", "simulate", "studies", "write_report"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
+    "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
@@ -57,6 +60,7 @@ __all__ = [
     "describe",
     "export",
     "figures",
+    "leaderboard",
     "load",
     "maneuvers",
     "methods",
@@ -72,6 +76,7 @@ __all__ = [
     "simulate",
     "simulate_many",
     "studies",
+    "write_report",
 ]
 
 
