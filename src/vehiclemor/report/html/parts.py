@@ -40,11 +40,11 @@ class Picture(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """An interactive plot, as the script of the page draws it; `id` is its element's."""
+    """Interactive figures beside one another, as the script of the page draws them."""
 
     id: str
     caption: str
-    item: Mapping[str, Any]
+    figures: list[Mapping[str, Any]]
 
 
 class Cell(NamedTuple):

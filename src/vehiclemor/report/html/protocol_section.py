@@ -10,8 +10,8 @@ import xarray as xr
 
 from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.saving import styled
-from vehiclemor.report.html import interactive
-from vehiclemor.report.html.cells import stored_cell
+from vehiclemor.report.html.cells import UNNAMED, stored_cell
+from vehiclemor.report.html.interactive import available
 from vehiclemor.report.html.parts import (
     Cell,
     Entry,
@@ -22,6 +22,7 @@ from vehiclemor.report.html.parts import (
     judged_entry,
     quantity,
 )
+from vehiclemor.report.html.protocol_plots import runs_plot
 from vehiclemor.report.html.provenance import facts, source_text
 from vehiclemor.report.html.vector import svg_element
 from vehiclemor.report.labels import label_of, unit_of
@@ -54,16 +55,13 @@ def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
     caption = "Worst error over its bound on the judged runs, over the time of a whole call."
     with styled():
         svg = svg_element(figure_pareto({name: dataset}), f"{name}-pareto", caption)
-    plots = []
-    if interactive.available():
-        plots.append(interactive.runs_plot(f"plot-{name}-runs", judged_part(dataset), protocol))
     return Section(
         f"study-{name}",
         str(dataset.attrs["title"]),
         _intro(dataset, rows, winner),
         [table for table in tables if table.rows],
         [Picture(caption, svg)],
-        plots,
+        runs_plot(name, judged_part(dataset), protocol) if available() else [],
         facts(dataset, cells),
         cells,
         source_text(dataset, folder),
@@ -103,8 +101,7 @@ def _cell(row: Row, anchor: str, dataset: xr.Dataset, folder: Path) -> Cell:
     }
     if anchor.startswith("cell-"):
         return stored_cell(folder, anchor.removeprefix("cell-"), known)
-    note = "Stored by an older version, which named no cells."
-    return Cell(f"{row['method']} on {row['model']}", known, note)
+    return Cell(f"{row['method']} on {row['model']}", known, UNNAMED)
 
 
 def _targets(rows: list[Row], anchors: dict[str, str]) -> Table:

@@ -14,7 +14,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.plans.study_file import PARAMETER
 from vehiclemor.study.provenance import attributes, layout_digest, versions
-from vehiclemor.study.store import read_arrays, read_dataset, result_path
+from vehiclemor.study.store import read_arrays, read_cell
 from vehiclemor.study.variables import meaning_of, variables
 
 if TYPE_CHECKING:
@@ -56,13 +56,12 @@ def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:
     ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(found)))
     template: xr.Dataset | None = None
     for key, flat in zip(found.astype(str), np.split(order, ends[:-1]), strict=True):
-        path = result_path(folder, key)
         if template is None:
-            template = read_dataset(path, "cell", key)
+            template = read_cell(folder, key)
             for name, variable in template.data_vars.items():
                 arrays[str(name)] = _empty(keys.shape + variable.shape, variable.dtype)
         places = np.unravel_index(flat, keys.shape)
-        cell = read_arrays(path, "cell", key)
+        cell = read_arrays(folder, key)
         for name, array in arrays.items():
             array[places] = cell[name]
     assert template is not None

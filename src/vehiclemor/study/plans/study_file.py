@@ -1,5 +1,6 @@
 """Study files: the grid of a study declared in TOML, validated on loading."""
 
+import hashlib
 import math
 import os
 from pathlib import Path
@@ -12,6 +13,7 @@ from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.study.store import Owner
 from vehiclemor.toml_files import FileSchema, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
@@ -251,13 +253,32 @@ def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
         content = read_study(file)
         if content.studies:
             raise FileError(f"{path}: studies.{member} is a collection itself")
-        if file.stem in members:
-            raise FileError(f"{path}: studies.{member}: another study is named {file.stem} too")
-        members[file.stem] = file, content
+        if content in (other for _, other in members.values()):
+            raise FileError(f"{path}: studies.{member}: the same study is in it already")
+        # As its combined dataset is named, see `combined_path`.
+        double = file.stem in members
+        members[f"{file.stem}-{content_hash(content)}" if double else file.stem] = file, content
     return members
 
 
-def file_as_stored(path: Path, folder: Path) -> str:
+def owner(study: str, path: Path, definition: FileSchema, folder: Path) -> Owner:
+    """Whose a combined dataset in a results folder is.
+
+    Parameters
+    ----------
+    study
+        Name of its results.
+    """
+    return Owner(study, _as_stored(path, folder), content_hash(definition))
+
+
+def content_hash(definition: FileSchema) -> str:
+    """Short hash of what a file says."""
+    text = definition.model_dump_json(exclude_defaults=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def _as_stored(path: Path, folder: Path) -> str:
     """How results in a folder name the file that they come from: the package's own by its name."""
     if data_folder() in path.parents:
         return path.stem
