@@ -39,6 +39,7 @@ from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import method_text, unit_of
 from vehiclemor.report.result_selection import drawn
+from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
     import xarray as xr
