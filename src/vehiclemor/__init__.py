@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
+    from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -44,6 +45,7 @@ _DEFINED_IN = {
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
     "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
@@ -57,6 +59,7 @@ __all__ = [
     "Signals",
     "VehiclemorError",
     "compare",
+    "convert",
     "describe",
     "export",
     "figures",
