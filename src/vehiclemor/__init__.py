@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import plot as plot
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
+    from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
@@ -35,7 +36,7 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
@@ -63,6 +64,7 @@ __all__ = [
     "run_study",
     "simulate",
     "simulate_many",
+    "status",
     "studies",
 ]
 

@@ -18,6 +18,7 @@ from vehiclemor.cli.plot import plot
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
+from vehiclemor.cli.status import status
 from vehiclemor.resources import handbook_folder
 
 app = App(
@@ -36,6 +37,7 @@ COMMANDS = {
     "simulate": simulate,
     "plot": plot,
     "run": run,
+    "status": status,
     "compare": compare,
     "figures": figures,
     "export": export,
