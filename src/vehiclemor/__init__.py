@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
+    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -27,7 +28,11 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
+    from vehiclemor.study.objectives import objective as objective
+    from vehiclemor.study.objectives import objectives as objectives
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -36,13 +41,18 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
+    **dict.fromkeys(
+        ("run_study", "simulate", "status", "studies", "write_report"), "vehiclemor.api"
+    ),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
+    "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
+    **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
+    "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
@@ -53,19 +63,24 @@ __all__ = [
     "describe",
     "export",
     "figures",
+    "leaderboard",
     "load",
     "maneuvers",
     "methods",
     "model",
     "models",
+    "objective",
+    "objectives",
     "plot",
     "reduce",
     "rom",
     "run_study",
+    "sensitivities",
     "simulate",
     "simulate_many",
     "status",
     "studies",
+    "write_report",
 ]
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.plans.grid import expand
+from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import validation_experiments
 from vehiclemor.study.plans.study_file import owner, studies_and_files
@@ -80,37 +79,43 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
     for name, (path, definition) in studies_and_files(study).items():
         for protocol in map(load_protocol, definition.protocols):
             of = owner(protocol.study, protocol.path, protocol.definition, folder)
-            cells = {e.key: e for e in validation_experiments(protocol)}
+            cells = {e.key: e.method for e in validation_experiments(protocol)}
             found[protocol.study] = _status(cells, of, folder, "then the chosen ones are tested")
         if not definition.protocols:
-            cells = expand(name, definition).unique
+            cells = _methods(expand(name, definition))
             found[name] = _status(cells, owner(name, path, definition, folder), folder)
     return found
 
 
-def _status(
-    cells: Mapping[str, Experiment], of: Owner, folder: Path, later: str = ""
-) -> StudyStatus:
+def _methods(grid: Grid) -> dict[str, str]:
+    """Key of each cell -> label of its method."""
+    labels = grid.dimensions["method"]
+    keys = [np.unique(grid.keys[..., place]).astype(str).tolist() for place in range(len(labels))]
+    return {key: label for label, own in zip(labels, keys, strict=True) for key in own}
+
+
+def _status(cells: Mapping[str, str], of: Owner, folder: Path, later: str = "") -> StudyStatus:
+    """Of cells with their methods."""
     result = combined_path(folder, of)
     status = StudyStatus(len(cells), result=result if result.exists() else None, later=later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     seconds: dict[str, list[float]] = defaultdict(list)
     missing: Counter[str] = Counter()
-    for key, experiment in cells.items():
+    for key, method in cells.items():
         try:
             end, finished = cell_end(folder, key)
         except FileError:
             # Missing, or set aside by the next run.
-            missing[experiment.method] += 1
+            missing[method] += 1
             continue
         for (name, message), runs in end.runs.items():
             alike = name, NUMBER.sub("#", message)
             status.ends[examples.setdefault(alike, (name, message))] += runs
         if finished:
             status.done += 1
-            seconds[experiment.method].append(end.seconds)
+            seconds[method].append(end.seconds)
         else:
-            missing[experiment.method] += 1
+            missing[method] += 1
     status.seconds_left = _seconds_left(missing, seconds)
     return status
 

@@ -260,15 +260,19 @@ def stored(
         Of the result of a study.
     """
     dataset = _current(path, attribute, key, sources)
-    if dataset is None:
-        others = (p for p in sorted(path.parent.glob("[!.]*.nc")) if p != path)
-        same = (p for p in others if global_attributes(p).get(attribute) == key)
-        found = (_current(p, attribute, key, sources) for p in same)
-        dataset = next((d for d in found if d is not None), None)
-        make_folder(path.parent)
-        dataset = (make() if dataset is None else dataset).assign_attrs({attribute: key})
-        dataset.attrs |= owner._asdict() if owner else {}
-        write_dataset(dataset, path)
+    if dataset is not None:
+        return dataset
+    for other in sorted(path.parent.glob("[!.]*.nc")):
+        if other != path and global_attributes(other).get(attribute) == key:
+            dataset = _current(other, attribute, key, sources)
+            if dataset is not None and owner is None:
+                return dataset
+            if dataset is not None:
+                break
+    make_folder(path.parent)
+    dataset = (make() if dataset is None else dataset).assign_attrs({attribute: key})
+    dataset.attrs |= owner._asdict() if owner else {}
+    write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
 
