@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
@@ -51,6 +52,7 @@ _DEFINED_IN = {
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
     "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
+    "sobol_indices": "vehiclemor.online.sobol",
 }
 __all__ = [
     "Signal",
@@ -75,6 +77,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
+    "sobol_indices",
     "studies",
     "write_report",
 ]
