@@ -111,8 +111,8 @@ class ReducedOrderModel(ShortRepr):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
         run = self.reduced.simulate(chosen, begun)
-        if self._outside and not (run.trust and run.trust.reason):
-            return run.judged(self._outside)
+        if self.outside and not (run.trust and run.trust.reason):
+            return run.judged(self.outside)
         if run.trust or self._range is None:
             return run
         own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
@@ -143,7 +143,7 @@ class ReducedOrderModel(ShortRepr):
         return replace(self, model=car, reduced=reduced, known=self.input_range)
 
     @cached_property
-    def _outside(self) -> Trust | None:
+    def outside(self) -> Trust | None:
         """What is told of the car, if it lies beyond those of the training."""
         return self.input_range.outside(component("method", self.method), self.model)
 
