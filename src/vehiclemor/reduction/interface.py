@@ -105,6 +105,8 @@ class Method(ShortRepr):
     own_limits
         Whether its runs tell themselves when they leave what the model knows, or it knows no
         bounds; else a run beyond the inputs of the training runs is not trusted.
+    exported
+        Whether what it fits can be exported; it can't if it is no straight-line program.
     fits_others
         Whether `fit` takes a `FitOther` too, by which it fits what it is made of.
     check
@@ -125,6 +127,7 @@ class Method(ShortRepr):
     check: Callable[[Any, Any], None] = fits_all
     learns_from: Literal["own", "any", "inputs"] = "own"
     own_limits: bool = False
+    exported: bool = True
     fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
 

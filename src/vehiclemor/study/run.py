@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import count, within
+from vehiclemor.errors import InputError
 from vehiclemor.progress import telling
+from vehiclemor.study.cluster import LOCAL, reached
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
 from vehiclemor.study.plans.protocol import load_protocol
@@ -25,7 +27,9 @@ MOST_JOBS = 1024
 LARGE = 10_000
 
 
-def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset]:
+def run_studies(
+    study: str, folder: Path, jobs: int = 1, scheduler: str = ""
+) -> dict[str, xr.Dataset]:
     """Run a study, or all studies of a collection, and combine the results.
 
     Parameters
@@ -36,6 +40,8 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
         Results folder; cells that it holds already are not computed again.
     jobs
         Number of processes.
+    scheduler
+        Address of a dask scheduler whose workers compute, or `local` for one that is started here.
 
     Returns
     -------
@@ -44,22 +50,25 @@ def run_studies(study: str, folder: Path, jobs: int = 1) -> dict[str, xr.Dataset
         is `predictive-<protocol>`.
     """
     within("jobs", count("jobs", jobs), (1, MOST_JOBS))
+    if jobs > 1 and scheduler not in ("", LOCAL):
+        raise InputError("jobs: a scheduler at an address has its own workers")
     files = studies_and_files(study)
     protocols = [load_protocol(name) for _, d in files.values() for name in d.protocols]
     grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
-    results = {p.study: run_protocol(p, folder, jobs) for p in protocols}
-    for path, grid in grids:
-        cells = grid.unique
-        workers = Workers(grid.name, folder, jobs)
-        workers([[cell] for cell in cells.values()])
-        results[grid.name] = stored(
-            folder / "studies" / f"{grid.name}.nc",
-            "cells",
-            cells_digest(grid),
-            partial(grid_dataset, grid, folder),
-            [result_path(folder, key) for key in cells],
-            file_as_stored(path, folder),
-        )
+    with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
+        results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
+        for path, grid in grids:
+            cells = grid.unique
+            workers = Workers(grid.name, folder, jobs, elsewhere)
+            workers([[cell] for cell in cells.values()])
+            results[grid.name] = stored(
+                folder / "studies" / f"{grid.name}.nc",
+                "cells",
+                cells_digest(grid),
+                partial(grid_dataset, grid, folder),
+                [result_path(folder, key) for key in cells],
+                file_as_stored(path, folder),
+            )
     return results
 
 

@@ -1,6 +1,7 @@
 """Scenarios: what a reduced model is trained, chosen or tested on."""
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -89,8 +90,9 @@ def input_hash(maneuver: Maneuver) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
     times = maneuver.times
     if isinstance(maneuver, Signal):
-        parts = (times, *maneuver.polynomials)
-        return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()[:16]
+        parts = [part.tobytes() for part in (times, *maneuver.polynomials)]
+        names = json.dumps(maneuver.inputs).encode()
+        return hashlib.sha256(b"".join([names, *parts])).hexdigest()[:16]
     # Adding zero makes -0 and 0 one input.
     inputs = np.ascontiguousarray(maneuver.at(times)) + 0.0
     return hashlib.sha256(times.tobytes() + inputs.tobytes()).hexdigest()[:16]

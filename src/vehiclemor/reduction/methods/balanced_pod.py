@@ -159,4 +159,5 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="any",
+    exported=False,
 )

@@ -56,4 +56,5 @@ METHOD = Method(
     check=check_subspaces,
     fit=fit,
     learns_from="any",
+    exported=False,
 )

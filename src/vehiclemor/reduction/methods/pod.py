@@ -88,4 +88,5 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="any",
+    exported=False,
 )

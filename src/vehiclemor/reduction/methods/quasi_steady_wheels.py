@@ -65,4 +65,5 @@ METHOD = Method(
     refusal=refusal,
     fit=fit,
     learns_from="inputs",
+    exported=False,
 )

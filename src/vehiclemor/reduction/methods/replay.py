@@ -110,5 +110,6 @@ METHOD = Method(
     settings=dict.fromkeys(KINDS, Settings),
     fit=fit,
     learns_from="any",
+    exported=False,
     own_limits=True,
 )

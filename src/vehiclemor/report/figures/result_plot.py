@@ -91,7 +91,7 @@ def _title(dataset: xr.Dataset) -> str:
     return title if status == "ok" else f"{title}: {status}"
 
 
-def _outputs(dataset: xr.Dataset) -> list[str]:
+def shown_outputs(dataset: xr.Dataset) -> list[str]:
     """Outputs that the model shows; of a model that is not installed here, the first."""
     known = [str(output) for output in dataset["output"].values]
     try:
@@ -130,7 +130,7 @@ def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
 def figure_histories(dataset: xr.Dataset) -> Figure:
     """Outputs over the time, the differences from full order below each."""
     full, curves = _runs(dataset)
-    outputs = _outputs(dataset)
+    outputs = shown_outputs(dataset)
     # Up to three panels beside each other, four in two rows.
     columns = len(outputs) if len(outputs) < 4 else 2
     blocks, each = -(-len(outputs) // columns), 2 if curves else 1
@@ -201,7 +201,7 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
         dataset = dataset.expand_dims(method=[label])
     methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
     texts = {m: method_text(m) for m in methods}
-    shown = {"outputs": _outputs(dataset), "methods": texts}
+    shown = {"outputs": shown_outputs(dataset), "methods": texts}
     if both:
         cells = len(grid[FACTORS[0]]) * len(grid[FACTORS[1]])
         figure = figure_error_map({"": dataset}, values=cells <= WRITTEN, **shown)

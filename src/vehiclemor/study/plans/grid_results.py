@@ -12,7 +12,7 @@ import numpy as np
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.provenance import attributes, layout_digest, versions
 from vehiclemor.study.store import read_arrays, read_dataset, result_path
-from vehiclemor.study.variables import meaning_of
+from vehiclemor.study.variables import meaning_of, variables
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,16 +58,19 @@ def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
                 array[place] = found[name]
     assert template is not None
     names = tuple(grid.dimensions)
+    keys = np.full(sizes, "", dtype=object)
+    for place, cell in grid.cells.items():
+        keys[place] = cell.key
     coordinates: dict[str, Any] = {
         name: (name, values, {"long_name": meaning_of(name)})
         for name, values in grid.dimensions.items()
     }
     coordinates |= {str(name): variable for name, variable in template.coords.items()}
-    variables = {
+    combined = {
         str(name): (names + variable.dims, arrays[str(name)], variable.attrs)
         for name, variable in template.data_vars.items()
     }
-    dataset = xr.Dataset(variables, coordinates)
+    dataset = xr.Dataset(combined | variables({"cell_key": keys}, *names), coordinates)
     cell = next(iter(grid.cells.values()))
     return dataset.assign_attrs(
         attributes(

@@ -30,7 +30,7 @@ from vehiclemor.study.plans.study_file import file_as_stored
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.store import result_path, stored
-from vehiclemor.study.workers import Workers
+from vehiclemor.study.workers import Engine, Workers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 TIMED = 24
 
 
-def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
+def run_protocol(
+    protocol: Protocol, folder: Path, jobs: int = 1, elsewhere: Engine | None = None
+) -> xr.Dataset:
     """Run a protocol; what an earlier run has finished is not computed again.
 
     Returns
@@ -48,7 +50,7 @@ def run_protocol(protocol: Protocol, folder: Path, jobs: int = 1) -> xr.Dataset:
         On the dimensions `row`, `scenario` and `output`, stored as
         `studies/predictive-<protocol>.nc` too.
     """
-    workers = Workers(protocol.study, folder, jobs)
+    workers = Workers(protocol.study, folder, jobs, elsewhere)
     rows = validate(
         protocol.model,
         protocol.definition,

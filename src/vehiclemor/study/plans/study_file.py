@@ -11,7 +11,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.toml_files import FileSchema, read_toml
+from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.toml_files import FileSchema, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # A grid of more points than this is a mistake in a file, not a study.
@@ -170,6 +171,13 @@ def study_path(study: str) -> Path:
     return named_file("study", "studies", study)
 
 
+def read_study(path: Path) -> StudyFile:
+    """A study file; of a protocol's file the study of it alone."""
+    if not has_table(path, "contestants"):
+        return read_toml(path, StudyFile)
+    return StudyFile(title=read_toml(path, ProtocolFile).title, protocols=[str(path)])
+
+
 def load_studies(study: str) -> dict[str, StudyFile]:
     """Study name -> definition; a collection gives all of its members."""
     return {name: definition for name, (_, definition) in studies_and_files(study).items()}
@@ -178,13 +186,13 @@ def load_studies(study: str) -> dict[str, StudyFile]:
 def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
     """As `load_studies`, with the files."""
     path = study_path(study)
-    definition = read_toml(path, StudyFile)
+    definition = read_study(path)
     if not definition.studies:
         return {path.stem: (path, definition)}
     members: dict[str, tuple[Path, StudyFile]] = {}
     for member in definition.studies:
         file = study_path(member)
-        content = read_toml(file, StudyFile)
+        content = read_study(file)
         if content.studies:
             raise FileError(f"{path}: studies.{member} is a collection itself")
         if file.stem in members:
