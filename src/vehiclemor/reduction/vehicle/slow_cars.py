@@ -36,8 +36,8 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
-# Runs of each other car that are learnt from, of all that are given, and steps of the common fit.
-RUNS, SWEEPS = 6, 6
+# Gauss-Newton steps of the common fit, first on a part of the runs.
+FEW, FIRST_SWEEPS, SWEEPS = 0.34, 7, 4
 # Time (s) before a car is steered, in which its starts are seen, and samples in it.
 STILL, SAMPLES = 1.0, 101
 RIDGE = 1e-10
@@ -66,7 +66,7 @@ class Member(NamedTuple):
 
 
 def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, list[Training]]:
-    """Training runs of a car, and some of those of each other one.
+    """Training runs of a car, and those of each other one.
 
     Raises
     ------
@@ -83,10 +83,7 @@ def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, l
     for number, run in zip(cars.numbers(run.model for run in training), training, strict=True):
         groups.setdefault(number, []).append(run)
     known = cars.numbers([model])[0]
-    others = [
-        spread(runs, RUNS / len(runs), n / len(groups)) for n, runs in groups.items() if n != known
-    ]
-    return own, others
+    return own, [runs for number, runs in groups.items() if number != known]
 
 
 def member(training: Training, like: SlowModes) -> Member:
@@ -212,7 +209,9 @@ def fitted_box(
         plain = replace(vehicle, encoding=np.vstack([m.modes.left, m.modes.speed_left]))
         goals.append(targets(plain, m.training, m.runs))
         vehicles.append(vehicle)
-    change = improved_together(vehicles, goals, rows, table.free, SWEEPS)
+    few = [spread(own, FEW) for own in goals]
+    change = improved_together(vehicles, few, rows, table.free, FIRST_SWEEPS)
+    change = improved_together(vehicles, goals, rows, table.free, SWEEPS, change=change)
     coefficients = np.zeros((rows.shape[1], *first.coefficients.shape))
     coefficients[0] = first.coefficients
     place = 0

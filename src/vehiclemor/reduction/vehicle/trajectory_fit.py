@@ -105,6 +105,7 @@ def improved_together(
     free: Free,
     sweeps: int,
     power: float = 2.0,
+    change: np.ndarray | None = None,
 ) -> np.ndarray:
     """Change (m, free coefficients) of several cars by so many damped Gauss-Newton steps.
 
@@ -118,31 +119,30 @@ def improved_together(
         Of the runs' errors in the sum that is made small.  With 1 the worst runs count no more than
         the others (iteratively reweighted least squares): of use from a first guess on, where the
         errors of some are too large to say much.
+    change
+        That is begun with; zero by default.
     """
-    change = np.zeros((rows.shape[1], sum(len(terms) for terms, _ in free)))
-    every, error = _all_compared(vehicles, goals, power)
-    moved, damping = list(vehicles), DAMPING
+    if change is None:
+        change = np.zeros((rows.shape[1], sum(len(terms) for terms, _ in free)))
+    moved = _all_changed(vehicles, rows, free, change)
+    every, error = _all_compared(moved, goals, power)
+    damping = DAMPING
     for _ in range(sweeps):
         if not np.isfinite(error):
             break
-        normal, gradient = np.zeros(2 * change.shape), np.zeros_like(change)
-        for vehicle, own, paths, row in zip(moved, goals, every, rows, strict=True):
-            part, slope = _normal_equations(vehicle, own, paths, free, power)
-            gradient += np.outer(row, slope)
-            for i, j in np.ndindex(len(row), len(row)):
-                normal[i, :, j] += row[i] * row[j] * part
-        print("error", error, damping, flush=True)
-        scaled, scale = unit_diagonal(normal.reshape(change.size, -1))
+        parts = [
+            _normal_equations(vehicle, own, paths, free, power)
+            for vehicle, own, paths in zip(moved, goals, every, strict=True)
+        ]
+        gradient = rows.T @ np.array([slope for _, slope in parts])
+        scaled, scale = unit_diagonal(_all_together(rows, np.array([part for part, _ in parts])))
         while damping < MOST_DAMPING:
             step = (
                 np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient.ravel() / scale)
                 / scale
             )
             further = change - step.reshape(change.shape)
-            candidates = [
-                _changed(vehicle, free, row @ further)
-                for vehicle, row in zip(vehicles, rows, strict=True)
-            ]
+            candidates = _all_changed(vehicles, rows, free, further)
             new, new_error = _all_compared(candidates, goals, power)
             if new_error < error:
                 change, moved, every, error = further, candidates, new, new_error
@@ -150,6 +150,21 @@ def improved_together(
                 break
             damping *= 10.0
     return change
+
+
+def _all_changed(
+    vehicles: Sequence[ReducedVehicle], rows: np.ndarray, free: Free, change: np.ndarray
+) -> list[ReducedVehicle]:
+    """Cars with their coefficients changed, see `improved_together`."""
+    return [_changed(v, free, row @ change) for v, row in zip(vehicles, rows, strict=True)]
+
+
+def _all_together(rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Sum over cars of the Kronecker products of their rows' squares and normal matrices."""
+    (cars, m), n = rows.shape, parts.shape[1]
+    squares = (rows[:, :, None] * rows[:, None, :]).reshape(cars, m * m)
+    found = (squares.T @ parts.reshape(cars, n * n)).reshape(m, m, n, n)
+    return found.transpose(0, 2, 1, 3).reshape(m * n, m * n)
 
 
 def _all_compared(
