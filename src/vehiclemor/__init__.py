@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
@@ -54,6 +55,7 @@ _DEFINED_IN = {
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
     "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
+    "sobol_indices": "vehiclemor.online.sobol",
 }
 __all__ = [
     "Signal",
@@ -78,8 +80,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
-    "status",
-    "studies",
+to    "studies",
     "write_report",
 ]
 
