@@ -25,8 +25,8 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.scenario import start_of
-from vehiclemor.study.store import write_dataset
 
 CAR = "independent_suspension_vehicle"
 

@@ -245,5 +245,6 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    learns_from="any",
     exported=False,
 )
