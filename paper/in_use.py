@@ -29,10 +29,9 @@ from vehiclemor.codegen.loops import Prepared
 from vehiclemor.files import make_folder
 from vehiclemor.online.rom import ReducedOrderModel as Car
 from vehiclemor.online.saved import shipped_folder
-from vehiclemor.piecewise import quiet_ends
 from vehiclemor.registry import component
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.provenance import attributes
-from vehiclemor.study.store import read_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -285,7 +284,8 @@ def kinks() -> Values:
             pieces = signal.pieces._replace(edges=TIMES[rows], first=rows)
             return replace(signal, pieces=pieces, kept={})
 
-        rests = np.flatnonzero(quiet_ends(TIMES, u[1:] != u[:-1])) + 1
+        stops, moves = signal.pieces.first[1:-1], u[1:] != u[:-1]
+        rests = stops[moves[stops - 1] != moves[stops]]
         through = ending(np.concatenate([[0], rests, [len(u) - 1]]))
         everywhere = ending(np.arange(len(u)))
         fine = car.simulate(everywhere, "equilibrium", tolerance=1e-10).outputs

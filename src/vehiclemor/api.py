@@ -234,6 +234,7 @@ def run_study(
     jobs: int = 1,
     out: str | Path = RESULTS,
     progress: Callable[[str, int, int], None] | None = None,
+    scheduler: str = "",
 ) -> xr.Dataset:
     """Run a study, resuming where an earlier run stopped.
 
@@ -247,6 +248,9 @@ def run_study(
         Results folder.
     progress
         Called with (study, finished cells, all cells).
+    scheduler
+        Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
+        with so many processes.
 
     Returns
     -------
@@ -262,8 +266,11 @@ def run_study(
 
     if progress is not None and not callable(progress):
         raise InputError(f"progress is {quoted(progress)}, not a function")
+    if not isinstance(scheduler, str):
+        raise InputError(f"scheduler is {quoted(scheduler)}, not an address")
     with listening(progress):
-        results = run_studies(str(file_path("study", study)), file_path("out", out), jobs)
+        study, out = str(file_path("study", study)), file_path("out", out)
+        results = run_studies(study, out, jobs, scheduler)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
 
 
@@ -374,3 +381,42 @@ def figures(
     if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
         raise InputError(f"only is {quoted(only)}, not a list of names of figures")
     return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)
+
+
+def write_report(
+    studies: str | Sequence[str] = (),
+    out: str | Path = "report.html",
+    results: str | Path = RESULTS,
+    jobs: int = 1,
+) -> Path:
+    """Write results as one HTML file that needs no network and no other file.
+
+    Parameters
+    ----------
+    studies
+        Names of studies or collections, TOML files, run first where results are missing, or models,
+        of which their studies by default are meant; all that is stored by default.
+    out
+        The file.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name is wrong, nothing is stored, or the file can't be written.
+    """
+    from vehiclemor.report.html import document
+
+    page, folder = file_path("out", out), file_path("results", results)
+    chosen = [studies] if isinstance(studies, str) else studies
+    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
+        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
+    return document.write_report(chosen, page, folder, count("jobs", jobs))

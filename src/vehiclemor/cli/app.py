@@ -16,6 +16,7 @@ from vehiclemor.cli.figures import figures
 from vehiclemor.cli.leaderboard import leaderboard
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.plot import plot
+from vehiclemor.cli.report import report
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
@@ -40,6 +41,7 @@ COMMANDS = {
     "compare": compare,
     "leaderboard": leaderboard,
     "figures": figures,
+    "report": report,
     "export": export,
     "cite": cite,
 }

@@ -11,7 +11,7 @@ from vehiclemor.cli.progress import shown_progress
 from vehiclemor.report.printing import wrapped
 
 
-def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
+def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESULTS) -> int:
     """Run a study; what an earlier run has finished is not computed again.
 
     A cell that stands at several points of the grid is computed once.
@@ -22,6 +22,9 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
         Name of a study or collection, or a TOML file.
     jobs
         Number of processes.
+    scheduler
+        Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
+        with so many processes.
     out
         Results folder.
     """
@@ -37,13 +40,13 @@ def run(study: str, *, jobs: int = 1, out: Path = api.RESULTS) -> int:
             shown(name, done, total)
 
         with listening(counted):
-            results = run_studies(study, out, jobs)
+            results = run_studies(study, out, jobs, scheduler)
     errors = 0
     for name, dataset in results.items():
         count = Counter(str(status) for status in dataset["status"].values.ravel())
         counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
         places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
-        print(wrapped(f"{name}: {places}; {out / 'studies' / f'{name}.nc'}", 0, 2))
+        print(wrapped(f"{name}: {places}; {dataset.encoding['source']}", 0, 2))
         errors += count["error"]
     print(f"{time.perf_counter() - began:.1f} s")
     if errors:

@@ -15,6 +15,7 @@ import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -24,6 +25,9 @@ from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 from vehiclemor.progress import making
 
+# Gives a file by its name, or by making it.
+Asked = Callable[[str, Callable[[], bytes]], bytes]
+_OTHERS: ContextVar[Asked | None] = ContextVar("others", default=None)
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
@@ -50,7 +54,11 @@ def cache_folder() -> Path:
     Where it can't be written, or others could write it, a temporary folder: then every process
     compiles for itself, with its workers.
     """
-    return _folders(os.environ.get("VEHICLEMOR_CACHE"))[0]
+    return _folders(_chosen())[0]
+
+
+def _chosen() -> str | None:
+    return os.environ.get("VEHICLEMOR_CACHE")
 
 
 @cache
@@ -104,7 +112,7 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     make
         Gives the content.
     """
-    folders = _folders(os.environ.get("VEHICLEMOR_CACHE"))
+    folders = _folders(_chosen())
     for folder in folders:
         content, reason = _checked(folder / name, name)
         if content is not None:
@@ -116,9 +124,37 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     with making(what, derived=derived), locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
-            content = make()
-            _keep(folders, name, _digest(name, content) + b"\n" + content)
+            others = _OTHERS.get()
+            content = others(name, make) if others else make()
+            _keep(folders, name, packed(name, content))
     return content
+
+
+@contextmanager
+def asking(others: Asked) -> Iterator[None]:
+    """Ask others inside for files that the cache lacks."""
+    token = _OTHERS.set(others)
+    try:
+        yield
+    finally:
+        _OTHERS.reset(token)
+
+
+def packed(name: str, content: bytes) -> bytes:
+    """A file of the cache as it is kept and sent: a hash of name and content before the content."""
+    return _digest(name, content) + b"\n" + content
+
+
+def unpacked(name: str, file: bytes) -> bytes | None:
+    """Content of a file of the cache; None if it is not what was packed."""
+    digest, _, content = file.partition(b"\n")
+    return content if digest == _digest(name, content) else None
+
+
+def held(name: str) -> bytes | None:
+    """Content of a file, if the cache has it."""
+    found = (_checked(folder / name, name)[0] for folder in _folders(_chosen()))
+    return next((content for content in found if content is not None), None)
 
 
 @contextmanager
@@ -143,12 +179,12 @@ def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
     try:
         with path.open("rb") as file:
             reason = _distrust(os.fstat(file.fileno()))
-            digest, _, content = file.read().partition(b"\n")
+            content = unpacked(name, file.read())
     except FileNotFoundError:
         return None, ""
     except OSError as error:
-        digest, content, reason = b"", b"", error.strerror or "it can't be read"
-    if not reason and _digest(name, content) == digest:
+        content, reason = None, error.strerror or "it can't be read"
+    if not reason and content is not None:
         return content, ""
     return None, reason or "the file is damaged"
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder, write_text
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,11 +8,12 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Generator, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vehiclemor.codegen.object_cache import cache_folder
 from vehiclemor.errors import MachineError, machine_reason
@@ -21,32 +22,41 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
     cell_path,
+    finished_cells,
     prepare_folder,
-    read_dataset,
+    read_cell,
     remove_partial,
-    result_path,
     write_cell,
 )
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     import xarray as xr
 
 Groups = Sequence[Sequence[Experiment]]
+# Keys of what is finished of a group, and how the machine has failed in the rest, if it has.
+Done = tuple[list[str], str]
+# What evaluates groups elsewhere and stores their results: in processes, or on a cluster.
+Engine = Callable[[Groups, Path], Generator[Done, None, None]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
-# Groups sent for each worker, so that none is idle; more would not fit into its queue.
+# Batches sent for each worker, so that none is idle; more would not fit into its queue.
 WAITING = 2
+# Seconds that a batch should take, beside which it is nothing to send it; and its most experiments.
+BATCH, LARGEST = 0.5, 100
 KILLED = "a worker process was killed, perhaps for lack of memory"
 _LOG = logging.getLogger("vehiclemor")
 
 
 @dataclass
 class Workers:
-    """Evaluates what is missing of some experiments, in so many jobs, and stores it."""
+    """Evaluates what is missing of experiments, in so many jobs or elsewhere, and stores it."""
 
     name: str
     folder: Path
     jobs: int = 1
+    elsewhere: Engine | None = None
     asked: set[str] = field(default_factory=set)
     finished: set[str] = field(default_factory=set)
 
@@ -61,7 +71,7 @@ class Workers:
         remove_partial(self.folder)
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
-        self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        self.finished |= finished_cells(self.folder, keys - self.finished)
         if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
@@ -84,8 +94,7 @@ class Workers:
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        path = result_path(self.folder, experiment.key)
-        return read_dataset(path, "cell", experiment.key)
+        return read_cell(self.folder, experiment.key)
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -101,15 +110,20 @@ class Workers:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
         # Starting processes costs seconds: a handful of groups is quicker without.  But what has
         # killed a worker would kill this process too.
-        if self.jobs == 1 or (len(work) < 2 * self.jobs and not again):
+        few = len(work) < 2 * self.jobs and not again
+        if not self.elsewhere and (self.jobs == 1 or few):
             for group in work:
                 yield self._taken(*evaluate_and_store(group, self.folder))
             return
         # One group of each method first, so that workers compile different loops at a time.
         first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
         work.sort(key=lambda group: id(group) not in first)
-        with closing(evaluated_by_workers(work, self.folder, self.jobs)) as pool:
-            for done in pool:
+        if self.elsewhere:
+            engine = self.elsewhere(work, self.folder)
+        else:
+            engine = evaluated_by_workers(work, self.folder, self.jobs)
+        with closing(engine):
+            for done in engine:
                 yield self._taken(*done)
 
     def _taken(self, finished: list[str], fault: str) -> str:
@@ -118,22 +132,32 @@ class Workers:
         return fault
 
 
-def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> tuple[list[str], str]:
+def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     """Evaluate some experiments, and move each complete file into place.
-
-    Returns
-    -------
-    tuple
-        Keys of those that are stored, and how the machine has failed in others; empty if it has
-        not.
 
     Raises
     ------
     MachineError
         If a result can't be stored: no other could.
     """
+    # Another driver may have stored it, or a worker that was killed before it could say so.
+    there = {e.key for e in experiments if cell_path(folder, e.key).exists()}
+    left = [e for e in experiments if e.key not in there]
+
+    def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
+        write_cell(dataset, folder, key, seconds)
+
+    finished, fault = evaluated(left, keep)
+    return [*there, *finished], fault
+
+
+def evaluated(
+    experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset, float], object]
+) -> Done:
+    """Evaluate some experiments, and keep what each gives, under its key, and its seconds."""
     finished, fault = [], ""
     for experiment in experiments:
+        began = time.perf_counter()
         try:
             dataset = evaluate(experiment)
         except Exception as error:
@@ -141,16 +165,65 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> tuple
             if not fault:
                 raise
             continue
-        write_cell(dataset, folder, experiment.key)
+        keep(experiment.key, dataset, time.perf_counter() - began)
         finished.append(experiment.key)
     return finished, fault
 
 
+class Timed(NamedTuple):
+    """What a batch gives, and the seconds that a worker took for it."""
+
+    result: Any
+    seconds: float
+
+
+def timed_batch(work: Callable[..., Any], *arguments: object) -> Timed:
+    """Run a batch on a worker."""
+    began = time.perf_counter()
+    return Timed(work(*arguments), time.perf_counter() - began)
+
+
+def in_batches(
+    groups: Groups,
+    submit: Callable[[list[Experiment]], Future[Timed]],
+    places: Callable[[], int],
+    taken: Callable[[Future[Timed]], Timed],
+) -> Generator[Any, None, None]:
+    """Send groups to workers, several at once where they are quick; gives what comes back.
+
+    Parameters
+    ----------
+    submit
+        Sends a batch.
+    places
+        Tells how many batches can be worked at a time.
+    taken
+        Gives what a batch that is done has given.
+    """
+    from concurrent.futures import FIRST_COMPLETED, wait
+
+    waiting: dict[Future[Timed], int] = {}
+    left, size = deque(groups), 1
+    while left or waiting:
+        at_once = WAITING * max(places(), 1)
+        while left and len(waiting) < at_once:
+            batch = list(left.popleft())
+            # The last batches are small, so that workers end together.
+            while left and len(batch) < min(size, len(left) // at_once):
+                batch += left.popleft()
+            waiting[submit(batch)] = len(batch)
+        for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+            number, (result, seconds) = waiting.pop(future), taken(future)
+            if seconds > 0.0:
+                size = int(min(max(BATCH * number / seconds, 1), LARGEST))
+            yield result
+
+
 def evaluated_by_workers(
-    groups: Groups, folder: Path, jobs: int
-) -> Generator[tuple[list[str], str], None, None]:
-    """What `evaluate_and_store` gives for each group, in processes that end with this one."""
-    from concurrent.futures import FIRST_COMPLETED, Future, wait
+    groups: Groups, folder: Path, jobs: int, work: Callable[..., Done] = evaluate_and_store
+) -> Generator[Done, None, None]:
+    """What `evaluate_and_store` gives for each batch, in processes that end with this one."""
+    from concurrent.futures import Future
     from concurrent.futures.process import BrokenProcessPool
 
     from joblib.externals.loky import get_reusable_executor
@@ -164,17 +237,12 @@ def evaluated_by_workers(
         initargs=(os.getpid(), str(cache_folder())),
         env={"PYTHONFAULTHANDLER": ""},
     )
-    waiting: set[Future] = set()
-    left = iter(groups)
+
+    def submit(batch: list[Experiment]) -> Future[Timed]:
+        return pool.submit(timed_batch, work, batch, folder)
+
     try:
-        while True:
-            while len(waiting) < WAITING * jobs and (group := next(left, None)):
-                waiting.add(pool.submit(evaluate_and_store, group, folder))
-            if not waiting:
-                return
-            done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in done:
-                yield future.result()
+        yield from in_batches(groups, submit, lambda: jobs, Future.result)
     except BrokenProcessPool:
         yield [], KILLED
     except BaseException:

@@ -39,6 +39,7 @@ from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import method_text, unit_of
 from vehiclemor.report.result_selection import drawn
+from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,7 +115,7 @@ def _title(dataset: xr.Dataset) -> str:
     return title if status == "ok" else f"{title}: {status}"
 
 
-def _outputs(dataset: xr.Dataset) -> list[str]:
+def shown_outputs(dataset: xr.Dataset) -> list[str]:
     """Outputs that the model shows; of a model that is not installed here, the first."""
     known = [str(output) for output in dataset["output"].values]
     try:
@@ -153,7 +154,7 @@ def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
 def figure_histories(dataset: xr.Dataset) -> Figure:
     """Outputs over the time, the differences from full order below each."""
     full, curves = _runs(dataset)
-    outputs = _outputs(dataset)
+    outputs = shown_outputs(dataset)
     # Up to three panels beside each other, four in two rows.
     columns = len(outputs) if len(outputs) < 4 else 2
     blocks, each = -(-len(outputs) // columns), 2 if curves else 1
@@ -213,8 +214,30 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
         (label,) = _points(dataset)
         dataset = dataset.expand_dims(method=[label])
     if sample_axis(dataset):
-        return figure_samples(dataset, _outputs(dataset))
-    return figure_grid_errors(dataset, _outputs(dataset)) or _errors_of_a_point(dataset)
+        return figure_samples(dataset, shown_outputs(dataset))
+    return figure_grid_errors(dataset, shown_outputs(dataset)) or _errors_of_a_point(dataset)
+
+
+def error_axes(dataset: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
+    """Axes over which errors are drawn: both factors, else the longest one of numbers, if any.
+
+    Returns
+    -------
+    dataset, list of str, list of str
+        The dataset at one place of all other dimensions, the axes, and that place in words.
+    """
+    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
+    grid = {d: values for d, values in grid.items() if len(values) > 1}
+    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
+    drawn = sorted(axes, key=lambda d: len(grid[d]))[-1:]
+    drawn = list(FACTORS) if set(FACTORS) <= set(axes) else drawn
+    at = []
+    for dimension in (d for d in grid if d not in drawn):
+        values = grid[dimension].tolist()
+        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
+        dataset = dataset.sel({dimension: value})
+        at.append(f"{dimension} {value}")
+    return dataset, drawn, at
 
 
 def _errors_of_a_point(dataset: xr.Dataset) -> Figure:

@@ -1,0 +1,290 @@
+"""Studies on a cluster: workers of dask.distributed, at a scheduler's address or on this machine.
+
+Workers write their results into the driver's folder where they see it, else the driver does.  Of
+compiled kernels they ask the driver, and one another, before one of them makes it.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vehiclemor.codegen.object_cache import asking, cache_folder, held, packed, unpacked
+from vehiclemor.codegen.once import once
+from vehiclemor.errors import FileError, InputError, MachineError, one_line
+from vehiclemor.files import probe_folder, temporary_path, write_text
+from vehiclemor.study.evaluate import model_of
+from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.provenance import code_digest
+from vehiclemor.study.store import write_cell
+from vehiclemor.study.workers import (
+    KILLED,
+    Done,
+    Engine,
+    Groups,
+    Timed,
+    evaluate_and_store,
+    evaluated,
+    in_batches,
+    timed_batch,
+)
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+    import xarray as xr
+    from distributed import Client
+
+LOCAL = "local"
+# Seconds: to reach a scheduler, until the driver has answered, between two looks at who works.
+REACH, ANSWER, LOOK = 10.0, 20.0, 1.0
+# Packages that must be the same everywhere; that of Python is its first two numbers.
+SAME = ("python", "distributed")
+_LOG = logging.getLogger("vehiclemor")
+
+
+class Place(NamedTuple):
+    """Where results belong, and how a worker finds out whether it sees that folder.
+
+    Attributes
+    ----------
+    token, text
+        A file of the driver's, and what it holds.
+    topic
+        Under which the driver is asked for kernels.
+    """
+
+    folder: Path
+    token: Path
+    text: str
+    topic: str
+
+
+@contextmanager
+def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
+    """The workers of a scheduler, or with `local` so many new ones that end with this process.
+
+    Raises
+    ------
+    InputError
+        If the scheduler can't be reached, or runs other versions.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
+    with ExitStack() as stack:
+        address: Any = scheduler
+        if scheduler == LOCAL:
+            address = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=jobs,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.ERROR,
+                    env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"},
+                )
+            )
+        client = stack.enter_context(_client(address))
+        topic = f"vehiclemor-{uuid.uuid4().hex}"
+        client.subscribe_topic(topic, partial(_answer, client, topic))
+        yield partial(evaluated_by_cluster, client=client, topic=topic)
+
+
+@contextmanager
+def _client(address: Any) -> Iterator[Client]:
+    from distributed import Client
+
+    with warnings.catch_warnings():
+        # What differs is an error below.
+        warnings.simplefilter("ignore")
+        try:
+            client = Client(address, timeout=REACH, set_as_default=False)
+        except (OSError, ValueError, TypeError, ImportError) as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
+    with client:
+        _same_versions(client)
+        number = sum(client.nthreads().values())
+        work = f"{number} places for cells" if number else "no worker yet, cells wait for the first"
+        _LOG.info(
+            "scheduler %s: %s; dashboard %s", client.scheduler.address, work, client.dashboard_link
+        )
+        yield client
+
+
+def _same_versions(client: Client) -> None:
+    """Raise `InputError` if the scheduler or a worker runs other versions than this process."""
+    found = client.get_versions()
+    own = _versions(found["client"])
+    others = {"the scheduler": found["scheduler"]}
+    others |= {f"worker {name}": entry for name, entry in found["workers"].items()}
+    for who, entry in others.items():
+        for package, version in _versions(entry).items():
+            if version != own[package]:
+                raise InputError(
+                    f"scheduler: {who} runs {package} {version}, this process {own[package]}; "
+                    f"install the same versions"
+                )
+
+
+def _versions(entry: dict[str, Any] | None) -> dict[str, str]:
+    packages = (entry or {}).get("packages") or {}
+    found = {name: str(packages.get(name)) for name in SAME}
+    return found | {"python": ".".join(found["python"].split(".")[:2])}
+
+
+async def _answer(client: Client, topic: str, event: tuple[float, str]) -> None:
+    """Give a worker a file of this process's cache; nothing if it has none."""
+    import asyncio
+
+    from distributed import Variable
+
+    name = event[1]
+    content = await asyncio.to_thread(held, name)
+    answer = b"" if content is None else packed(name, content)
+    await Variable(f"{topic} {name}", client=client).set(answer)
+
+
+def evaluated_by_cluster(
+    groups: Groups,
+    folder: Path,
+    client: Client,
+    topic: str,
+    work: Callable[..., tuple[Done, dict[str, tuple[xr.Dataset, float]]]] | None = None,
+) -> Generator[Done, None, None]:
+    """What `evaluate_and_store` gives for each batch, by the workers of a cluster."""
+    from distributed.cfexecutor import ClientExecutor
+
+    folder = folder.absolute()
+    token = temporary_path(folder / "cells" / "token")
+    place = Place(folder, token, uuid.uuid4().hex, topic)
+    pool = ClientExecutor(client, pure=False)
+    seen, number = 0.0, 0
+
+    def submit(batch: list[Experiment]) -> Future[Timed]:
+        return pool.submit(timed_batch, work or on_worker, batch, place)
+
+    def places() -> int:
+        nonlocal seen, number
+        if time.monotonic() - seen > LOOK:
+            seen, number = time.monotonic(), sum(client.nthreads().values())
+        return number
+
+    try:
+        write_text(token, place.text)
+        for done, results in in_batches(groups, submit, places, _taken):
+            for key, (dataset, seconds) in results.items():
+                write_cell(dataset, folder, key, seconds)
+            yield done
+    finally:
+        pool.shutdown(wait=False)
+        token.unlink(missing_ok=True)
+
+
+def _taken(future: Future[Timed]) -> Timed:
+    """What a worker has given; what it has died of is a fault of the machine."""
+    from concurrent.futures import CancelledError
+
+    from distributed import KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker:
+        return Timed((([], KILLED), {}), 0.0)
+    except CancelledError:
+        raise MachineError(
+            "the scheduler is lost; what is finished is stored: run again to resume"
+        ) from None
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"scheduler: a worker lacks what this process has ({one_line(error)}); "
+            f"install the same versions"
+        ) from error
+
+
+# On a worker
+
+
+def on_worker(
+    experiments: Sequence[Experiment], place: Place
+) -> tuple[Done, dict[str, tuple[xr.Dataset, float]]]:
+    """Evaluate some experiments; gives their results too, if the driver is to write them."""
+    with _turn(), asking(partial(_from_others, place.topic)):
+        _same_source(experiments)
+        if _sees(place):
+            return evaluate_and_store(experiments, place.folder), {}
+        results: dict[str, tuple[xr.Dataset, float]] = {}
+
+        def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
+            results[key] = dataset, seconds
+
+        return evaluated(experiments, keep), results
+
+
+@once
+def _turn() -> threading.Lock:
+    """Cells of one process take turns, with linear algebra on one thread: netCDF allows no two."""
+    from threadpoolctl import threadpool_limits
+
+    threadpool_limits(1)
+    return threading.Lock()
+
+
+@cache
+def _sees(place: Place) -> bool:
+    """Whether a worker can write into the driver's own folder, not into another of its name."""
+    try:
+        if place.token.read_text() != place.text:
+            return False
+        probe_folder(place.token.parent)
+    except (OSError, FileError, MachineError):
+        return False
+    return True
+
+
+def _same_source(experiments: Sequence[Experiment]) -> None:
+    """Raise `InputError` if results would be those of other source or another compiler."""
+    for e in experiments:
+        what = ""
+        if code_digest(e.model, e.method) != e.code:
+            what = "another version of vehiclemor, or of the package of"
+        elif model_of(e).kernel_hash != e.kernel:
+            what = "another processor or compiler, which gives other kernels of"
+        if what:
+            from distributed import get_worker
+
+            raise InputError(
+                f"scheduler: worker {get_worker().address} has {what} {e.model} with {e.method}; "
+                f"cells are known by what computes them, so it must be the driver's own"
+            )
+
+
+def _from_others(topic: str, name: str, make: Callable[[], bytes]) -> bytes:
+    """A file of the cache: the driver's, or another worker's, or else made for all."""
+    from distributed import Lock, Variable, get_client, get_worker
+
+    client = get_client()
+    shared = Variable(f"{topic} {name}", client=client)
+    with Lock(f"{topic} {name}"):
+        for answer in (0.0, ANSWER):
+            if answer:
+                get_worker().log_event(topic, name)
+            try:
+                content = unpacked(name, shared.get(timeout=answer))
+            except TimeoutError:
+                continue
+            if content is not None:
+                return content
+        content = make()
+        shared.set(packed(name, content))
+    return content
