@@ -46,6 +46,8 @@ if TYPE_CHECKING:
 LOCAL = "local"
 # Seconds: to reach a scheduler, until the driver has answered, between two looks at who works.
 REACH, ANSWER, LOOK = 10.0, 20.0, 1.0
+# Ctrl-C reaches all processes of a terminal, and the driver ends the workers.
+NO_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 # Packages that must be the same everywhere; that of Python is its first two numbers.
 SAME = ("python", "distributed")
 _LOG = logging.getLogger("vehiclemor")
@@ -81,7 +83,11 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
         import distributed
     except ImportError:
         raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
+    from distributed.utils import silence_logging_cmgr
+
     with ExitStack() as stack:
+        # What matters is said in one line; it would add a traceback for each lost connection.
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))
         address: Any = scheduler
         if scheduler == LOCAL:
             address = stack.enter_context(
@@ -90,7 +96,8 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
                     threads_per_worker=1,
                     processes=True,
                     dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.ERROR,
+                    silence_logs=False,
+                    preload=[NO_INTERRUPT],
                     env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"},
                 )
             )
@@ -104,22 +111,39 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
 def _client(address: Any) -> Iterator[Client]:
     from distributed import Client
 
+    if isinstance(address, str):
+        _knock(address)
     with warnings.catch_warnings():
         # What differs is an error below.
         warnings.simplefilter("ignore")
-        try:
-            client = Client(address, timeout=REACH, set_as_default=False)
-        except (OSError, ValueError, TypeError, ImportError) as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
+        client = Client(address, timeout=REACH, set_as_default=False)
     with client:
         _same_versions(client)
         number = sum(client.nthreads().values())
         work = f"{number} places for cells" if number else "no worker yet, cells wait for the first"
-        _LOG.info(
-            "scheduler %s: %s; dashboard %s", client.scheduler.address, work, client.dashboard_link
-        )
+        at, dashboard = client.scheduler.address, client.dashboard_link
+        _LOG.info("scheduler %s: %s; dashboard %s", at, work, dashboard)
         yield client
+
+
+def _knock(address: str) -> None:
+    """Raise `InputError` if there is no scheduler: a client that fails hangs when it is deleted."""
+    import asyncio
+
+    from distributed.core import connect
+    from distributed.security import Security
+
+    async def knock() -> None:
+        arguments = Security().get_connection_args("client")
+        # What is no scheduler may accept the connection, and never answer.
+        connection = await asyncio.wait_for(connect(address, timeout=REACH, **arguments), REACH + 1)
+        connection.abort()
+
+    try:
+        asyncio.run(knock())
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
+        reason = " ".join(str(error).split()) or f"no answer in {REACH:g} s"
+        raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
 
 
 def _same_versions(client: Client) -> None:
