@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
+    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -26,7 +27,11 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
+    from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
+    from vehiclemor.study.objectives import objective as objective
+    from vehiclemor.study.objectives import objectives as objectives
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -35,13 +40,16 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    **dict.fromkeys(("run_study", "simulate", "studies", "write_report"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
+    "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
+    **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
+    "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [
@@ -52,18 +60,23 @@ __all__ = [
     "describe",
     "export",
     "figures",
+    "leaderboard",
     "load",
     "maneuvers",
     "methods",
     "model",
     "models",
+    "objective",
+    "objectives",
     "plot",
     "reduce",
     "rom",
     "run_study",
+    "sensitivities",
     "simulate",
     "simulate_many",
     "studies",
+    "write_report",
 ]
 
 

@@ -323,7 +323,8 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
     what
         `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
         not seen, beside full-order integrators.  The name of a model: every method that fits it,
-        nominal, perturbed and on unseen inputs, with costs.
+        nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
+        name or TOML file: errors of every method over the grid, or on the protocol's inputs.
     out
         Results folder.
     jobs
@@ -335,8 +336,8 @@ def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd
         Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
         floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
         that the paper doesn't have), measure, reason, threshold_source; described at
-        `comparison.rows.Row`, those of the others at `predictive_comparison` and
-        `model_comparison` in `vehiclemor.report`.
+        `comparison.rows.Row`, those of the others at `predictive_comparison`,
+        `model_comparison` and `study_comparison` in `vehiclemor.report`.
     """
     from vehiclemor.report.comparison.kinds import comparison
 
@@ -380,3 +381,42 @@ def figures(
     if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
         raise InputError(f"only is {quoted(only)}, not a list of names of figures")
     return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)
+
+
+def write_report(
+    studies: str | Sequence[str] = (),
+    out: str | Path = "report.html",
+    results: str | Path = RESULTS,
+    jobs: int = 1,
+) -> Path:
+    """Write results as one HTML file that needs no network and no other file.
+
+    Parameters
+    ----------
+    studies
+        Names of studies or collections, TOML files, run first where results are missing, or models,
+        of which their studies by default are meant; all that is stored by default.
+    out
+        The file.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name is wrong, nothing is stored, or the file can't be written.
+    """
+    from vehiclemor.report.html import document
+
+    page, folder = file_path("out", out), file_path("results", results)
+    chosen = [studies] if isinstance(studies, str) else studies
+    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
+        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
+    return document.write_report(chosen, page, folder, count("jobs", jobs))

@@ -17,6 +17,8 @@ from vehiclemor.toml_files import FileSchema, read_toml
 
 # No road vehicle has a part farther than this from its origin (m).
 LARGEST_LENGTH = 20.0
+# Components of a point, as they follow its name after a full stop.
+AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,8 @@ def load_parameters(
     path
         Parameter file; the model's own public data by default.
     overrides
-        Parameter name -> value in SI units that replaces the file's.
+        Parameter name -> value in SI units that replaces the file's; `name.z` is one component of a
+        point.
 
     Raises
     ------
@@ -178,16 +181,44 @@ def overridden(
     if not isinstance(overrides, Mapping):
         raise InputError(f"parameters must be a mapping of names to values, not {overrides!r}")
     model, entries = parameters.model, dict(parameters.entries)
-    for name, value in overrides.items():
-        if name not in entries:
-            hint = did_you_mean(name, expected) or f"it has {', '.join(expected)}"
-            raise InputError(f"{name!r} is not a parameter of {model}; {hint}")
-        number = _number_or_list(value, name)
+    for given, value in overrides.items():
+        name, axis = parameter_and_axis(model, expected, given)
+        number = _number_or_list(value, given)
+        if axis is not None:
+            point = np.atleast_1d(entries[name].value).tolist()
+            if isinstance(number, list):
+                raise InputError(f"parameter {given}: a number is needed, not a list")
+            point[axis] = number
+            number = point
         _check_value(number, expected[name], f"parameter {name}", InputError)
         entries[name] = entries[name].model_copy(
             update={"value": number, "status": "assumed", "source": "override"}
         )
     return ParameterSet(model, entries)
+
+
+def parameter_and_axis(
+    model: str, expected: Mapping[str, Declared], name: str
+) -> tuple[str, int | None]:
+    """A parameter, and the number of the component if it is one of a point, such as `joint.z`.
+
+    Raises
+    ------
+    InputError
+        If the model has no such parameter.
+    """
+    whole, _, axis = name.partition(".")
+    declared = expected.get(name, expected.get(whole))
+    if declared is None:
+        hint = did_you_mean(whole, expected) or f"it has {', '.join(expected)}"
+    elif name == whole:
+        return name, None
+    elif declared.size == len(AXES) and axis in AXES:
+        return whole, AXES.index(axis)
+    else:
+        has = "is a number" if declared.size == 1 else f"has the components {', '.join(AXES)}"
+        hint = f"{whole} {has}"
+    raise InputError(f"{name!r} is not a parameter of {model}; {hint}")
 
 
 def _number_or_list(value: object, name: str) -> float | list[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,9 @@ import numpy as np
 from vehiclemor.arguments import file_path, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
-from vehiclemor.piecewise import HOLDS, Pieces, through
+from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
 from vehiclemor.registry import unknown
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.signal_columns import array_columns, csv_columns
 from vehiclemor.units import base_units
 
@@ -107,17 +109,14 @@ class Signal(Maneuver):
         names = _names(inputs, values.shape[1])
         if not isinstance(name, str) or not name:
             raise InputError(f"name is {quoted(name)}, not a text")
+        (pieces,) = through(times, values[None], hold)
         duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
-        samples = _output_samples(duration, output_step)
-        pieces = through(times, values, hold)
-        return cls(
-            name,
-            f"{len(times)} samples, {hold} hold",
-            _no_function,
-            names,
-            duration,
-            samples,
-            _no_corners,
+        return _template()._with(
+            name=name,
+            summary=f"{len(times)} samples, {hold} hold",
+            inputs=names,
+            duration=duration,
+            samples=_output_samples(duration, output_step),
             hold=hold,
             pieces=pieces,
         )
@@ -131,8 +130,8 @@ class Signal(Maneuver):
         if "polynomials" not in self.kept:
             inputs = self.pieces.coefficients.shape[1]
             orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
-            scaled = self.pieces.scaled(frequency, amplitude * frequency**orders)
-            self.kept["polynomials"] = scaled
+            amplitudes = amplitude * frequency**orders
+            self.kept["polynomials"] = scaled(self.pieces, frequency, amplitudes)
         return self.kept["polynomials"]
 
     def _with(self, **changes: Any) -> Signal:
@@ -148,7 +147,7 @@ class Signal(Maneuver):
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at the given times (n,) in s."""
-        return self.polynomials.at(np.asarray(times, dtype=float))
+        return at(self.polynomials, np.asarray(times, dtype=float))
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
@@ -202,7 +201,7 @@ class Signal(Maneuver):
         if order and self.hold != "cubic":
             raise InputError(f"{self}: derivatives of {name} follow from a cubic hold alone")
         for _ in range(order):
-            pieces = pieces.derivative()
+            pieces = derivative(pieces)
         return pieces.coefficients[:, self.inputs.index(name)]
 
     @classmethod
@@ -318,6 +317,12 @@ class Signal(Maneuver):
         return cls.from_samples(columns[time], values, hold, inputs=[*named], **further)
 
 
+@cache
+def _template() -> Signal:
+    """What all signals have alike."""
+    return Signal("signal", "", _no_function, (), 0.0, 2, _no_corners)
+
+
 def _no_function(*_: Any) -> np.ndarray:
     raise NotImplementedError("a signal is evaluated by its polynomials")
 
@@ -341,18 +346,7 @@ def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
         raise InputError(f"a signal needs two samples at least, not {len(times)}")
     values = values.reshape(len(times), -1)
     within("number of samples", len(times), (2, MOST_SAMPLES))
-    for name, array in (("t", times), ("u", values)):
-        if not np.isfinite(array).all():
-            row = int(np.argwhere(~np.isfinite(array))[0, 0])
-            raise InputError(f"samples of a signal: {name}[{row}] is not finite")
-    falls = (times[1:] <= times[:-1]).nonzero()[0]
-    if len(falls):
-        row = int(falls[0])
-        raise InputError(
-            f"samples of a signal: times must increase, t[{row + 1}] = {times[row + 1]:.6g} s "
-            f"follows {times[row]:.6g} s"
-        )
-    return times - times[0], values
+    return times - times[0], np.ascontiguousarray(values)
 
 
 def _names(inputs: Any, columns: int) -> tuple[str, ...]:

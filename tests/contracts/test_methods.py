@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import InputError
+from vehiclemor.exporting.exported import exported_system
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.online.rom import ReducedOrderModel
@@ -202,6 +203,14 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
         fast = (*fast, "pitch", "longitudinal_speed")
     chosen = moving & np.array([not name.endswith(fast) for name in pair.model.outputs])
     assert np.all(error[chosen] < bound * size[chosen])
+
+
+def test_what_is_declared_exported_can_be(pair: Pair) -> None:
+    if pair.method.exported:
+        assert exported_system(pair.fit(), "car").name == "car"
+    else:
+        with pytest.raises(InputError, match="car can't be exported"):
+            exported_system(pair.fit(), "car")
 
 
 def test_runs_are_labelled(pair: Pair) -> None:

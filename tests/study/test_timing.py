@@ -9,6 +9,7 @@ import pytest
 from vehiclemor.maneuver import sine_travel
 from vehiclemor.multibody.report import TimingCase
 from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.signals import Signal
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
@@ -129,3 +130,11 @@ def test_minus_zero_and_zero_are_one_input():
     runs = [Scenario(signed(sign), "equilibrium").run_key for sign in (1.0, -1.0)]
     assert runs[0] == runs[1]
     assert runs[0][0] != input_hash(sine_travel)
+
+
+def test_signals_of_other_inputs_are_other_runs():
+    def key(name):
+        signal = Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
+        return Scenario(signal, "equilibrium").run_key
+
+    assert key("z") == key("z") != key("s0")

@@ -14,7 +14,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation import build, input_polynomials
 from vehiclemor.simulation.dynamic import DynamicModel
 
-GAPS = st.lists(st.floats(1e-3, 0.5), min_size=3, max_size=30)
+GAPS = st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=30)
 
 
 def samples(gaps: list[float], columns: int = 1, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

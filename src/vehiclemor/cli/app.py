@@ -13,8 +13,10 @@ from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.export import export
 from vehiclemor.cli.figures import figures
+from vehiclemor.cli.leaderboard import leaderboard
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.plot import plot
+from vehiclemor.cli.report import report
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
@@ -37,7 +39,9 @@ COMMANDS = {
     "plot": plot,
     "run": run,
     "compare": compare,
+    "leaderboard": leaderboard,
     "figures": figures,
+    "report": report,
     "export": export,
     "cite": cite,
 }

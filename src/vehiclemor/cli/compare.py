@@ -17,7 +17,7 @@ def compare(
     out: Path = api.RESULTS,
     jobs: int = 1,
 ) -> int:
-    """Set published numbers beside reproduced ones, or reduced models beside full order.
+    """Set published numbers beside reproduced ones, or the methods of a study side by side.
 
     Exit status 1 if a bound is missed; what can't be compared, since the machine was too busy or
     the start is ours, counts neither way.
@@ -26,7 +26,8 @@ def compare(
     ----------
     what
         The comparison: paper (published beside reproduced), predictive (reduced models on inputs
-        that they have not seen), or the name of a model (every method that fits it).
+        that they have not seen), the name of a model (every method that fits it), or a study,
+        collection or protocol by its name or TOML file.
     json_output
         Print JSON.
     out
@@ -42,6 +43,6 @@ def compare(
         from vehiclemor.report.comparison.kinds import comparison_text
 
         print(comparison_text(what, rows, out))
-    # The comparison of a model judges nothing that was published.
-    judged = what in ("paper", "predictive")
+    # A protocol that a model has by default, and a grid, judge nothing.
+    judged = what not in api.models() and "verdict" in rows
     return MISSED if judged and "missed" in set(rows["verdict"]) else 0

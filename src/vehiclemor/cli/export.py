@@ -9,6 +9,7 @@ import vehiclemor as vm
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.export import STEP, Target, destination, name_of
+from vehiclemor.registry import component
 
 # Method that stands for the model that ships.
 SHIPPED = "shipped"
@@ -65,8 +66,13 @@ def export(
     else:
         chosen = vm.model(model, values)
         # Before anything is fitted.
-        out = destination(name_of(model, method), to, out, overwrite)
+        name = name_of(model, method)
+        out = destination(name, to, out, overwrite)
         if method is not None:
+            if not component("method", method).exported:
+                from vehiclemor.exporting.exported import WHY
+
+                raise InputError(f"{name} can't be exported: {WHY}")
             chosen = vm.reduce(chosen, method, **given)
     print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")
     return 0

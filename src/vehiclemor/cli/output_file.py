@@ -25,6 +25,20 @@ def picture_file(option: str, given: Sequence[Path], default: str) -> Path:
     return path
 
 
+def page_file(option: str, path: Path) -> Path:
+    """The HTML file that was given.
+
+    Raises
+    ------
+    InputError
+        If it has another ending, or can't be written.
+    """
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{option} {path}: the file ends with .html")
+    _exists(option, path)
+    return path
+
+
 def result_file(option: str, path: Path) -> Path:
     """The file that was given; one that stands there must be a result, which is replaced.
 
@@ -33,7 +47,7 @@ def result_file(option: str, path: Path) -> Path:
     InputError, FileError
         If it can't be written, or what stands there is something else.
     """
-    from vehiclemor.study.store import read_dataset
+    from vehiclemor.study.netcdf_file import read_dataset
 
     if _exists(option, path):
         read_dataset(path, "source", "vehiclemor")

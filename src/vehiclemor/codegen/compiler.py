@@ -39,7 +39,10 @@ OPTIONS = {
 }
 INTRINSICS = {
     name: getattr(loop_intrinsics, name)
-    for name in ("vector", "matrix", "call_kernel", "call_lanes", "call_loop", "mixed_rows")
+    for name in (
+        *("vector", "matrix", "call_kernel", "call_lanes", "call_tangent"),
+        *("call_loop", "mixed_rows"),
+    )
 }
 
 

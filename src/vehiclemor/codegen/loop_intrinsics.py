@@ -95,25 +95,46 @@ def call_lanes(
     """See `loop_types.call_lanes`; the matrices must have as many rows and columns."""
     del typing_context
     _require_plain(path, inputs, constants, result)
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place, first = (context.cast(builder, args[k], sig.args[k], types.intp) for k in (1, 6))
-        address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
-        pointers, strides = [], []
-        for k in range(2, 6):
-            array = context.make_array(sig.args[k])(context, builder, args[k])
-            pointers.append(array.data)
-            if sig.args[k].ndim == 2:
-                strides.append(cgutils.unpack_tuple(builder, array.shape)[1])
-                pointers[-1] = builder.gep(array.data, [builder.mul(first, strides[-1])])
-        kinds = [DOUBLE.as_pointer()] * len(pointers) + [WORD] * len(strides)
-        kind = ir.FunctionType(ir.VoidType(), kinds)
-        function = builder.inttoptr(address, kind.as_pointer())
-        builder.call(function, pointers + strides, attrs=("nounwind",))
-        return context.get_dummy_value()
-
     arguments = kernels, place, path, inputs, constants, result, first
-    return types.void(*arguments), generate
+    return types.void(*arguments), _call_of_rows
+
+
+@intrinsic
+def call_tangent(
+    typing_context: Any,
+    kernels: Any,
+    place: Any,
+    x: Any,
+    u: Any,
+    constants: Any,
+    of_x: Any,
+    of_constants: Any,
+    result: Any,
+    first: Any,
+) -> Any:
+    """See `loop_types.call_tangent`; the matrices must have as many rows and columns."""
+    del typing_context
+    arrays = x, u, constants, of_x, of_constants, result
+    _require_plain(*arrays)
+    return types.void(kernels, place, *arrays, first), _call_of_rows
+
+
+def _call_of_rows(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Call a kernel: matrices from a row on, the last argument, with the length of their rows."""
+    last = len(args) - 1
+    place, first = (context.cast(builder, args[k], sig.args[k], types.intp) for k in (1, last))
+    address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
+    pointers, strides = [], []
+    for k in range(2, last):
+        array = context.make_array(sig.args[k])(context, builder, args[k])
+        pointers.append(array.data)
+        if sig.args[k].ndim == 2:
+            strides.append(cgutils.unpack_tuple(builder, array.shape)[1])
+            pointers[-1] = builder.gep(array.data, [builder.mul(first, strides[-1])])
+    kinds = [DOUBLE.as_pointer()] * len(pointers) + [WORD] * len(strides)
+    function = builder.inttoptr(address, ir.FunctionType(ir.VoidType(), kinds).as_pointer())
+    builder.call(function, pointers + strides, attrs=("nounwind",))
+    return context.get_dummy_value()
 
 
 @intrinsic

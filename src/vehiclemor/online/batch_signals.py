@@ -9,15 +9,15 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from vehiclemor.arguments import real_array
-from vehiclemor.codegen.loops import Ready, loops, ready
+from vehiclemor.codegen.loops import Ready, address_of_array, loops, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_stages import addresses, batch_loop, stage
-from vehiclemor.piecewise import CONTINUOUS, Pieces, bent_by_column, joined, polynomials, quiet_ends
+from vehiclemor.piecewise import through
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
 from vehiclemor.simulation.input_polynomials import SIGNAL_LOOPS, recorded_inputs, signal_of
-from vehiclemor.simulation.integrators import structures
 from vehiclemor.simulation.maneuver_checks import cut_short
 
 
@@ -27,7 +27,7 @@ class Given(NamedTuple):
     Attributes
     ----------
     words
-        Words (runs, words) of their signals, see `structures.Signal` and `loops.Ready`.
+        Words (runs, words) of their signals, see `Pieces` and `loops.Ready`.
     edges
         Ends of the smooth segments of each, in s.
     inputs
@@ -130,55 +130,26 @@ class Signals(Sequence[Signal], ShortRepr):
 
     def given(self, names: tuple[str, ...], times: np.ndarray | None) -> Given:
         """The inputs of a model with these names, as loops take them; see `given_of`."""
-        derived = self.inputs != names and (self.inputs or self.u.shape[2] != len(names))
-        if self.hold not in CONTINUOUS or derived:
+        if self.inputs != names and (self.inputs or self.u.shape[2] != len(names)):
             return given_of([signal.for_inputs(names) for signal in self.apart()], times)
-        pieces, coefficients = self._pieces()
-        kept = [ready(structures.Signal(*first)) for _, first in pieces]
-        words = np.empty((self.runs, len(kept[0].words) // 8), dtype=np.int64)
-        edges: list[Any] = [None] * self.runs
-        for (alike, first), shared in zip(pieces, kept, strict=True):
-            words[alike] = np.frombuffer(shared.words, dtype=np.int64)
-            for run in alike:
-                edges[run] = first.edges
+        pieces = self._pieces()
+        # Runs with the same segments share all but their coefficients.
+        kept = {id(own.edges): own for own in pieces}
+        of = {edges: ready(own) for edges, own in kept.items()}
+        words = np.stack([np.frombuffer(of[id(own.edges)].words, np.int64) for own in pieces])
         # The address of the coefficients comes before their shape, which is last.
-        words[:, -4] = addresses(coefficients)
-        inputs = _sampled(kept[0], words, self.first.times if times is None else times)
-        return Given(words, edges, inputs, [""] * self.runs, (coefficients, kept))
+        begin, size = address_of_array(pieces[0].coefficients), pieces[0].coefficients.nbytes
+        words[:, -4] = begin + size * np.arange(self.runs)
+        output_times = self.first.times if times is None else times
+        inputs = _sampled(of[id(pieces[0].edges)], words, output_times)
+        return Given(words, [own.edges for own in pieces], inputs, [""] * self.runs, pieces)
 
     def apart(self) -> list[Signal]:
         """The signals, one by one; polynomials of all are made together."""
-        if self.hold not in CONTINUOUS:
-            return [self[run] for run in range(self.runs)]
-        pieces, coefficients = self._pieces()
-        signals: list[Any] = [None] * self.runs
-        for alike, first in pieces:
-            for run in alike:
-                own = first._replace(coefficients=coefficients[run])
-                signals[run] = replace(self.first, pieces=own, kept={})
-        return signals
+        return [replace(self.first, pieces=pieces, kept={}) for pieces in self._pieces()]
 
-    def _pieces(self) -> tuple[list[tuple[list[int], Pieces]], np.ndarray]:
-        """Runs with the same segments, and the first of them; all coefficients by run."""
-        runs, n, columns = self.u.shape
-        times = self.t - self.t[0]
-        side_by_side = self.u.swapaxes(0, 1).reshape(n, runs * columns)
-        found = polynomials(times, side_by_side, self.hold).reshape(n - 1, runs, columns, -1)
-        coefficients = np.ascontiguousarray(found.swapaxes(0, 1))
-        kinks = bent_by_column(times, side_by_side).reshape(n - 2, runs, columns)
-        moves = np.diff(self.u, axis=1) != 0.0
-        segments: dict[bytes, tuple[np.ndarray, list[int]]] = {}
-        for run in range(runs):
-            bends = np.logical_or.reduce(kinks[:, run], axis=1)
-            moving = moves[run].any(axis=1)
-            if not np.all(moving):
-                bends |= quiet_ends(times, moving)
-            segments.setdefault(bends.tobytes(), (bends, []))[1].append(run)
-        pieces = [
-            (alike, joined(times, bends, coefficients[alike[0]]))
-            for bends, alike in segments.values()
-        ]
-        return pieces, coefficients
+    def _pieces(self) -> list[Pieces]:
+        return through(self.t - self.t[0], self.u, self.hold)
 
 
 def _sampled(first: Ready, words: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.online.training import training_set
+from vehiclemor.online.training import Box, of_cars, training_set
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -111,10 +111,41 @@ class ReducedOrderModel(ShortRepr):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
         run = self.reduced.simulate(chosen, begun)
+        if self._outside and not (run.trust and run.trust.reason):
+            return run.judged(self._outside)
         if run.trust or self._range is None:
             return run
         own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
         return run.judged(self._range.trust(self.model, Scenario(chosen, own)))
+
+    def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
+        """The reduced model of another car: what follows from its parameters is made anew.
+
+        Nothing is fitted.  Runs of a car beyond the `cars` of the training are not trusted.
+
+        Parameters
+        ----------
+        parameters
+            Name -> value in SI units of what differs from this car.
+
+        Raises
+        ------
+        VehiclemorError
+            If a parameter is wrong, the car can't stand, or the method is fitted to one car.
+        """
+        from vehiclemor.reduction.validation import of_car
+        from vehiclemor.simulation.build import reparametrised
+        from vehiclemor.study.method_settings import for_method
+
+        car, method = reparametrised(self.model, parameters), component("method", self.method)
+        settings = for_method(self.model, self.method, self.settings)
+        reduced = of_car(method, self.reduced, car, settings)
+        return replace(self, model=car, reduced=reduced, known=self.input_range)
+
+    @cached_property
+    def _outside(self) -> Trust | None:
+        """What is told of the car, if it lies beyond those of the training."""
+        return self.input_range.outside(component("method", self.method), self.model)
 
     @cached_property
     def _range(self) -> InputRange | None:
@@ -316,6 +347,7 @@ def reduce(
     method: str,
     *,
     training: str | Sequence[Scenario | Maneuver] | None = None,
+    cars: Box | Sequence[Mapping[str, Any]] = (),
     preset: str = "recommended",
     **settings: object,
 ) -> ReducedOrderModel:
@@ -331,6 +363,11 @@ def reduce(
         `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
         the model's own protocol, which is the default of the methods that compete there.  Or a
         list of maneuvers, or of scenarios.
+    cars
+        Cars whose runs are learnt from beside the model's own, each with all of the training: names
+        of parameters with the two ends of their ranges, in which some cars are chosen, or a list
+        of cars, each its parameters in SI units.  `for_parameters` then gives the reduced model of
+        any car between them.
     preset, **settings
         Of the method; see `describe()`.
 
@@ -340,7 +377,7 @@ def reduce(
         If a name or value is wrong, or the method can't reduce the model.
     """
     from vehiclemor.progress import first_use
-    from vehiclemor.reduction.validation import checked_fit, validated
+    from vehiclemor.reduction.validation import fitted, validated
     from vehiclemor.simulation.build import build
     from vehiclemor.study.linear_algebra import one_thread
     from vehiclemor.study.scenario import training_run
@@ -352,8 +389,8 @@ def reduce(
         raise InputError(reason)
     complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
     definition.check(ready, complete)
-    scenarios = training_set(ready, method, training)
+    scenarios = of_cars(ready, training_set(ready, method, training), cars)
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
-        fitted = checked_fit(method, definition.fit(ready, runs, complete))
-    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, fitted)
+        reduced = fitted(definition, ready, runs, complete)
+    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced)

@@ -6,7 +6,7 @@ The entry point of a method, in the group `vehiclemor.methods`, names a `Method`
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -98,9 +98,15 @@ class Method(ShortRepr):
         DOI of the publication, if there is one.
     refusal
         Model of such a kind -> why the method can't reduce it all the same; empty if it can.
+    learns_from
+        Cars whose runs `fit` may learn from: `own`, that of the model alone; `any`, others too, as
+        each run's own `model` tells; `inputs`: of runs it looks at the inputs at most, so that it
+        is as good for one car as for another.
     own_limits
         Whether its runs tell themselves when they leave what the model knows, or it knows no
         bounds; else a run beyond the inputs of the training runs is not trusted.
+    exported
+        Whether what it fits can be exported; it can't if it is no straight-line program.
     fits_others
         Whether `fit` takes a `FitOther` too, by which it fits what it is made of.
     check
@@ -119,7 +125,9 @@ class Method(ShortRepr):
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all
+    learns_from: Literal["own", "any", "inputs"] = "own"
     own_limits: bool = False
+    exported: bool = True
     fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
 

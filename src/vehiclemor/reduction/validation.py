@@ -9,8 +9,10 @@ from pydantic import ValidationError
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.interface import Method, Offline
+from vehiclemor.reduction.cars import difference
+from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.training import Training
 from vehiclemor.registry import unknown
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
@@ -57,6 +59,43 @@ def validated(
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(f"{method.name}: {first['loc'][0]} {_wrong(first)}") from None
+
+
+def fitted(
+    method: Method, model: Model, training: Training, settings: Any, others: FitOther | None = None
+) -> ReducedModel:
+    """What a method's `fit` gives, checked.
+
+    Raises
+    ------
+    InputError
+        If it learns from its own car alone and a training run is of another one, or `fit` refuses.
+    """
+    for run in training if method.learns_from == "own" else ():
+        if name := difference(model, run.model):
+            raise InputError(
+                f"{method.name} learns from runs of the car that it reduces alone: {name} of a "
+                f"training run is another"
+            )
+    more = (others,) if others and method.fits_others else ()
+    return checked_fit(method.name, method.fit(model, training, settings, *more))
+
+
+def of_car(method: Method, reduced: ReducedModel, model: Model, settings: Any) -> ReducedModel:
+    """A reduced model remade for another car: what follows from its parameters, and no fit.
+
+    Raises
+    ------
+    InputError
+        If the method does not know how.
+    """
+    if (remade := getattr(reduced, "for_car", None)) is not None:
+        return checked_fit(method.name, remade(model))
+    if method.learns_from == "inputs":
+        return fitted(method, model, (), settings)
+    raise InputError(
+        f"{method.name} is fitted to one car: reduce the model with the other parameters"
+    )
 
 
 def checked_fit(method: str, reduced: Any) -> Any:

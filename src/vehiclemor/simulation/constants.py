@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,14 +85,43 @@ def constants_along(
         return np.array([found[name] for name in definition.solved])
 
     directions = np.zeros((len(numbers), len(flat) + len(definition.solved)))
-    for row, number in zip(directions, numbers, strict=True):
-        row[number] = 1.0
-        if definition.solved:
-            step = np.zeros_like(flat)
-            step[number] = STEP * max(abs(flat[number]), SMALLEST)
-            near, far = (solved(flat + k * step) - solved(flat - k * step) for k in (1, 2))
-            row[len(flat) :] = (8.0 * near - far) / (12.0 * step[number])
+    directions[np.arange(len(numbers)), numbers] = 1.0
+    if definition.solved:
+        directions[:, len(flat) :] = differences(solved, flat, numbers)
     given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
     source = equations.sources["constants"]
     along = tangent(source, source.arguments[0], equations.constants, len(given))
     return along.columns((given,), directions)
+
+
+def starts_along(
+    definition: ModelDefinition, flat: np.ndarray, equations: Derivation, numbers: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """Derivatives (numbers, states) of each start by components of the parameters.
+
+    By differences of order 4: a start is a function of Python, and may be solved for.
+    """
+
+    def begun(moved: np.ndarray) -> dict[str, np.ndarray]:
+        values = values_of(definition, moved) | solved_parameters(definition, moved, equations)
+        return definition.starts(values)
+
+    def flattened(moved: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.asarray(x, float) for x in begun(moved).values()])
+
+    names = tuple(begun(flat))
+    found = differences(flattened, flat, numbers).reshape(len(numbers), len(names), -1)
+    return dict(zip(names, found.swapaxes(0, 1), strict=True))
+
+
+def differences(
+    function: Callable[[np.ndarray], np.ndarray], flat: np.ndarray, numbers: Sequence[int]
+) -> np.ndarray:
+    """Derivatives (numbers, size) of a smooth function of the parameters, by order 4."""
+    rows = []
+    for number in numbers:
+        step = np.zeros_like(flat)
+        step[number] = STEP * max(abs(flat[number]), SMALLEST)
+        near, far = (function(flat + k * step) - function(flat - k * step) for k in (1, 2))
+        rows.append((8.0 * near - far) / (12.0 * step[number]))
+    return np.array(rows)

@@ -14,9 +14,9 @@ import numpy as np
 from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.signals import Signal as GivenSignal
+from vehiclemor.sample_loops import Pieces
+from vehiclemor.signals import Signal
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.integrators.structures import Signal
 
 ACCURACY = 1e-11
 SIGNAL_LOOPS = "simulation.integrators.structures", "simulation.formulations.inputs"
@@ -28,7 +28,7 @@ KEPT = 512
 
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    if not isinstance(maneuver, GivenSignal):
+    if not isinstance(maneuver, Signal):
         return _recorded(maneuver)
     # Kept with the signal, so not longer than it.
     if "recorded" not in maneuver.kept:
@@ -82,10 +82,10 @@ def signal_of(maneuver: Maneuver) -> Ready:
     InputError
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
-    if not isinstance(maneuver, GivenSignal):
+    if not isinstance(maneuver, Signal):
         return _found_signal(maneuver)
     if "ready" not in maneuver.kept:
-        maneuver.kept["ready"] = ready(Signal(*maneuver.polynomials))
+        maneuver.kept["ready"] = ready(maneuver.polynomials)
     return maneuver.kept["ready"]
 
 
@@ -99,7 +99,7 @@ def _found_signal(maneuver: Maneuver) -> Ready:
         If an input isn't finite, or isn't smooth between the break points that the maneuver names.
     """
     if (unit := _of_unit_amplitude(maneuver)) is not None:
-        signal: Signal = _found_signal(unit).bundle
+        signal: Pieces = _found_signal(unit).bundle
         coefficients = maneuver.amplitude_factor * signal.coefficients
         return ready(signal._replace(coefficients=coefficients))
     inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
@@ -118,7 +118,7 @@ def _found_signal(maneuver: Maneuver) -> Ready:
     largest = np.abs(samples).max(axis=0) + 1e-300
     parts = [_segment(maneuver, (a, b), largest, (times, samples)) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
-    return ready(Signal(edges, first.astype(np.int64), np.empty(0), np.concatenate(parts)))
+    return ready(Pieces(edges, first.astype(np.int64), np.empty(0), np.concatenate(parts)))
 
 
 def _segment(

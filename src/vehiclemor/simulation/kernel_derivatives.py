@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.tangent import Tangent, tangent
+from vehiclemor.codegen.tangent import FEW, Tangent, tangent, tangent_source
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 
@@ -37,6 +37,18 @@ def along(
 def _tangent(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> Tangent:
     source = kernels.sources[name]
     return tangent(source, source.arguments[place], size, len(arrays[place]))
+
+
+def lanes_of(directions: int) -> int:
+    """How many of so many directions a compiled loop takes at once: one, or `FEW`."""
+    return FEW if directions >= FEW else min(directions, 1)
+
+
+def address_of_tangent(kernels: Kernels, name: str, lanes: int) -> int:
+    """Address of a kernel's tangent along state and constants, for so many directions at once."""
+    source = kernels.sources[name]
+    found = tangent_source(source, (source.arguments[STATE], source.arguments[CONSTANTS]))
+    return Kernels({found.name: found}).address(found.name, lanes)
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:

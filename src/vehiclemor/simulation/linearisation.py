@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.loop import scratch_end
-from vehiclemor.simulation.integrators.structures import Place, Signal
+from vehiclemor.simulation.integrators.structures import Place
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def reduced_jacobian(
     """Jacobian of one window's reduced system at y (dim,), all inputs zero."""
     dim, n = len(y), 2 * len(model.coordinates)
     nothing = np.zeros((1, len(model.inputs), 6))
-    signal = Signal(np.array([0.0, 1.0]), np.array([0, 1]), np.empty(0), nothing)
+    signal = Pieces(np.array([0.0, 1.0]), np.array([0, 1]), np.empty(0), nothing)
     loop = catalogue.rhs_loop(windows.formulation)
     equations = model.system.called(windows.formulation, "")
     buffer = np.empty(scratch_end(n, len(model.inputs)))

@@ -84,4 +84,5 @@ def address_of(kernels: Kernels, name: str, lanes: int = 1) -> int:
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    return loops(PATH_LOOPS, ("kernel_path", "lane_path", "delivered", "jacobian_at"))
+    entries = "kernel_path", "lane_path", "tangent_path", "delivered", "jacobian_at"
+    return loops(PATH_LOOPS, entries)

@@ -15,7 +15,8 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, ready
 from vehiclemor.errors import ConvergenceError
-from vehiclemor.simulation.integrators.structures import Output, Signal, Spans
+from vehiclemor.sample_loops import Pieces
+from vehiclemor.simulation.integrators.structures import Output, Spans
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
 from vehiclemor.simulation.run_plans import NO_POINTS, Solver
@@ -143,7 +144,7 @@ class Stepper:
         edges, coefficients = np.zeros(2), np.zeros((1, self.system.inputs, 6))
         span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
         counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
-        signal = ready(Signal(edges, one, np.empty(0), coefficients))
+        signal = ready(Pieces(edges, one, np.empty(0), coefficients))
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
         n = len(self.system.error_scale)
         output = Output(sample, np.empty((1, n)), counts, *NO_POINTS, np.inf)

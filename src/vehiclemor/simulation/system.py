@@ -27,6 +27,7 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
+from vehiclemor.simulation.kernel_derivatives import address_of_tangent, lanes_of
 from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
@@ -58,6 +59,8 @@ CALLED = {
     "vehicle_frame": ("derivative",),
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
+    "sensitivities": ("derivative",),
+    "state_sensitivities": ("derivative",),
 }
 
 
@@ -87,6 +90,9 @@ class System(ShortRepr):
         Numbers of states by diagonal block of the Jacobian, where a fused step relies on them.
     partners
         Number of the state that each becomes in the mirror image; empty where there is none.
+    directions
+        Derivatives (parameters, constants) of the constants along which the states have tangents,
+        see `formulations/sensitivities.py`; scales and reference are as long as both together.
     """
 
     kernels: Kernels
@@ -99,6 +105,7 @@ class System(ShortRepr):
     fused: Mapping[str, str] = field(default_factory=dict)
     diagonal: tuple[tuple[int, ...], ...] = ()
     partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def equations(self, *names: str, step: int = 0) -> Equations:
         """Kernels of these names, at their places, as compiled loops take them.
@@ -110,8 +117,11 @@ class System(ShortRepr):
         """
         places = ("derivative", "outputs", "second_order", "speeds")
         found = [address_of(self.kernels, name) if name in names else 0 for name in places]
-        kernels = np.array([*found, step], dtype=np.int64)
-        return Equations(kernels, self.constants, self.error_scale, self.turning)
+        lanes = lanes_of(len(self.directions))
+        tangent = address_of_tangent(self.kernels, "derivative", lanes) if lanes else 0
+        kernels = np.array([*found, step, tangent], dtype=np.int64)
+        own = self.constants, self.error_scale, self.turning, self.directions
+        return Equations(kernels, *own, lanes)
 
     @cached_property
     def turning(self) -> np.ndarray:

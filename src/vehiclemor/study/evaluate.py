@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
-from vehiclemor.reduction.validation import checked_fit, checked_run
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.validation import checked_run, fitted, of_car
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
@@ -26,8 +27,23 @@ from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.input_range import input_range
 from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.method_settings import Settings, default_settings, for_method
-from vehiclemor.study.result import Outcome, errors_dataset, metrics_dataset
-from vehiclemor.study.scenario import Scenario, start_of, training_run
+from vehiclemor.study.result import (
+    FitCost,
+    Outcome,
+    errors_dataset,
+    fit_cost,
+    metrics_dataset,
+    total_cost,
+)
+from vehiclemor.study.scenario import (
+    Overrides,
+    Scenario,
+    car_of,
+    start_of,
+    trained_for,
+    training_run,
+    with_parameters,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,6 +52,31 @@ if TYPE_CHECKING:
 
 # How a fitted model is integrated: experiments that differ in these alone are fitted once.
 ONLINE = ("solver", "tolerance")
+
+
+class Fit(NamedTuple):
+    """All that determines a fit.
+
+    Attributes
+    ----------
+    model
+        The experiment's.
+    car
+        What differs from it in the car whose equations are reduced; training runs may be of others.
+    settings
+        As text.
+    """
+
+    model: Model
+    car: Overrides
+    method: str
+    settings: str
+    training: tuple[Scenario, ...]
+
+    @property
+    def shared(self) -> bool:
+        """Whether it is for another car than those that all of it is learnt from."""
+        return bool(self.car) and all(run.parameters != self.car for run in self.training)
 
 
 @dataclass
@@ -75,13 +116,17 @@ def evaluate(
 
 def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -> xr.Dataset:
     refused = refusal(model, experiment)
-    if kept or refused:
-        fitted = Fitted(refused or kept_fit(model, experiment))
-    else:
-        fitted = recent_fit(model, experiment)
-    reduced, solve = fitted.reduced, kept_reference if kept else recent_reference
+    solve = kept_reference if kept else recent_reference
+    fitted, car, costs = Fitted(Failure("error", "")), None, dict[Any, FitCost]()
     outcomes: list[Outcome | Failure] = []
     for scenario in experiment.test:
+        if scenario.parameters != car:
+            car = scenario.parameters
+            if kept or refused:
+                fitted = Fitted(refused or kept_fit(model, experiment, scenario))
+            else:
+                fitted = recent_fit(model, experiment, scenario)
+            costs[car] = fit_cost(fitted.reduced)
         outcome: Any = refused
         if errors and not refused:
             outcome = attempt(partial(solve, model, scenario), "the full-order reference: ")
@@ -89,15 +134,16 @@ def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -
             outcome = _tested(model, fitted, scenario, outcome, experiment)
         outcomes.append(outcome)
     if experiment.keep == "errors":
-        return errors_dataset(model, experiment, outcomes, reduced)
-    return metrics_dataset(model, experiment, outcomes[0], reduced)
+        return errors_dataset(model, experiment, outcomes, total_cost(costs.values()))
+    car = car_of(model, experiment.test[0])
+    return metrics_dataset(car, experiment, outcomes[0], fitted.reduced)
 
 
 def _failed(experiment: Experiment, model: Model, failure: Failure) -> xr.Dataset:
     """Result of an experiment that a bug has ended."""
     outcomes = [failure] * len(experiment.test)
     if experiment.keep == "errors":
-        return errors_dataset(model, experiment, outcomes, failure)
+        return errors_dataset(model, experiment, outcomes, fit_cost(failure))
     return metrics_dataset(model, experiment, failure, failure)
 
 
@@ -126,7 +172,7 @@ def refusal(model: Model, experiment: Experiment) -> Failure | None:
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:
     """Full-order solution at the model's default tolerance."""
-    trajectory = model.simulate(scenario.maneuver, start_of(model, scenario))
+    trajectory = car_of(model, scenario).simulate(scenario.maneuver, start_of(model, scenario))
     if trajectory.status != "ok":
         raise ConvergenceError(trajectory.message)
     return trajectory
@@ -139,31 +185,38 @@ recent_reference = lru_cache(maxsize=RECENT)(reference_run)
 kept_reference = lru_cache(maxsize=1024)(reference_run)
 
 
-def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
-    """Fit the method on the training scenarios, and on nothing else."""
-    return _fit(model, experiment.method, _text(experiment.settings), experiment.training)
+def _wanted(model: Model, experiment: Experiment, test: Scenario | None = None) -> Fit:
+    test = test or experiment.test[0]
+    training, settings = trained_for(experiment.training, test), _text(experiment.settings)
+    return Fit(model, test.parameters or (), experiment.method, settings, training)
 
 
-def recent_fit(model: Model, experiment: Experiment) -> Fitted:
+def fresh_fit(
+    model: Model, experiment: Experiment, test: Scenario | None = None
+) -> ReducedModel | Failure:
+    """Fit the method on the training scenarios, and on nothing else.
+
+    Parameters
+    ----------
+    test
+        Scenario of the car to which it is fitted; the first by default.
+    """
+    return _fit(_wanted(model, experiment, test))
+
+
+def recent_fit(model: Model, experiment: Experiment, test: Scenario) -> Fitted:
     """As `fresh_fit`, but what was lately fitted alike is used again."""
     method: Method = component("method", experiment.method)
     try:
-        settings = _text(experiment.settings)
-        return _recent_fit(model, experiment.method, settings, experiment.training, method.fit)
+        return _recent_fit(_wanted(model, experiment, test), method.fit)
     except _FitError as bug:
         return Fitted(bug.args[0])
 
 
 @lru_cache(maxsize=RECENT)
-def _recent_fit(
-    model: Model,
-    method_name: str,
-    settings: str,
-    training: tuple[Scenario, ...],
-    _: Callable,
-) -> Fitted:
+def _recent_fit(fit: Fit, _: Callable) -> Fitted:
     """Found by the method's function too, which may be written anew under the same name."""
-    return Fitted(_unless_bug(_fit(model, method_name, settings, training)))
+    return Fitted(_unless_bug(_fit(fit)))
 
 
 def _unless_bug(fitted: ReducedModel | Failure) -> ReducedModel | Failure:
@@ -173,62 +226,60 @@ def _unless_bug(fitted: ReducedModel | Failure) -> ReducedModel | Failure:
     return fitted
 
 
-def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
-    """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
-    return _shared_fit(model, experiment.method, experiment.settings, experiment.training)
-
-
-def _shared_fit(
-    model: Model, method_name: str, settings: Settings, training: tuple[Scenario, ...]
+def kept_fit(
+    model: Model, experiment: Experiment, test: Scenario | None = None
 ) -> ReducedModel | Failure:
+    """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
+    return _shared_fit(_wanted(model, experiment, test), experiment.settings)
+
+
+def _shared_fit(fit: Fit, settings: Settings) -> ReducedModel | Failure:
     online = {name: value for name, value in settings.items() if name in ONLINE}
-    defaults = default_settings(model, method_name)
+    defaults = default_settings(fit.model, fit.method)
     common = settings | {name: defaults[name] for name in online}
     try:
-        fitted: Any = _kept_fit(model, method_name, _text(common), training)
+        fitted: Any = _kept_fit(fit._replace(settings=_text(common)))
         if isinstance(fitted, Failure) or not online:
             return fitted
         if not all(hasattr(fitted, name) for name in online):
-            return _kept_fit(model, method_name, _text(settings), training)
+            return _kept_fit(fit)
     except _FitError as bug:
         return bug.args[0]
     return replace(fitted, **online)
 
 
-def _fit(
-    model: Model,
-    method_name: str,
-    settings: str,
-    training: tuple[Scenario, ...],
-    others: FitOther | None = None,
-) -> ReducedModel | Failure:
-    """Fit a method; with the settings as text, since what is kept is found by it."""
-    method: Method = component("method", method_name)
+def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
+    method: Method = component("method", fit.method)
 
-    def fit() -> ReducedModel:
-        runs = [training_run(model, scenario) for scenario in training]
-        complete = for_method(model, method_name, json.loads(settings))
-        more = (others,) if others and method.fits_others else ()
-        return checked_fit(method_name, method.fit(model, runs, complete, *more))
+    def made() -> ReducedModel:
+        complete = for_method(fit.model, fit.method, json.loads(fit.settings))
+        if fit.shared:
+            of_all = _kept_fit(fit._replace(car=()))
+            if hasattr(of_all, "for_car"):
+                return of_car(method, of_all, with_parameters(fit.model, fit.car), complete)
+        return fitted(method, *_given(fit), complete, others)
 
     with one_thread():
-        return attempt(fit)
+        return attempt(made)
+
+
+def _given(fit: Fit) -> tuple[Model, list[TrainingRun]]:
+    """The car that a method is fitted to, and what it learns from."""
+    return with_parameters(fit.model, fit.car), [training_run(fit.model, s) for s in fit.training]
 
 
 # More than the fits of a study of protocols, some of which take a minute.
 @lru_cache(maxsize=128)
-def _kept_fit(
-    model: Model, method_name: str, settings: str, training: tuple[Scenario, ...]
-) -> ReducedModel | Failure:
+def _kept_fit(fit: Fit) -> ReducedModel | Failure:
     def other(name: str, given: Any) -> ReducedModel:
-        found = _shared_fit(model, name, given.model_dump(), training)
+        settings = given.model_dump()
+        found = _shared_fit(fit._replace(method=name, settings=_text(settings)), settings)
         if isinstance(found, Failure):
             # Fitted again it fails as it does alone.
-            method: Method = component("method", name)
-            return method.fit(model, [training_run(model, s) for s in training], given)
+            return fitted(component("method", name), *_given(fit), given)
         return found
 
-    return _unless_bug(_fit(model, method_name, settings, training, other))
+    return _unless_bug(_fit(fit, other))
 
 
 class _FitError(Exception):
@@ -246,22 +297,23 @@ def _tested(
     reference: Trajectory | None,
     experiment: Experiment,
 ) -> Outcome | Failure:
-    """One test scenario, simulated with the reduced model."""
+    """One test scenario, simulated with the reduced model of its car."""
     if isinstance(fitted.reduced, Failure):
         return fitted.reduced
     reduced: ReducedModel = fitted.reduced
 
     def run() -> Outcome:
-        start = start_of(model, scenario)
+        car, start = car_of(model, scenario), start_of(model, scenario)
         if experiment.keep == "errors":
-            trajectory = _sound(model, reduced, scenario, start)
-            trajectory = warned(model, experiment.method, experiment.training, scenario, trajectory)
-            return Outcome(trajectory, reference, estimate=_estimate(model, trajectory))
+            trajectory = _sound(car, reduced, scenario, start)
+            trajectory = warned(model, experiment, scenario, trajectory)
+            return Outcome(trajectory, reference, estimate=_estimate(car, trajectory))
         # The first run loads machine code and warms caches, another is timed.
         if not fitted.warm:
             reduced.simulate(scenario.maneuver, start)
             fitted.warm = True
-        trajectory = _remarked(model, experiment, _sound(model, reduced, scenario, start))
+        trajectory = _sound(car, reduced, scenario, start)
+        trajectory = _remarked(model, experiment, scenario, trajectory)
         if reference is None:
             return Outcome(trajectory, None)
         nearest = reduced.best_approximation(reference.states)
@@ -271,24 +323,26 @@ def _tested(
             raise TypeError(
                 f"best_approximation gives shape {np.shape(nearest)}, not its argument's"
             )
-        floor = rms(model.outputs_at(nearest, reference.inputs) - reference.outputs)
+        floor = rms(car.outputs_at(nearest, reference.inputs) - reference.outputs)
         return Outcome(trajectory, reference, floor)
 
     return attempt(run)
 
 
-def warned(
-    model: Model, method: str, training: tuple[Scenario, ...], scenario: Scenario, run: Trajectory
-) -> Trajectory:
-    """A run; beyond the training's inputs it is not trusted, if its model judges nothing itself."""
-    if run.trust or component("method", method).own_limits:
+def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
+    """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
+    if run.trust and run.trust.reason:
         return run
-    return run.judged(input_range(model, training).trust(model, scenario))
+    method: Method = component("method", experiment.method)
+    known = input_range(model, trained_for(experiment.training, test))
+    if outside := known.outside(method, car_of(model, test)):
+        return run.judged(outside)
+    return run if run.trust or method.own_limits else run.judged(known.trust(model, test))
 
 
-def _remarked(model: Model, experiment: Experiment, run: Trajectory) -> Trajectory:
+def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
     """A run with a remark where a protocol would not trust it; its status is the method's own."""
-    judged = warned(model, experiment.method, experiment.training, experiment.test[0], run)
+    judged = warned(model, experiment, test, run)
     if judged.status == run.status:
         return run
     told = f"not to be trusted {judged.message}"

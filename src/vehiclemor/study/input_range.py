@@ -7,10 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.cars import Cars, cars_of
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
-from vehiclemor.study.scenario import Scenario, own_speed
+from vehiclemor.study.scenario import Scenario, car_of, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
 SPEED_SLACK = 0.01
@@ -28,12 +30,25 @@ class InputRange:
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
         Duration of the longest run in s; a kinematic model has no memory, and any is known.
+    cars
+        Those of the training runs; nothing is told of them where None.
     """
 
     largest: np.ndarray
     speed: float
     reach: float
     longest: float
+    cars: Cars | None = None
+
+    def outside(self, method: Method, car: Model) -> Trust | None:
+        """What is told of a car that lies beyond those of the training, of which the method learns.
+
+        A method that is exact for every car has none that lie beyond.
+        """
+        if self.cars is None or method.learns_from == "inputs":
+            return None
+        found = self.cars.trust(car)
+        return found if found.reason else None
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""
@@ -66,7 +81,8 @@ def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
     lasting = model.kind != "ae"
     longest = max(scenario.maneuver.duration for scenario in training) if lasting else np.inf
     edge = 1.0 + 1e-6
-    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge)
+    cars = cars_of(car_of(model, scenario) for scenario in training)
+    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge, cars)
 
 
 def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
@@ -81,4 +97,4 @@ def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
 
 def _speed(model: Model, scenario: Scenario) -> float:
     """Initial speed in m/s; zero of a model that has none."""
-    return scenario.speed or own_speed(model) or 0.0
+    return scenario.speed or own_speed(car_of(model, scenario)) or 0.0

@@ -16,6 +16,7 @@ FILES = (
     "parameters.py",
     "maneuver.py",
     "piecewise.py",
+    "sample_loops.py",
     "signal_columns.py",
     "signals.py",
     "steering_maneuvers.py",

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
-from vehiclemor.reduction.interface import Offline, ReducedModel
+from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
@@ -73,7 +73,8 @@ def metrics_dataset(
     if model.kind == "ae":
         residuals = model.along("residual", run.coordinates, run.inputs)
         found["largest_residual"] = float(np.abs(residuals).max())
-    dataset = trajectory_dataset(model, run, variables(found | _of_fit(reduced)) | histories)
+    found |= fit_cost(reduced)._asdict()
+    dataset = trajectory_dataset(model, run, variables(found) | histories)
     if experiment.keep == "metrics":
         dataset = dataset.drop_dims(["time", "input"])
     dataset.attrs |= _attributes(experiment)
@@ -99,15 +100,27 @@ def _compared(model: Model, outcome: Outcome) -> tuple[dict[str, object], dict[s
     return found, variables({"reference_outputs": full.outputs.copy()}, "time")
 
 
-def _of_fit(reduced: ReducedModel | Failure) -> dict[str, object]:
-    """Rank, and what the fit has cost."""
-    failed = isinstance(reduced, Failure)
-    offline = Offline(np.nan, 0) if failed else reduced.offline
-    return {
-        "effective_rank": 0 if failed else reduced.effective_rank,
-        "offline_seconds": offline.seconds,
-        "offline_evaluations": offline.evaluations,
-    }
+class FitCost(NamedTuple):
+    """Rank of a fit, and what it has cost; zero and missing of one that has failed."""
+
+    effective_rank: int
+    offline_seconds: float
+    offline_evaluations: int
+
+
+def fit_cost(reduced: ReducedModel | Failure) -> FitCost:
+    """Rank and cost of one fit."""
+    if isinstance(reduced, Failure):
+        return FitCost(0, np.nan, 0)
+    offline = reduced.offline
+    return FitCost(reduced.effective_rank, offline.seconds, offline.evaluations)
+
+
+def total_cost(costs: Iterable[FitCost]) -> FitCost:
+    """Largest rank and summed costs of the fits to several cars."""
+    ranks, seconds, evaluations = zip(*costs, strict=True)
+    spent = [second for second in seconds if not np.isnan(second)]
+    return FitCost(max(ranks), sum(spent) if spent else np.nan, sum(evaluations))
 
 
 def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
@@ -129,7 +142,7 @@ def errors_dataset(
     model: Model,
     experiment: Experiment,
     outcomes: Sequence[Outcome | Failure],
-    reduced: ReducedModel | Failure,
+    cost: FitCost,
 ) -> xr.Dataset:
     """Errors of the outputs, counts and status on the dimension `scenario`.
 
@@ -156,7 +169,7 @@ def errors_dataset(
     trusted = [o.trajectory.trust if o else None for o in finished]
     found["trust_indicator"] = np.array([t.indicator if t else np.nan for t in trusted])
     found["trusted_until"] = np.array([t.until if t else np.inf for t in trusted])
-    described = variables(found, "scenario") | variables(_of_fit(reduced))
+    described = variables(found, "scenario") | variables(cost._asdict())
     for name, text in model.counts.items():
         values = np.array([o.trajectory.counts.get(name, 0) if o else 0 for o in finished])
         described[name] = ("scenario", values, {"units": "1", "long_name": text})

@@ -2,9 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,18 +13,32 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import TrainingRun, policy_factors
 from vehiclemor.signals import Signal
-from vehiclemor.simulation.build import build
+from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 
 # Parameter with the speed (m/s) at which a vehicle starts.
 SPEED = "initial_speed"
+# Parameter name (of a component of a point such as `tie_rod_inner.z`) and value in SI units.
+Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
+
+
+def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
+    """Parameters of a car from a table of them; of which the order does not matter."""
+    return tuple((name, _plain(value)) for name, value in sorted(table.items()))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as floats and lists as tuples; what is neither is refused where it is used."""
+    if isinstance(value, list | tuple):
+        return tuple(map(_plain, value))
+    return float(value) if isinstance(value, int) else value
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """One run of a model: an input, a start, a speed.
+    """One run of a model: an input, a start, a speed, a car.
 
     Attributes
     ----------
@@ -34,11 +48,15 @@ class Scenario:
         Name of an initial condition, or a state as numbers.
     speed
         Initial speed in m/s; None is that of the model's parameters, if it has any.
+    parameters
+        What differs from the model's parameters in this run.  None, of a training scenario: nothing
+        differs from the car that is tested.
     """
 
     maneuver: Maneuver
     start: str | tuple[float, ...]
     speed: float | None = None
+    parameters: Overrides | None = ()
 
     @property
     def label(self) -> str:
@@ -48,12 +66,14 @@ class Scenario:
         words = [run.name, *factors, self.start if isinstance(self.start, str) else "own state"]
         if self.speed is not None:
             words.append(f"{self.speed:g} m/s")
+        words += [f"{name} {_short(value)}" for name, value in self.parameters or ()]
         return ", ".join(words)
 
     @property
     def content(self) -> dict[str, Any]:
         """Everything that determines the run of a given model, for a hash."""
-        return {
+        car = {} if self.parameters == () else {"parameters": self.parameters}
+        return car | {
             "maneuver": self.maneuver.name,
             "frequency": self.maneuver.frequency_factor,
             "amplitude": self.maneuver.amplitude_factor,
@@ -64,9 +84,16 @@ class Scenario:
         }
 
     @property
-    def run_key(self) -> tuple[str, str | tuple[float, ...], float | None]:
+    def run_key(self) -> tuple[Any, ...]:
         """Equal for scenarios that are one run of the model, whatever their names."""
-        return input_hash(self.maneuver), self.start, self.speed
+        return input_hash(self.maneuver), self.start, self.speed, self.parameters
+
+
+# Of as many as are looked at by turns; settings vary over each of them.
+@lru_cache(maxsize=4096)
+def scenario_text(scenario: Scenario) -> str:
+    """Canonical JSON text of a scenario's content."""
+    return json.dumps(scenario.content, sort_keys=True)
 
 
 @lru_cache(maxsize=1024)
@@ -74,8 +101,9 @@ def input_hash(maneuver: Maneuver) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
     times = maneuver.times
     if isinstance(maneuver, Signal):
-        parts = (times, *maneuver.polynomials)
-        return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()[:16]
+        parts = [part.tobytes() for part in (times, *maneuver.polynomials)]
+        names = json.dumps(maneuver.inputs).encode()
+        return hashlib.sha256(b"".join([names, *parts])).hexdigest()[:16]
     # Adding zero makes -0 and 0 one input.
     inputs = np.ascontiguousarray(maneuver.at(times)) + 0.0
     return hashlib.sha256(times.tobytes() + inputs.tobytes()).hexdigest()[:16]
@@ -87,35 +115,79 @@ def own_speed(model: Model) -> float | None:
     return None if entry is None else float(np.asarray(entry.value))
 
 
+class Values(dict[str, Any]):
+    """Values by name that many experiments share: their canonical JSON text is made once."""
+
+    @cached_property
+    def text(self) -> str:
+        """Canonical JSON text."""
+        return json.dumps(self, sort_keys=True)
+
+
 @lru_cache(maxsize=16)
-def parameters_of(model: Model) -> dict[str, Any]:
+def parameters_of(model: Model) -> Values:
     """Name -> value of a model's parameters, SI units."""
-    return {name: entry.value for name, entry in model.parameters.entries.items()}
+    return Values((name, entry.value) for name, entry in model.parameters.entries.items())
+
+
+def car_of(model: Model, scenario: Scenario) -> Model:
+    """The model with the parameters of a scenario.
+
+    Raises
+    ------
+    VehiclemorError
+        If a parameter is wrong, or the car can't be assembled or can't stand.
+    """
+    return with_parameters(model, scenario.parameters or ())
+
+
+def with_parameters(model: Model, parameters: Overrides) -> Model:
+    """The model with some of its parameters changed; kept, since many runs are of one car."""
+    return _car(model, parameters) if parameters else model
 
 
 def start_of(model: Model, scenario: Scenario) -> Start:
-    """What the model starts from: a name, or at another speed than its own the state (n,)."""
-    if scenario.speed is None or scenario.speed == own_speed(model):
+    """What its car starts from: a name, or at another speed than its own the state (n,)."""
+    if scenario.speed is None or scenario.speed == own_speed(car_of(model, scenario)):
         return scenario.start
-    parameters = json.dumps(parameters_of(model) | {SPEED: scenario.speed}, sort_keys=True)
-    return _state_at(model.name, parameters, scenario.start)
+    return _state_at(model, (*(scenario.parameters or ()), (SPEED, scenario.speed)), scenario.start)
 
 
 # More than the runs of a protocol, over which all rows go.
+@lru_cache(maxsize=1024)
+def _car(model: Model, parameters: Overrides) -> Model:
+    return reparametrised(model, dict(parameters))
+
+
 @lru_cache(maxsize=4096)
-def _state_at(model: str, parameters: str, start: str) -> np.ndarray:
-    return build(model, overrides=json.loads(parameters)).start(start)
+def _state_at(model: Model, parameters: Overrides, start: Start) -> np.ndarray:
+    return reparametrised(model, dict(parameters)).start(start)
 
 
 def training_run(model: Model, scenario: Scenario) -> TrainingRun:
     """The scenario as a run that a method may learn from."""
-    return TrainingRun(model, scenario.maneuver, start_of(model, scenario))
+    return TrainingRun(car_of(model, scenario), scenario.maneuver, start_of(model, scenario))
+
+
+def trained_for(training: Sequence[Scenario], test: Scenario) -> tuple[Scenario, ...]:
+    """Training scenarios of which those of the tested car have the parameters of a test."""
+    own = test.parameters
+    return tuple(replace(s, parameters=own) if s.parameters is None else s for s in training)
 
 
 def training_scenarios(
-    test: Scenario, policy: str, factors: Sequence[tuple[float, float]] = ()
+    test: Scenario,
+    policy: str,
+    factors: Sequence[tuple[float, float]] = (),
+    cars: Sequence[Overrides] | None = None,
 ) -> tuple[Scenario, ...]:
     """What a training policy trains on before a test scenario, see `policy_factors`.
+
+    Parameters
+    ----------
+    cars
+        Parameters of the cars that are trained on, each with every input; the tested one's where
+        None.
 
     Raises
     ------
@@ -125,7 +197,9 @@ def training_scenarios(
     pairs = policy_factors(test.maneuver, policy, factors)
     if factors and policy != "set":
         raise InputError("training_set is for the training policy 'set' alone")
-    return tuple(replace(test, maneuver=test.maneuver.perturbed(*pair)) for pair in pairs)
+    inputs = [test.maneuver.perturbed(*pair) for pair in pairs]
+    known = [test.parameters] if cars is None else cars
+    return tuple(replace(test, maneuver=run, parameters=car) for car in known for run in inputs)
 
 
 def check(model: Model, scenario: Scenario) -> None:
@@ -134,4 +208,8 @@ def check(model: Model, scenario: Scenario) -> None:
     check_resolved(scenario.maneuver)
     if scenario.speed is not None and own_speed(model) is None:
         raise InputError(f"{model.name} has no {SPEED}: a scenario of it has no speed")
-    model.start(start_of(model, scenario))
+    car_of(model, scenario).start(start_of(model, scenario))
+
+
+def _short(value: float | tuple[float, ...]) -> str:
+    return " ".join(f"{v:g}" for v in (value if isinstance(value, tuple) else (value,)))

@@ -85,16 +85,15 @@ def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: s
         parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    return stored_timing(folder, name, [content, CASE_ROUNDS], every_start)
+    path = folder / "studies" / f"{name}.nc"
+    return stored_timing(path, [content, CASE_ROUNDS], every_start)
 
 
-def stored_timing(
-    folder: Path, name: str, content: object, make: Callable[[], xr.Dataset]
-) -> xr.Dataset:
-    """What the file `studies/<name>.nc` holds for this content and machine, or else is made."""
+def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+    """What is stored for this content and machine, or else is made and stored at `path`."""
     text = json.dumps([content, machine(), REPEATS, REPEATS_OF_LONG, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return stored(folder / "studies" / f"{name}.nc", "timing", key, make)
+    return stored(path, "timing", key, make)
 
 
 def case_experiments(
@@ -215,11 +214,11 @@ def _rounds(
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     work = f"rounds of times on {model.name}"
     tell(work, 0, rounds[0] + 1)
-    fits = [_warm_fit(model, e, wanted[index].any()) for index, e in enumerate(experiments)]
+    fits = [_warm_fits(model, e, wanted[index]) for index, e in enumerate(experiments)]
     seconds = np.full((rounds[0] + 1, *shape, 2), np.nan)
     for turn in range(rounds[0] + 1):
         for place, test in enumerate(tests):
-            for index, (reduced, _) in enumerate(fits):
+            for index, reduced in enumerate(fit[place] for fit, _ in fits):
                 # The first round loads machine code, and tells how long a run takes.
                 long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
                 if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
@@ -249,18 +248,30 @@ def called(run: Callable[[], Trajectory], repeats: int) -> tuple[float, float] |
     return float(whole), float(loop)
 
 
+def _warm_fits(
+    model: Model, experiment: Experiment, wanted: np.ndarray
+) -> tuple[list[ReducedModel | None], float]:
+    """Fitted models for every test, and the seconds of fitting one to each car."""
+    cars: dict[object, tuple[ReducedModel | None, float]] = {}
+    for scenario in experiment.test:
+        if scenario.parameters not in cars:
+            cars[scenario.parameters] = _warm_fit(model, experiment, scenario, bool(wanted.any()))
+    reduced = [cars[scenario.parameters][0] for scenario in experiment.test]
+    return reduced, sum(seconds for _, seconds in cars.values())
+
+
 def _warm_fit(
-    model: Model, experiment: Experiment, needed: bool
+    model: Model, experiment: Experiment, test: Scenario, needed: bool
 ) -> tuple[ReducedModel | None, float]:
     """A fitted model, and the median seconds of fits that found their machine code loaded."""
-    fitted = kept_fit(model, experiment)
+    fitted = kept_fit(model, experiment, test)
     if isinstance(fitted, Failure):
         return None, np.nan
     if not needed or fitted.offline.seconds > LONG_FIT:
         return fitted, fitted.offline.seconds
     seconds: list[float] = []
     while len(seconds) < FITS and sum(seconds) < FIT_SECONDS:
-        fitted = fresh_fit(model, experiment)
+        fitted = fresh_fit(model, experiment, test)
         if isinstance(fitted, Failure):
             return None, np.nan
         seconds.append(fitted.offline.seconds)

@@ -41,6 +41,12 @@ def test_a_method_without_equations_of_its_own(model, nominal):
         vm.export(ReducedOrderModel(model, "pod", {}, (), reduced), "casadi")
 
 
+def test_a_method_is_refused_before_it_is_fitted(monkeypatch, capsys):
+    monkeypatch.setattr(vm, "reduce", None)
+    assert main(["export", CAR, "--to", "c", "--method", "pod"]) == 2
+    assert f"{CAR}_pod can't be exported" in capsys.readouterr().err
+
+
 def test_a_table_is_no_expression():
     with pytest.raises(vm.VehiclemorError, match="reads a table"):
         vm.export(vm.rom("double_wishbone"), "sympy")

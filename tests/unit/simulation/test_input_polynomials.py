@@ -11,22 +11,22 @@ from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver, smooth
-from vehiclemor.piecewise import Pieces
+from vehiclemor.piecewise import at
 from vehiclemor.registry import component
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.simulation.input_polynomials import ACCURACY, recorded_inputs
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
-from vehiclemor.simulation.integrators.structures import Signal
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
 
 LANE_CHANGE = component("maneuver", "lane_change")
 
 
-def signal_of(maneuver: Maneuver) -> Signal:
+def signal_of(maneuver: Maneuver) -> Pieces:
     return ready_signal_of(maneuver).bundle
 
 
-def value(signal: Signal, t: float, segment: int | None = None) -> np.ndarray:
+def value(signal: Pieces, t: float, segment: int | None = None) -> np.ndarray:
     """Inputs at one time; at a break point those after it, unless a segment is given."""
     if segment is None:
         segment = int(np.searchsorted(signal.edges, t, side="right")) - 1
@@ -202,7 +202,7 @@ def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
         assert set(calls) == {-0.7}
         np.testing.assert_array_equal(scaled.edges, searched.edges)
         times = np.linspace(0.0, 3.0, 997)
-        found, wanted = (Pieces(*signal).at(times) for signal in (scaled, searched))
+        found, wanted = (at(signal, times) for signal in (scaled, searched))
         # Both round off in the powers of the pieces, far below the accuracy of these.
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=0.1 * ACCURACY)
 
@@ -211,5 +211,5 @@ def test_a_copy_with_another_signal_is_not_taken_for_linear():
     linear = component("maneuver", "lane_change").perturbed(1.0, 1.5)
     fixed = dataclasses.replace(linear, signal=lambda t, *_: np.sin(t)[:, None], corners=smooth)
     np.testing.assert_array_equal(recorded_inputs(fixed)[1][:, 0], np.sin(fixed.times))
-    found = Pieces(*signal_of(fixed)).at(fixed.times)[:, 0]
+    found = at(signal_of(fixed), fixed.times)[:, 0]
     np.testing.assert_allclose(found, np.sin(fixed.times), rtol=0.0, atol=1e-11)

@@ -68,10 +68,13 @@ def fit(model: DynamicModel, training: Training, settings: BalancedPodSettings) 
     """Balance the gramians of the training runs and of the linearisation."""
     began = time.process_time()
     shape, count = VehicleShape(model), settings.snapshots
-    runs = [run.snapshots(count) for run in with_mirrored(training)]
+    both = with_mirrored(training)
+    runs = [run.snapshots(count) for run in both]
+    cars = {id(run.model): VehicleShape(run.model) for run in both}
     # Gramians are integrals in time: each snapshot is weighted by its time step.
     parts = [
-        (shape.of(run.states) - shape.reference) * np.sqrt(run.time[-1] / count) for run in runs
+        (shape.of(run.states) - cars[id(given.model)].reference) * np.sqrt(run.time[-1] / count)
+        for run, given in zip(runs, both, strict=True)
     ]
     places = [model.outputs.index(name) for name in OUTPUTS]
     ranges = np.ptp(np.concatenate([run.outputs[:, places] for run in runs]), axis=0)
@@ -155,4 +158,6 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    learns_from="any",
+    exported=False,
 )

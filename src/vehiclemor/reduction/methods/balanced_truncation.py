@@ -93,4 +93,5 @@ METHOD = Method(
     refusal=no_steered_vehicle,
     check=check,
     fit=fit,
+    learns_from="inputs",
 )

@@ -55,4 +55,6 @@ METHOD = Method(
     presets=PRESETS,
     check=check_subspaces,
     fit=fit,
+    learns_from="any",
+    exported=False,
 )

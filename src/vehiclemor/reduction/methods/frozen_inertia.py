@@ -58,5 +58,6 @@ METHOD = Method(
     settings={"dae": OnlineSettings},
     refusal=no_closed_forms,
     fit=fit,
+    learns_from="inputs",
     own_limits=True,
 )

@@ -65,6 +65,10 @@ class FullOrderModel(ShortRepr):
         """Number of coordinates."""
         return len(self.model.coordinates)
 
+    def for_car(self, model: Model) -> "FullOrderModel":
+        """The full order of another car."""
+        return FullOrderModel(model, self.solver, self.tolerance)
+
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
         """Full-order trajectory at the output times; it may have diverged.
 
@@ -120,5 +124,6 @@ METHOD = Method(
         "dae": _strongest("ros34pw2", 7e-4),
     },
     fit=fit,
+    learns_from="inputs",
     own_limits=True,
 )

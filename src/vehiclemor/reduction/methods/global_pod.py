@@ -60,10 +60,13 @@ def fit(model: DynamicModel, training: Training, settings: GlobalPodSettings) ->
 
     began = time.process_time()
     n, count = len(model.coordinates), settings.snapshots
-    runs = [run.snapshots(count) for run in with_mirrored(training)]
+    both = with_mirrored(training)
+    runs = [run.snapshots(count) for run in both]
     start = model.start()
-    # Deviations from straight running, so that straight running lies in the subspace.
-    moved = np.concatenate([run.coordinates for run in runs]) - start[:n]
+    # Deviations from each car's straight running, so that straight running lies in the subspace.
+    moved = np.concatenate(
+        [run.coordinates - given.model.start()[:n] for run, given in zip(runs, both, strict=True)]
+    )
     apart = kept_apart(model)
     # Orthonormal basis of the complement of the vectors kept apart.
     others = null_space(apart)
@@ -106,4 +109,6 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    learns_from="any",
+    exported=False,
 )

@@ -18,7 +18,7 @@ from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedMod
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.validation import fitted, validated
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
@@ -148,7 +148,7 @@ def fit(
     """Fit both, by `others` if it is given."""
 
     def anew(name: str, given: Any) -> ReducedModel:
-        return component("method", name).fit(model, training, given)
+        return fitted(component("method", name), model, training, given)
 
     fast = (others or anew)(settings.fast, _of_fast(model, settings))
     safe = (others or anew)(settings.safe, _of_safe(model, settings))
@@ -210,5 +210,6 @@ METHOD = Method(
     refusal=no_steered_vehicle,
     check=check,
     fit=fit,
+    learns_from="any",
     fits_others=True,
 )

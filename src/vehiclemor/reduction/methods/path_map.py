@@ -188,6 +188,11 @@ class PathMapModel(ShortRepr):
             f"{_named(self.model, self.ranges)}"
         )
 
+    def for_car(self, model: AlgebraicModel) -> "PathMapModel":
+        """The map of another mechanism, between the same inputs."""
+        number = int(self.cells.numbers.max())
+        return _mapped(model, self.ranges, self.degree, number, self.stops)
+
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
         del states
@@ -222,17 +227,25 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     InputError
         If no input moves in training, or not all of the box that they span can be reached.
     """
-    began = time.process_time()
     every = np.concatenate([model.sampled(run.maneuver)[1] for run in training])
     low, high = every.min(axis=0), every.max(axis=0)
     margins = MARGIN * (high - low)
     ranges = np.column_stack([low - margins, high + margins])
+    stops = settings.outside == "stop"
+    return _mapped(model, ranges, settings.degree, settings.cells, stops)
+
+
+def _mapped(
+    model: AlgebraicModel, ranges: np.ndarray, degree: int, number: int, stops: bool
+) -> PathMapModel:
+    """The map of a mechanism between the ranges (inputs, 2), in so many cells along each input."""
+    began = time.process_time()
     centres, widths = ranges.mean(axis=1), np.ptp(ranges, axis=1)
     moving = np.flatnonzero(widths > RESTING)
     if not len(moving):
         raise InputError("path_map: no input moves in training")
-    places = np.arange(settings.cells)[:, None] + 0.5 + 0.5 * _nodes(settings.degree)
-    shares = places.ravel() / settings.cells
+    places = np.arange(number)[:, None] + 0.5 + 0.5 * _nodes(degree)
+    shares = places.ravel() / number
     grid = [low + shares * (high - low) for low, high in ranges[moving]]
     inputs = np.tile(centres, (len(grid[0]) ** len(grid), 1))
     inputs[:, moving] = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, len(grid))
@@ -241,7 +254,7 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     except UnreachableError:
         box = _named(model, ranges)
         raise InputError(f"path_map: what training spans is not all in reach: {box}") from None
-    numbers = np.where(widths > RESTING, settings.cells, 1)
+    numbers = np.where(widths > RESTING, number, 1)
     values, columns = _distinct(np.hstack([solved.coordinates, solved.outputs]))
     cells = Cells(
         centres,
@@ -249,12 +262,11 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
         0.5 * numbers,
         numbers - 1.0,
         numbers,
-        _coefficients(values, len(moving), settings),
+        _coefficients(values, len(moving), number, degree),
     )
     cost = offline_cost(began, model, [solved])
-    stops = settings.outside == "stop"
     varied = tuple(moving.tolist())
-    return PathMapModel(model, ranges, varied, settings.degree, cells, columns, stops, cost)
+    return PathMapModel(model, ranges, varied, degree, cells, columns, stops, cost)
 
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
@@ -273,9 +285,8 @@ def _nodes(degree: int) -> np.ndarray:
     return chebyshev.chebpts1(degree + 1)
 
 
-def _coefficients(values: np.ndarray, moving: int, settings: PathMapSettings) -> np.ndarray:
+def _coefficients(values: np.ndarray, moving: int, number: int, degree: int) -> np.ndarray:
     """Coefficients (cells, monomials, quantities) from values (nodes, quantities) of all cells."""
-    degree, number = settings.degree, settings.cells
     size = degree + 1
     values = values.reshape(*[number, size] * moving, values.shape[1])
     values = np.moveaxis(values, range(0, 2 * moving, 2), range(moving))
@@ -310,5 +321,6 @@ METHOD = Method(
     settings={"ae": PathMapSettings},
     check=check,
     fit=fit,
+    learns_from="inputs",
     own_limits=True,
 )

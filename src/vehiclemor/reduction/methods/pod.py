@@ -87,4 +87,6 @@ METHOD = Method(
     presets=PRESETS,
     check=check,
     fit=fit,
+    learns_from="any",
+    exported=False,
 )

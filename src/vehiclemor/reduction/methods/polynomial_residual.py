@@ -17,7 +17,6 @@ from pydantic import Field
 
 from vehiclemor.codegen.loops import Loop, Ready, ready
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import (
     derivatives,
@@ -29,12 +28,11 @@ from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.state_space import KinematicStates
+from vehiclemor.reduction.state_space import SolvedAnywhere
 from vehiclemor.reduction.training import Training
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Trajectory
 
 # Every monomial is a line of machine code in each equation.
 MOST_MONOMIALS = 150
@@ -64,7 +62,7 @@ class PolynomialResidualSettings(Settings):
 
 
 @dataclass(frozen=True)
-class PolynomialResidualModel(ShortRepr):
+class PolynomialResidualModel(SolvedAnywhere):
     """Polynomial reduced equations g(x) = response^T (u - u_mean).
 
     Attributes
@@ -104,19 +102,7 @@ class PolynomialResidualModel(ShortRepr):
         """Number of reduced coordinates."""
         return self.basis.rank
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Solve the polynomial equations at the maneuver's output times."""
-        times, inputs, _ = self.model.sampled(maneuver)
-        return self._solved(times, inputs, self.model.start(start))
-
-    @property
-    def state_space(self) -> KinematicStates:
-        """The coordinates, all in the subspace."""
-        return KinematicStates(
-            self.model, lambda time, u, state: self._solved(np.array([time]), u, state)
-        )
-
-    def _solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+    def solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
         """Solve the polynomial equations at some times, beginning at a state (n,)."""
         model, began_at = self.model, self.reduced(state[None, :])[0]
         rank, start_at = self.basis.rank, loop_array(began_at)
@@ -259,4 +245,6 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
+    learns_from="any",
+    exported=False,
 )

@@ -64,4 +64,6 @@ METHOD = Method(
     settings=dict.fromkeys(("ode", "dae"), ProjectedSettings),
     refusal=refusal,
     fit=fit,
+    learns_from="inputs",
+    exported=False,
 )

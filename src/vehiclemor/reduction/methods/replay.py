@@ -11,6 +11,7 @@ import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
+from vehiclemor.reduction.cars import cars_of
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
@@ -21,10 +22,11 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 
 @dataclass(frozen=True)
 class ReplayModel(ShortRepr):
-    """Stored training trajectories."""
+    """Stored training trajectories, and the models that they are of."""
 
     model: Model
     recorded: tuple[Trajectory, ...]
+    models: tuple[Model, ...]
     offline: Offline
 
     @property
@@ -35,6 +37,8 @@ class ReplayModel(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The training trajectory whose input is nearest (root mean square) to the maneuver's.
 
+        Of several cars with the same input that of the nearest car.
+
         Runs of the maneuver's own output times come first.  If there are none, inputs are compared
         over the time that a run and the maneuver share, and the run is read at the maneuver's
         times: between samples linearly, after its end its last value.
@@ -42,8 +46,17 @@ class ReplayModel(ShortRepr):
         self.model.start(start)
         times = maneuver.times
         inputs = maneuver.at(times)
-        alike = [run for run in self.recorded if np.array_equal(run.time, times)]
-        nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
+        runs = list(zip(self.recorded, self.models, strict=True))
+        alike = [run for run in runs if np.array_equal(run[0].time, times)]
+        cars = cars_of(self.models)
+        own = cars.place(self.model)
+        nearest, model = min(
+            alike or runs,
+            key=lambda run: (
+                _distance(run[0], times, inputs),
+                float(np.sum((cars.place(run[1]) - own) ** 2)),
+            ),
+        )
         if not alike:
             nearest = replace(
                 nearest,
@@ -54,10 +67,14 @@ class ReplayModel(ShortRepr):
             nearest,
             time=times,
             inputs=inputs,
-            outputs=self.model.outputs_at(nearest.states, inputs),
+            outputs=model.outputs_at(nearest.states, inputs),
             counts=dict.fromkeys(self.model.counts, 0),
             seconds=0.0,
         )
+
+    def for_car(self, model: Model) -> "ReplayModel":
+        """The same trajectories; another car may be nearer."""
+        return replace(self, model=model, offline=Offline())
 
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
@@ -83,7 +100,8 @@ def fit(model: Model, training: Training, settings: Settings) -> ReplayModel:
     """Record the training runs at the output times."""
     began = time.process_time()
     recorded = tuple(run.recorded() for run in training)
-    return ReplayModel(model, recorded, offline_cost(began, model, recorded))
+    cost = offline_cost(began, model, recorded)
+    return ReplayModel(model, recorded, tuple(run.model for run in training), cost)
 
 
 METHOD = Method(
@@ -91,5 +109,7 @@ METHOD = Method(
     summary="returns the training trajectory, whatever the input: the null hypothesis",
     settings=dict.fromkeys(KINDS, Settings),
     fit=fit,
+    learns_from="any",
+    exported=False,
     own_limits=True,
 )

@@ -89,4 +89,5 @@ METHOD = Method(
     settings=dict.fromkeys(("ode", "dae"), SoftenedSlipSettings),
     refusal=refusal,
     fit=fit,
+    learns_from="inputs",
 )

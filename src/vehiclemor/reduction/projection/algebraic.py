@@ -7,26 +7,24 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
 from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
 from vehiclemor.reduction.projection.windows import by_window, first_samples
 from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.state_space import KinematicStates
+from vehiclemor.reduction.state_space import SolvedAnywhere
 from vehiclemor.reduction.training import Training
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Iteration
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Trajectory
 
 ITERATION_LIMIT = 50
 
 
 @dataclass(frozen=True)
-class AlgebraicProjection(ShortRepr):
+class AlgebraicProjection(SolvedAnywhere):
     """Reduced model on affine subspaces, one in each window.
 
     Attributes
@@ -53,19 +51,7 @@ class AlgebraicProjection(ShortRepr):
         """Largest number of reduced coordinates in any window."""
         return max(basis.rank for basis in self.bases)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Solve the reduced equations at the maneuver's output times."""
-        times, inputs, _ = self.model.sampled(maneuver)
-        return self._solved(times, inputs, self.model.start(start))
-
-    @property
-    def state_space(self) -> KinematicStates:
-        """The coordinates, on the subspace of the window that the time is in."""
-        return KinematicStates(
-            self.model, lambda time, u, state: self._solved(np.array([time]), u, state)
-        )
-
-    def _solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+    def solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
         """Solve the reduced equations at some times, beginning at a state (n,)."""
         model = self.model
         n, windows = len(model.coordinates), len(self.bases)

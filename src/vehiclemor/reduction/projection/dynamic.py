@@ -7,15 +7,18 @@ compared.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.cars import cars_of
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
+from vehiclemor.reduction.projection.car_subspaces import Subspaces, local_bases
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.reduction.projection.windows import by_window
@@ -25,7 +28,6 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +40,28 @@ class DynamicProjection(ReducedSystem):
         Basis of each window, orthonormal in its inner product: of the states for `state`, else of
         the coordinates; `spaces` are the same for the compiled loops.  Each window starts where the
         one before has ended.
+    subspaces
+        What they follow from, for other cars.
     """
 
     bases: tuple[Basis, ...] = ()
+    subspaces: Subspaces | None = None
+
+    def for_car(self, model: DynamicModel) -> Self:
+        """The equations of another car in its subspaces."""
+        if self.subspaces is None:
+            raise InputError(f"the subspaces belong to one car of {model.name}")
+        began = time.process_time()
+        spaces, bases = self.subspaces.of(model)
+        return replace(
+            self,
+            model=model,
+            system=model.system,
+            spaces=spaces,
+            bases=bases,
+            effective_rank=max(basis.rank for basis in bases),
+            offline=offline_cost(began, model),
+        )
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
@@ -103,9 +124,10 @@ class DynamicProjection(ReducedSystem):
 def fit_windows(
     model: DynamicModel, training: Training, edges: np.ndarray, settings: DynamicPodSettings
 ) -> DynamicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) of all runs, side by side.
+    """POD subspaces of equidistant snapshots (both ends included) of all runs.
 
-    Windows lie between edges (windows + 1,) in s.
+    Windows lie between edges (windows + 1,) in s.  Runs of one car stand side by side, and so do
+    those of several unless their subspaces are interpolated.
 
     Raises
     ------
@@ -117,27 +139,35 @@ def fit_windows(
         lengths = ", ".join(f"{duration:g}" for duration in durations)
         raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
     began = time.process_time()
-    count, formulation = settings.snapshots, settings.formulation
+    count = settings.snapshots
     moments = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
     # The same time twice, at inner edges, needs one sample.
     unique, places = np.unique(moments, return_inverse=True)
     histories = [run.at(unique) for run in training]
-    weight = _weight(model, settings, histories, float(edges[1] - edges[0]))
+    states = np.array([history.states[places] for history in histories])
+    weight = _weight(model, settings, states.reshape(-1, states.shape[-1]), edges)
+    cars, groups = cars_of(run.model for run in training), [list(range(len(training)))]
+    if settings.bases == "interpolated":
+        numbers = cars.numbers(run.model for run in training)
+        groups = [np.flatnonzero(np.equal(numbers, k)).tolist() for k in range(len(cars.values))]
     root = np.linalg.cholesky(weight)
-    bases, means = [], []
-    for k in range(len(edges) - 1):
-        rows = places[k * count : (k + 1) * count]
-        snapshots = np.concatenate([history.states[rows] for history in histories])
-        means.append(snapshots.mean(axis=0))
-        # In the coordinates root^T x the inner product is the Euclidean one.
-        scaled = pod_basis(
-            (snapshots[:, : len(weight)] @ root).T, settings.rank, settings.rank_tolerance
-        )
-        vectors = np.linalg.solve(root.T, scaled.vectors)
-        bases.append(Basis(means[-1][: len(weight)], vectors, scaled.singular_values))
-    spaces = _spaces(model, formulation, edges, np.array(means), bases, weight)
+    windows = [slice(k * count, (k + 1) * count) for k in range(len(edges) - 1)]
+    local = tuple(
+        local_bases([_basis(states[group, window], root, settings) for group in groups])
+        for window in windows
+    )
+    subspaces = Subspaces(cars, edges, local, settings.formulation, settings.inner_product, weight)
+    spaces, bases = subspaces.of(model)
     offline = offline_cost(began, model, histories)
-    return projected_equations(model, spaces, bases, offline, settings)
+    found = projected_equations(model, spaces, bases, offline, settings)
+    return replace(found, subspaces=subspaces)
+
+
+def _basis(states: np.ndarray, root: np.ndarray, settings: DynamicPodSettings) -> Basis:
+    """POD basis of states (runs, samples, 2 n) times a root of the weight, and their own mean."""
+    snapshots = states.reshape(-1, states.shape[-1])
+    scaled = pod_basis((snapshots[:, : len(root)] @ root).T, settings.rank, settings.rank_tolerance)
+    return Basis(snapshots.mean(axis=0), scaled.vectors, scaled.singular_values)
 
 
 def projected_equations(
@@ -154,47 +184,13 @@ def projected_equations(
 
 
 def _weight(
-    model: DynamicModel,
-    settings: DynamicPodSettings,
-    histories: Sequence[Trajectory],
-    period: float,
+    model: DynamicModel, settings: DynamicPodSettings, states: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
     """Weight of the inner product: of all states (2 n, 2 n) or of the coordinates (n, n)."""
-    states = np.concatenate([history.states for history in histories])
     if settings.formulation == "state":
-        return state_weight(model, settings.inner_product, states, period)
+        return state_weight(model, settings.inner_product, states, float(edges[1] - edges[0]))
     coordinates = states[:, : len(model.coordinates)]
     return coordinate_weight(model, settings.inner_product, coordinates)
-
-
-def _spaces(
-    model: DynamicModel,
-    formulation: str,
-    edges: np.ndarray,
-    means: np.ndarray,
-    bases: Sequence[Basis],
-    weight: np.ndarray,
-) -> ProjectionWindows:
-    n, windows = len(model.coordinates), len(bases)
-    rows = max(basis.rank for basis in bases) * (2 if formulation == "paired" else 1)
-    trial, test = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
-    ranks = np.empty(windows, dtype=np.int64)
-    # The speeds that go with rates of the coordinates, where angles are small.
-    turn = (
-        linearisation.speeds_per_rates(model, model.start())
-        if formulation == "paired"
-        else np.eye(n)
-    )
-    back = np.linalg.inv(turn)
-    for k, basis in enumerate(bases):
-        r, width = basis.rank, len(basis.mean)
-        up, down = basis.vectors.T, basis.vectors.T @ weight
-        trial[k, :r, :width], test[k, :r, :width] = up, down
-        if formulation == "paired":
-            trial[k, r : 2 * r, n:], test[k, r : 2 * r, n:] = up @ turn.T, down @ back
-        ranks[k] = r if formulation == "state" else 2 * r
-    form = "coordinates" if formulation == "coordinates" else "state"
-    return ProjectionWindows(form, edges, means, trial, test, ranks)
 
 
 def check_subspace(model: DynamicModel, settings: DynamicPodSettings) -> None:

@@ -26,7 +26,7 @@ def coordinate_weight(
     if inner_product == "euclidean":
         return np.eye(n)
     if inner_product == "energy":
-        return model.mass_matrix(model.start())
+        return mass_weight(model)
     return _by_range(coordinates)
 
 
@@ -43,7 +43,14 @@ def state_weight(
         return np.eye(2 * n)
     if inner_product == "range":
         return _by_range(states)
-    mass = model.mass_matrix(model.start())
+    return mass_weight(model, time_scale)
+
+
+def mass_weight(model: DynamicModel, time_scale: float | None = None) -> np.ndarray:
+    """Weight `energy` of the coordinates; with a time scale in s of all states."""
+    n, mass = len(model.coordinates), model.mass_matrix(model.start())
+    if time_scale is None:
+        return mass
     weight = np.zeros((2 * n, 2 * n))
     weight[:n, :n] = mass / time_scale**2
     inverse = np.linalg.inv(linearisation.speeds_per_rates(model, model.start()))

@@ -1,4 +1,4 @@
-"""Which comparisons there are: with the paper, on unseen inputs, and of every model."""
+"""Which comparisons there are: with the paper, on unseen inputs, of every model, of any study."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.registry import names, unknown
+from vehiclemor.resources import data_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,7 +18,7 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     Parameters
     ----------
     what
-        `paper`, `predictive`, or the name of a model.
+        `paper`, `predictive`, the name of a model, or a study by its name or TOML file.
 
     Raises
     ------
@@ -36,7 +37,12 @@ def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
         from vehiclemor.report.comparison.model import model_comparison
 
         return model_comparison(what, folder, jobs)
-    raise unknown("comparison", what, ["paper", "predictive", *names("model")])
+    if what in data_names("studies") or what.endswith(".toml"):
+        from vehiclemor.report.comparison.study import study_comparison
+
+        return study_comparison(what, folder, jobs)
+    known = ["paper", "predictive", *names("model"), *data_names("studies"), "FILE.toml"]
+    raise unknown("comparison", what, known)
 
 
 def comparison_text(what: str, rows: pd.DataFrame, folder: Path) -> str:
@@ -49,6 +55,10 @@ def comparison_text(what: str, rows: pd.DataFrame, folder: Path) -> str:
         from vehiclemor.report.predictive.text import predictive_text
 
         return predictive_text(rows)
-    from vehiclemor.report.comparison.model import model_text
+    if what in names("model"):
+        from vehiclemor.report.comparison.model import model_text
 
-    return model_text(what, rows, folder)
+        return model_text(what, rows, folder)
+    from vehiclemor.report.comparison.study import study_text
+
+    return study_text(rows)

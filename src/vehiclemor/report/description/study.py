@@ -4,9 +4,9 @@ from vehiclemor.registry import component
 from vehiclemor.study.plans.protocol import SETS
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.study_file import (
-    StudyFile,
     load_studies,
     named_file,
+    read_study,
     study_path,
     values,
 )
@@ -16,7 +16,7 @@ from vehiclemor.toml_files import read_toml
 def study_description(name: str) -> dict[str, object]:
     """Grid and methods of a study, its members if it is a collection, or its protocols."""
     path = study_path(name)
-    study = read_toml(path, StudyFile)
+    study = read_study(path)
     head: dict[str, object] = {"study": path.stem, "summary": study.title, "file": str(path)}
     if study.studies:
         rows = [

@@ -34,26 +34,33 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
     Returns
     -------
     pandas.DataFrame
-        `kind` tells what a row is.  `method`: one contestant on what is judged, with the columns of
-        `method_rows`.  `target`: what the contender that validation has chosen must reach, with
-        `id`, `bound`, `measured`, `unit`, `verdict` (`met`, `missed` or `not_comparable`), `reason`
-        and `threshold_source`.  `draw`: a draw of the ledger.  `paper`: POD at the paper's rank and
-        control period, see `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
+        `kind` tells what a row is, `study` of which protocol.  `method`: one contestant on what is
+        judged, with the columns of `method_rows`.  `target`: what the contender that validation
+        has chosen must reach, with `id`, `bound`, `measured`, `unit`, `verdict` (`met`, `missed` or
+        `not_comparable`), `reason` and `threshold_source`.  `draw`: a draw of the ledger.  `paper`:
+        POD at the paper's rank and control period, see `paper_terms`.  Errors
+        `worst_<measure>_<output>` are in SI units.
     """
-    rows: list[Row] = []
-    models: list[str] = []
-    for dataset in run_studies(study, folder, jobs).values():
-        protocol = protocol_of(dataset)
-        models.append(protocol.model)
-        name = str(dataset.attrs["study"]).removeprefix(f"{STUDY}-")
-        draws = Ledger(name, folder, bool(dataset.attrs["own"])).entries()
-        methods = method_rows(dataset, protocol, draws)
-        rows += methods
-        rows += target_rows(dataset, protocol, methods)
-        rows += [_draw_row(entry, dataset) for entry in draws]
+    results = run_studies(study, folder, jobs).values()
+    rows = [row for dataset in results for row in protocol_rows(dataset, folder)]
     if study == STUDY:
-        rows += paper_terms_rows(models, folder)
+        rows += paper_terms_rows([dataset.attrs["model"] for dataset in results], folder)
     return pd.DataFrame(rows)
+
+
+def protocol_rows(dataset: xr.Dataset, folder: Path) -> list[Row]:
+    """Rows of one protocol: contestants, targets and draws, as of `predictive_comparison`."""
+    protocol, draws = protocol_of(dataset), draws_of(dataset, folder)
+    methods = method_rows(dataset, protocol, draws)
+    rows = methods + target_rows(dataset, protocol, methods)
+    rows += [_draw_row(entry, dataset) for entry in draws]
+    return [{**row, "study": str(dataset.attrs["study"])} for row in rows]
+
+
+def draws_of(dataset: xr.Dataset, folder: Path) -> list[Drawn]:
+    """Draws of a protocol that stand in its ledger."""
+    name = str(dataset.attrs["study"]).removeprefix(f"{STUDY}-")
+    return Ledger(name, folder, bool(dataset.attrs["own"])).entries()
 
 
 def protocol_of(dataset: xr.Dataset) -> ProtocolFile:

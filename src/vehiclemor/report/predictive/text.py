@@ -40,18 +40,21 @@ def predictive_text(rows: pd.DataFrame) -> str:
     parts = [wrapped(f"{title}."), terms(LEGEND)]
     records = [row for row in records if row["kind"] != "paper"]
     parts += [
-        _model_text(str(model), [row for row in records if row["model"] == model])
-        for model in dict.fromkeys(row["model"] for row in records)
+        _protocol_text([row for row in records if row["study"] == study])
+        for study in dict.fromkeys(row["study"] for row in records)
     ]
     if paper:
         parts.append(paper_terms_text(paper))
     return "\n\n".join(parts)
 
 
-def _model_text(model: str, rows: list[Row]) -> str:
+def _protocol_text(rows: list[Row]) -> str:
     methods, draws, notes = _of_kind(rows, "method"), _of_kind(rows, "draw"), Footnotes()
     winner = chosen(methods)
-    lines = [f"{model}: {methods[0]['runs']:.0f} runs"]
+    name, model = (str(methods[0][key]) for key in ("study", "model"))
+    known = name.removeprefix("predictive-")
+    of_model = "" if known == model else f" ({model})"
+    lines = [wrapped(f"{known}{of_model}: {methods[0]['runs']:.0f} runs")]
     lines += [_target_table(_of_kind(rows, "target"), notes)]
     lines += [_error_table(winner, notes) if winner else ""]
     lines += [_method_table(methods, winner, notes)]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vehiclemor.codegen.loop_types import Int, Matrix, Vector
-from vehiclemor.simulation.integrators.structures import Signal
+from vehiclemor.sample_loops import Pieces
 
 INLINED = ("input_at", "signal_at")
 
@@ -44,7 +44,7 @@ def signal_at(signal, segment, t, u):
         u[j] = value
 
 
-def sampled(signal: Signal, times: Vector, inputs: Matrix) -> Int:
+def sampled(signal: Pieces, times: Vector, inputs: Matrix) -> Int:
     """Inputs (samples, inputs) at increasing times (samples,) in s; at a jump those after it."""
     segment, last = 0, len(signal.edges) - 2
     for sample in range(len(times)):

@@ -7,6 +7,7 @@ An integrator gives `work_space`, `begin`, `longest_step`, `step`, `accept`, `pr
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
+from vehiclemor.sample_loops import Pieces
 from vehiclemor.simulation.formulations.full import error_norm, lift, project, rhs
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.dopri5 import (
@@ -36,7 +37,6 @@ from vehiclemor.simulation.integrators.structures import (
     Output,
     Place,
     Problem,
-    Signal,
     Spans,
     Subspaces,
 )
@@ -45,7 +45,7 @@ from vehiclemor.simulation.integrators.structures import (
 def integrate(
     start: Vector,
     equations: Equations,
-    signal: Signal,
+    signal: Pieces,
     spans: Spans,
     subspaces: Subspaces,
     method: Method,
@@ -274,7 +274,7 @@ def leave_out(output, sample):
 def rhs_at(
     y: Vector,
     equations: Equations,
-    signal: Signal,
+    signal: Pieces,
     subspaces: Subspaces,
     place: Place,
     buffer: Vector,

@@ -3,35 +3,14 @@
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
+from vehiclemor.sample_loops import Pieces
 
 # Places of a system's kernels in its list of addresses; see `System`.
-DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, FUSED_STEP = range(5)
+DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, FUSED_STEP, TANGENT = range(6)
 # Why a run has ended: all well, too many evaluations, not finite, singular matrix, tiny step.
 FINISHED, TOO_MANY_CALLS, NOT_FINITE, SINGULAR, STEP_TOO_SMALL = range(5)
 # Places of the counts of a run.
 RHS_CALLS, STEPS, REJECTED_STEPS, JACOBIANS, FACTORISATIONS, LINEAR_SOLVES = range(6)
-
-
-class Signal(NamedTuple):
-    """Piecewise polynomial inputs.
-
-    Attributes
-    ----------
-    edges
-        Ends of the smooth segments (segments + 1,) in s.
-    first
-        Number of the first piece of each segment (segments + 1,).
-    starts
-        Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
-    coefficients
-        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
-        power first.
-    """
-
-    edges: Vector
-    first: IntVector
-    starts: Vector
-    coefficients: Cube
 
 
 class Equations(NamedTuple):
@@ -47,12 +26,19 @@ class Equations(NamedTuple):
         Magnitude of each state below which errors count absolutely.
     turning
         Numbers of the heading and of pairs of velocities that turn with it; may be empty.
+    directions
+        Derivatives (parameters, constants) of the constants by parameters along which the state
+        has tangents, which follow it; no rows where it has none.
+    lanes
+        Directions that the tangent of the rates takes at once.
     """
 
     kernels: IntVector
     constants: Vector
     error_scale: Vector
     turning: IntVector
+    directions: Matrix
+    lanes: Int
 
 
 class Spans(NamedTuple):
@@ -246,7 +232,7 @@ class Problem(NamedTuple):
     """
 
     segment: int
-    signal: Signal
+    signal: Pieces
     equations: Equations
     mean: Vector
     trial: Matrix

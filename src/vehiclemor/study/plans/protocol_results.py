@@ -67,6 +67,10 @@ def protocol_dataset(
         "winner": [row.winner for row in rows],
         "method": [row.contestant.method for row in rows],
         "settings": [_settings(row) for row in rows],
+        "cell_keys": [
+            json.dumps({purpose: cells[index].attrs["cell"] for purpose, cells in found.items()})
+            for index in range(len(rows))
+        ],
         "validation": [_validation(row) for row in rows],
         "validation_score": [row.validation[row.candidate].score for row in rows],
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],

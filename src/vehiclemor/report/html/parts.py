@@ -1,0 +1,97 @@
+"""What a report is made of, as the template reads it."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from vehiclemor.report.verdicts import MET, MISSED, VERDICTS
+
+
+class Entry(NamedTuple):
+    """A table cell; one that is a number has it in full in `value`.
+
+    Attributes
+    ----------
+    anchor
+        Id of what it links to in the same file.
+    kind
+        Class of style: a verdict or a status.
+    """
+
+    text: str
+    value: float | None = None
+    anchor: str = ""
+    kind: str = ""
+
+
+class Table(NamedTuple):
+    """A table; `columns` are its headings, and `note` stands below."""
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: list[list[Entry]]
+    note: str = ""
+
+
+class Picture(NamedTuple):
+    """A vector figure: the text of an `svg` element, ready to stand in the page."""
+
+    caption: str
+    svg: str
+
+
+class Plot(NamedTuple):
+    """Interactive figures beside one another, as the script of the page draws them."""
+
+    id: str
+    caption: str
+    figures: list[Mapping[str, Any]]
+
+
+class Cell(NamedTuple):
+    """What determines a result: a number's link leads to it."""
+
+    title: str
+    configuration: Mapping[str, Any]
+    note: str = ""
+
+
+class Section(NamedTuple):
+    """A study, or a comparison.
+
+    Attributes
+    ----------
+    facts
+        Word -> text: where its results come from.
+    cells
+        Anchor -> cell of every number of its tables.
+    source
+        Text of the study file.
+    """
+
+    id: str
+    title: str
+    intro: list[str]
+    tables: list[Table]
+    pictures: list[Picture]
+    plots: list[Plot]
+    facts: dict[str, str]
+    cells: dict[str, Cell]
+    source: str = ""
+
+
+def quantity(value: float, anchor: str = "") -> Entry:
+    """A number with three digits, linked; a dash for one that is missing."""
+    if value != value:
+        return Entry("–")
+    return Entry(f"{value:.3g}", value, anchor)
+
+
+def count(value: int, anchor: str = "") -> Entry:
+    """A whole number."""
+    return Entry(str(value), value, anchor)
+
+
+def judged_entry(verdict: str) -> Entry:
+    """A verdict as a badge."""
+    kind = verdict if verdict in (MET, MISSED) else "other"
+    return Entry(VERDICTS.get(verdict, verdict), kind=kind)

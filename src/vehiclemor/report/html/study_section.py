@@ -1,0 +1,88 @@
+"""A study on a grid as a section: errors of every cell, figures, paths and errors to look into."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import xarray as xr
+
+from vehiclemor.errors import InputError
+from vehiclemor.report.figures.result_plot import plot_result
+from vehiclemor.report.figures.saving import styled
+from vehiclemor.report.html.cells import UNNAMED, stored_cell
+from vehiclemor.report.html.interactive import available
+from vehiclemor.report.html.parts import Cell, Picture, Section
+from vehiclemor.report.html.provenance import facts, source_text
+from vehiclemor.report.html.study_plots import study_plots
+from vehiclemor.report.html.study_table import Place, error_table, places
+from vehiclemor.report.html.vector import svg_element
+from vehiclemor.report.result_selection import drawn
+
+PICTURES = {
+    "histories": "Outputs over the time, differences from full order below",
+    "paths": "Paths in the plane, distances from full order below",
+    "errors": "RMS errors",
+}
+
+
+def study_section(dataset: xr.Dataset, folder: Path) -> Section:
+    """What a combined dataset of a grid holds, within a bounded size."""
+    name, definition = str(dataset.attrs["study"]), json.loads(dataset.attrs["configuration"])
+    rows = places(dataset)
+    table = error_table(dataset, rows)
+    linked = {entry.anchor for row in table.rows for entry in row if entry.anchor}
+    dims = [str(d) for d in dataset["status"].dims]
+    cells = {
+        str(row["anchor"]): _cell(row, dims, definition, folder)
+        for row in reversed(rows)
+        if row["anchor"] in linked
+    }
+    ends = Counter(str(row["status"]) for row in rows)
+    told = ", ".join(f"{n} {status}" for status, n in sorted(ends.items()))
+    what = f"Study {name} of {dataset.attrs['model']}"
+    size = f"{len(rows)} places of the grid, {len({row['anchor'] for row in rows})} cells"
+    return Section(
+        f"study-{name}",
+        str(dataset.attrs["title"]),
+        [f"{what}, trained on: {definition['training']}. {size}: {told}."],
+        [table],
+        _pictures(dataset, name),
+        study_plots(dataset, name) if available() else [],
+        facts(dataset, cells),
+        dict(reversed(cells.items())),
+        source_text(dataset, folder),
+    )
+
+
+def _cell(row: Place, dims: list[str], definition: dict, folder: Path) -> Cell:
+    entry = next(e for e in definition["methods"] if (e["label"] or e["method"]) == row["method"])
+    place = {d: row[d] for d in dims}
+    known = {"place": place, "method": entry, "training": definition["training"]}
+    kind, _, key = str(row["anchor"]).partition("-")
+    if kind == "cell":
+        return stored_cell(folder, key, known)
+    return Cell(f"place {', '.join(map(str, place.values()))}", known, UNNAMED)
+
+
+def _pictures(dataset: xr.Dataset, name: str) -> list[Picture]:
+    """Every kind of picture that the dataset has the data for; histories from every start."""
+    starts = [str(start) for start in dataset["start"].values]
+    found: list[Picture] = []
+    for kind, words in PICTURES.items():
+        for start in starts if kind != "errors" else [""]:
+            chosen = {"start": start} if start else {}
+            try:
+                figure = plot_result(drawn(dataset, kind, chosen)[0], None, kind)
+            except InputError:
+                # The study has nothing of that kind.
+                break
+            at = figure.get_suptitle().removeprefix(str(dataset.attrs["title"])).strip("; ")
+            at = ", ".join(
+                filter(None, (at, f"start {start}" if len(starts) > 1 and start else ""))
+            )
+            caption = f"{words}{f': {at}' if at else ''}."
+            figure.suptitle("")
+            with styled():
+                svg = svg_element(figure, f"{name}-{kind}-{len(found)}", caption)
+            found.append(Picture(caption, svg))
+    return found

@@ -1,0 +1,115 @@
+"""Runs of other cars than the study's: each is what a model with these parameters gives alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import sine_travel
+from vehiclemor.registry import component
+from vehiclemor.study import evaluate as evaluation
+from vehiclemor.study.evaluate import evaluate
+from vehiclemor.study.experiment import make_experiment
+from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.scenario import Scenario, start_of, training_run, training_scenarios
+
+HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
+MOVED = (("tie_rod_inner.z", -0.09),)
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return vm.model("independent_suspension_vehicle")
+
+
+@pytest.fixture(scope="module")
+def suspension():
+    return vm.model("double_wishbone")
+
+
+def lane_change(parameters=(), **further):
+    return Scenario(component("maneuver", "lane_change"), "dropped", None, parameters, **further)
+
+
+def experiment(model, method, training, tests, keep="errors", **settings):
+    complete = complete_settings(model, method, settings)
+    return make_experiment(model, method, complete, training, tests, keep)
+
+
+def test_a_run_of_another_car_is_that_of_a_model_made_with_its_parameters(vehicle):
+    alone = vm.model(vehicle.name, dict(HEAVY))
+    run = training_run(vehicle, lane_change(HEAVY)).recorded()
+    expected = alone.simulate(component("maneuver", "lane_change"), "dropped")
+    np.testing.assert_array_equal(run.states, expected.states)
+    # It stands lower on its springs, and starts faster.
+    assert not np.array_equal(alone.start("dropped"), vehicle.start("dropped"))
+    faster = replace(lane_change(HEAVY), speed=31.0)
+    own = vm.model(vehicle.name, dict(HEAVY) | {"initial_speed": 31.0})
+    np.testing.assert_array_equal(start_of(vehicle, faster), own.start("dropped"))
+
+
+def test_a_component_of_a_point_is_a_parameter(suspension):
+    x, y, _ = suspension.parameters["tie_rod_inner"]
+    whole = vm.model(suspension.name, {"tie_rod_inner": [x, y, -0.09]})
+    moved = vm.model(suspension.name, dict(MOVED))
+    np.testing.assert_array_equal(moved.constants, whole.constants)
+    for name in ("tie_rod_inner.w", "tie_rod_inner.", "tie_rod_iner.z"):
+        with pytest.raises(InputError, match="is not a parameter of double_wishbone; "):
+            vm.model(suspension.name, {name: 0.0})
+    with pytest.raises(InputError, match="a number is needed"):
+        vm.model(suspension.name, {"tie_rod_inner.z": [0.0, 0.0]})
+
+
+@pytest.mark.parametrize("cars", [None, ((),), ((), MOVED)], ids=["own", "nominal", "set"])
+def test_the_fit_of_a_car_is_the_method_on_its_equations_and_the_training_cars(suspension, cars):
+    test = Scenario(sine_travel, "equilibrium", None, MOVED)
+    training = training_scenarios(test, "matched", cars=cars)
+    found = evaluate(experiment(suspension, "pod", training, (test,), "metrics", rank=3))
+    moved, method = vm.model(suspension.name, dict(MOVED)), component("method", "pod")
+    trained = {None: [moved], ((),): [suspension], ((), MOVED): [suspension, moved]}[cars]
+    runs = [training_run(car, Scenario(sine_travel, "equilibrium")) for car in trained]
+    settings = complete_settings(suspension, "pod", {"rank": 3})
+    complete = method.settings["ae"](**settings)
+    alone = method.fit(moved, runs, complete).simulate(sine_travel, "equilibrium")
+    error = alone.outputs - moved.simulate(sine_travel, "equilibrium").outputs
+    expected = np.sqrt((error**2).mean(axis=0))
+    np.testing.assert_allclose(found["rms_error"], expected, rtol=1e-12)
+
+
+def test_tests_of_several_cars_are_each_compared_with_their_own_full_order(suspension, monkeypatch):
+    fits = []
+    method = component("method", "pod")
+    monkeypatch.setattr(
+        "vehiclemor.reduction.methods.pod.METHOD",
+        replace(method, fit=lambda car, *given: fits.append(car) or method.fit(car, *given)),
+    )
+    cars = ((), MOVED, (("tie_rod_inner.z", -0.1),))
+    tests = tuple(
+        Scenario(sine_travel.perturbed(f), "equilibrium", None, c) for c in cars for f in (1.0, 1.2)
+    )
+    own = (Scenario(sine_travel, "equilibrium", None, None),)
+    evaluation._kept_fit.cache_clear()
+    together = evaluate(experiment(suspension, "pod", own, tests, rank=3))
+    assert len(fits) == len(cars)
+    assert len(set(together["scenario"].values.tolist())) == len(tests)
+    for place, test in enumerate(tests):
+        alone = evaluate(
+            experiment(
+                suspension, "pod", (replace(own[0], parameters=test.parameters),), (test,), rank=3
+            )
+        )
+        for name in ("rms_error", "largest_output"):
+            np.testing.assert_array_equal(together[name][place], alone[name][0])
+
+
+def test_a_car_is_part_of_the_key_and_no_car_leaves_it_as_it_was(vehicle):
+    nominal, heavy = lane_change(), lane_change(HEAVY)
+    assert "parameters" not in nominal.content
+    assert nominal.run_key != heavy.run_key
+    keys = {
+        experiment(vehicle, "pod", (t,), (nominal,)).key
+        for t in (nominal, heavy, lane_change(None))
+    }
+    assert len(keys) == 3
