@@ -80,7 +80,9 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
-to    "studies",
+    "sobol_indices",
+    "status",
+    "studies",
     "write_report",
 ]
 
