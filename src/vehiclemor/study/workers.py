@@ -148,9 +148,7 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     return [*there, *finished], fault
 
 
-def evaluated(
-    experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset], object]
-) -> Done:
+def evaluated(experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset], object]) -> Done:
     """Evaluate some experiments, and keep what each gives under its key."""
     finished, fault = [], ""
     for experiment in experiments:

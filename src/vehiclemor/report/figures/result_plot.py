@@ -184,8 +184,16 @@ def figure_paths(dataset: xr.Dataset) -> Figure:
 
 def figure_errors(dataset: xr.Dataset) -> Figure:
     """RMS errors: over the grid where there is one, else of all outputs of one point."""
-    dataset, drawn, at = error_axes(dataset)
-    dataset = dataset.assign_attrs(title="; ".join([dataset.attrs.get("title", ""), *at]))
+    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
+    grid = {d: values for d, values in grid.items() if len(values) > 1}
+    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
+    both = set(FACTORS) <= set(axes)
+    drawn = list(FACTORS) if both else sorted(axes, key=lambda d: len(grid[d]))[-1:]
+    for dimension in set(grid) - set(drawn):
+        values = grid[dimension].tolist()
+        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
+        title = f"{dataset.attrs.get('title', '')}; {dimension} {value}"
+        dataset = dataset.sel({dimension: value}).assign_attrs(title=title)
     if not drawn:
         return _errors_of_a_point(dataset)
     if "method" not in dataset.dims:
@@ -194,35 +202,13 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
     methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
     texts = {m: method_text(m) for m in methods}
     shown = {"outputs": shown_outputs(dataset), "methods": texts}
-    if len(drawn) == 2:
-        cells = dataset.sizes[FACTORS[0]] * dataset.sizes[FACTORS[1]]
+    if both:
+        cells = len(grid[FACTORS[0]]) * len(grid[FACTORS[1]])
         figure = figure_error_map({"": dataset}, values=cells <= WRITTEN, **shown)
     else:
         figure = figure_error_curves({"": dataset}, axis=drawn[0], legend="lower", **shown)
     figure.suptitle(str(dataset.attrs.get("title", "")))
     return figure
-
-
-def error_axes(dataset: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
-    """Axes over which errors are drawn: both factors, else the longest one of numbers, if any.
-
-    Returns
-    -------
-    dataset, list of str, list of str
-        The dataset at one place of all other dimensions, the axes, and that place in words.
-    """
-    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
-    grid = {d: values for d, values in grid.items() if len(values) > 1}
-    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
-    drawn = sorted(axes, key=lambda d: len(grid[d]))[-1:]
-    drawn = list(FACTORS) if set(FACTORS) <= set(axes) else drawn
-    at = []
-    for dimension in (d for d in grid if d not in drawn):
-        values = grid[dimension].tolist()
-        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
-        dataset = dataset.sel({dimension: value})
-        at.append(f"{dimension} {value}")
-    return dataset, drawn, at
 
 
 def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
