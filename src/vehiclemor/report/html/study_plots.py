@@ -75,6 +75,9 @@ def _errors(dataset: xr.Dataset) -> tuple[list[Any], str]:
     if values.size > POINTS:
         return [], ""
     tables = {m: _table(values, keys, m, axes) for m in methods}
+    tables = {m: source for m, source in tables.items() if len(source.data["error"])}
+    if not tables:
+        return [], ""
     at = f", at {', '.join(words)}" if words else ""
     if len(axes) == 1:
         caption = f"Interactive: {label} over {axes[0].replace('_', ' ')}{at}; a tap on a point "
@@ -147,8 +150,6 @@ def _maps(tables: dict[str, Any], axes: list[str]) -> list[Any]:
     from bokeh.transform import transform
 
     errors = np.concatenate([source.data["error"] for source in tables.values()])
-    if not errors.size:
-        return []
     low, high = float(errors.min()), float(errors.max())
     made = []
     for method, source in tables.items():
