@@ -80,7 +80,8 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
-to    "studies",
+    "status",
+    "studies",
     "write_report",
 ]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,15 @@ from vehiclemor.files import (
     write_whole,
 )
 from vehiclemor.study import cell_file
-from vehiclemor.study.netcdf_file import global_attributes, read_dataset, write_dataset
+from vehiclemor.study.netcdf_file import (
+    LARGE,
+    Parts,
+    global_attributes,
+    opened_lazily,
+    read_dataset,
+    write_dataset,
+    write_parts,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -242,42 +250,59 @@ def stored(
     path: Path,
     attribute: str,
     key: str,
-    make: Callable[[], xr.Dataset],
-    sources: Sequence[Path] = (),
+    make: Callable[[], xr.Dataset | Parts],
+    sources: Callable[[], Iterable[Path]] = list,
     owner: Owner | None = None,
 ) -> xr.Dataset:
     """What is stored for this key, here or under another name, else what `make` gives.
 
-    It is stored at `path`, to which the encoding `source` of what is returned leads.
+    The results of a study are then stored at `path`.  Where the file is tells the encoding `source`
+    of what is returned.
 
     Parameters
     ----------
     attribute
         Global attribute that holds the key.
     sources
-        Files that it was made from; if one of them is missing or as new, it is made again.
+        Gives the files that it was made from; if one of them is missing or as new, it is made
+        again.
     owner
         Of the result of a study.
     """
     dataset = _current(path, attribute, key, sources)
     if dataset is not None:
         return dataset
-    for other in sorted(path.parent.glob("[!.]*.nc")):
-        if other != path and global_attributes(other).get(attribute) == key:
-            dataset = _current(other, attribute, key, sources)
-            if dataset is not None and owner is None:
-                return dataset
-            if dataset is not None:
-                break
+    same = _under_another_name(path, attribute, key, sources)
+    if same is not None and owner is None:
+        return same
     make_folder(path.parent)
-    dataset = (make() if dataset is None else dataset).assign_attrs({attribute: key})
-    dataset.attrs |= owner._asdict() if owner else {}
-    write_dataset(dataset, path)
+    made = make() if same is None else same
+    further = {attribute: key} | (owner._asdict() if owner else {})
+    if isinstance(made, Parts):
+        write_parts(made, path, further)
+        dataset = opened_lazily(path)
+    else:
+        dataset = made.assign_attrs(further)
+        write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
 
 
-def _current(path: Path, attribute: str, key: str, sources: Sequence[Path]) -> xr.Dataset | None:
+def _under_another_name(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
+    """As `_current`, of any file beside that can be held: its study was renamed since."""
+    for other in sorted(path.parent.glob("[!.]*.nc")):
+        if other == path or other.stat().st_size >= LARGE:
+            continue
+        if global_attributes(other).get(attribute) == key:
+            return _current(other, attribute, key, sources)
+    return None
+
+
+def _current(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
     """What a file holds, if that was made for this key from these sources as they are."""
     if not path.exists():
         return None
@@ -290,7 +315,8 @@ def _current(path: Path, attribute: str, key: str, sources: Sequence[Path]) -> x
         return None
     written = path.stat().st_mtime_ns
     try:
-        newest = max((source.stat().st_mtime_ns for source in sources), default=-1)
+        newest = max((source.stat().st_mtime_ns for source in sources()), default=-1)
     except FileNotFoundError:
         return None
+    dataset.encoding["source"] = str(path)
     return dataset if newest < written else None
