@@ -80,6 +80,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
+    "sobol_indices",
     "status",
     "studies",
     "write_report",
