@@ -18,9 +18,9 @@ from vehiclemor.report.html.parts import Section
 from vehiclemor.report.html.protocol_section import protocol_section
 from vehiclemor.report.html.study_section import study_section
 from vehiclemor.report.html.verdict_section import verdict_section
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset
 
 PAPER = "paper"
 
