@@ -18,7 +18,7 @@ from vehiclemor.report.figures.lines import CROSS, Style, legend_outside, letter
 from vehiclemor.report.figures.places import FEW_DECADES, Places, places_of, tick_decades
 from vehiclemor.report.labels import error_label, method_text, readable_unit, unit_of
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.study_file import FACTORS
+from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 # Lines of a panel, starts with panels of their own, columns of maps, and cells of a map with their
 # number.
@@ -90,7 +90,7 @@ def _lines(
     errors = errors.isel({d: 0 for d in others if d not in own}, drop=True)
     found = {}
     for place in itertools.product(*(errors[d].values.tolist() for d in own)):
-        values = [f"{name.replace('_', ' ')} {v}" for name, v in zip(own, place, strict=True)]
+        values = [f"{_words([name])} {v}" for name, v in zip(own, place, strict=True)]
         chosen = errors.sel(dict(zip(own, place, strict=True)), drop=True)
         name, text = (", ".join([m, *values]) for m in (method, method_text(method)))
         found[name] = text, chosen
@@ -216,7 +216,7 @@ def _largest_over(dataset: xr.Dataset, dimensions: Sequence[str]) -> str:
 
 
 def _words(dimensions: Sequence[str]) -> str:
-    *head, last = (d.replace("_", " ") for d in dimensions or [""])
+    *head, last = (d.removeprefix(PARAMETER).replace("_", " ") for d in dimensions or [""])
     return f"{', '.join(head)} and {last}" if head else last
 
 
