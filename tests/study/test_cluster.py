@@ -30,7 +30,7 @@ from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.workers import LARGEST, WAITING, Timed, evaluate_and_store, in_batches
+from vehiclemor.study.workers import WAITING, Timed, evaluate_and_store, in_batches
 
 distributed = pytest.importorskip("distributed")
 
@@ -218,8 +218,9 @@ def test_the_driver_hands_out_nothing_but_its_cache(tmp_path, monkeypatch):
     sizes=st.lists(st.integers(1, 4), max_size=300),
     places=st.integers(0, 5),
     pace=st.floats(0.0, 1.0),
+    most=st.sampled_from([1, 10, 100]),
 )
-def test_batches_hold_each_group_once_and_whole(sizes, places, pace):
+def test_batches_hold_each_group_once_and_whole(sizes, places, pace, most):
     groups = [[(number, part) for part in range(size)] for number, size in enumerate(sizes)]
     sent = []
 
@@ -229,10 +230,10 @@ def test_batches_hold_each_group_once_and_whole(sizes, places, pace):
         future.set_result(Timed(batch, pace * len(batch)))
         return future
 
-    found = list(in_batches(groups, submit, lambda: places, Future.result))
+    found = list(in_batches(groups, submit, lambda: places, Future.result, most))
     assert sorted(chain(*found)) == sorted(chain(*groups))
     assert list(chain(*sent)) == list(chain(*groups))
-    assert all(len(batch) < LARGEST + max([0, *sizes]) for batch in sent)
+    assert all(len(batch) <= max([most, *sizes]) for batch in sent)
     # As many as there are places end together.
     assert all(len(batch) <= 4 for batch in sent[-WAITING * places :] if places)
 
@@ -290,7 +291,7 @@ def test_a_worker_with_other_source_is_one_line(study, client, tmp_path, change,
     with engine.reached(client.scheduler.address, 1) as elsewhere:
         (tmp_path / "cells").mkdir()
         with pytest.raises(InputError, match=f"worker tcp://.* has {what}"):
-            list(elsewhere([[replace(cell, **change)]], tmp_path))
+            list(elsewhere([[replace(cell, **change)]], tmp_path, False))
     assert not cells_in(tmp_path)
 
 
