@@ -30,8 +30,8 @@ from vehiclemor.files import make_folder
 from vehiclemor.online.rom import ReducedOrderModel as Car
 from vehiclemor.online.saved import shipped_folder
 from vehiclemor.registry import component
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.provenance import attributes
-from vehiclemor.study.store import read_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

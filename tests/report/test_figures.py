@@ -17,15 +17,15 @@ from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.accessor import ResultAccessor
 from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.figures.error_map import luminance, two_digits
 from vehiclemor.report.figures.lines import panels
 from vehiclemor.report.figures.pareto import figure_pareto
-from vehiclemor.report.figures.perturbations import luminance, two_digits
-from vehiclemor.report.figures.result_plot import _outputs, plot_result
+from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.regenerate import left_out
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.store import write_dataset
 
 FREQUENCY, AMPLITUDE = np.linspace(0.7, 1.3, 7), np.linspace(0.7, 1.3, 7)
 SCHEMATICS = {"1", "5", "8"}
@@ -378,7 +378,7 @@ def test_full_order_alone_has_no_errors(results):
 
 def test_chosen_outputs_are_drawn_though_the_model_shows_others(results):
     point = results["figure-11"].isel(rank=0)
-    others = [name for name in point["output"].values if name not in _outputs(point)][:1]
+    others = [name for name in point["output"].values if name not in shown_outputs(point)][:1]
     figure = plot_result(point.sel(output=others))
     assert others == ["spindle_x"]
     assert figure.axes[0].get_ylabel().startswith("spindle displacement\nx")

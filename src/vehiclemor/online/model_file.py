@@ -27,9 +27,9 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.input_range import InputRange
 from vehiclemor.study.method_settings import Settings, for_method
+from vehiclemor.study.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.study.provenance import attributes, code_digest
 from vehiclemor.study.scenario import parameters_of
-from vehiclemor.study.store import INTEGRITY, opened, write_dataset
 
 # Of the layout of these files.
 SCHEMA = 1

@@ -160,7 +160,7 @@ def evaluated_by_cluster(
     folder: Path,
     client: Client,
     topic: str,
-    work: Callable[..., tuple[Done, dict[str, xr.Dataset]]] | None = None,
+    work: Callable[..., tuple[Done, dict[str, tuple[xr.Dataset, float]]]] | None = None,
 ) -> Generator[Done, None, None]:
     """What `evaluate_and_store` gives for each batch, by the workers of a cluster."""
     from distributed.cfexecutor import ClientExecutor
@@ -183,8 +183,8 @@ def evaluated_by_cluster(
     try:
         write_text(token, place.text)
         for done, results in in_batches(groups, submit, places, _taken):
-            for key, dataset in results.items():
-                write_cell(dataset, folder, key)
+            for key, (dataset, seconds) in results.items():
+                write_cell(dataset, folder, key, seconds)
             yield done
     finally:
         pool.shutdown(wait=False)
@@ -217,14 +217,18 @@ def _taken(future: Future[Timed]) -> Timed:
 
 def on_worker(
     experiments: Sequence[Experiment], place: Place
-) -> tuple[Done, dict[str, xr.Dataset]]:
+) -> tuple[Done, dict[str, tuple[xr.Dataset, float]]]:
     """Evaluate some experiments; gives their results too, if the driver is to write them."""
     with _turn(), asking(partial(_from_others, place.topic)):
         _same_source(experiments)
         if _sees(place):
             return evaluate_and_store(experiments, place.folder), {}
-        results: dict[str, xr.Dataset] = {}
-        return evaluated(experiments, results.__setitem__), results
+        results: dict[str, tuple[xr.Dataset, float]] = {}
+
+        def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
+            results[key] = dataset, seconds
+
+        return evaluated(experiments, keep), results
 
 
 @once

@@ -297,7 +297,7 @@ def test_wrong_input_is_one_line(changes, line, full):
 
 def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
     signals = vm.Signals(TIMES, steering(2))
-    with pytest.raises(InputError, match="was fitted to one parameter set"):
+    with pytest.raises(InputError, match="is fitted to one car"):
         vm.simulate_many(reduced, signals, parameters={"sprung_mass": 1400.0})
     (tmp_path / "runs.nc").mkdir()
     with pytest.raises(FileError, match="exists already"):

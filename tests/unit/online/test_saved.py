@@ -23,8 +23,8 @@ from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.scenario import start_of
-from vehiclemor.study.store import write_dataset
 
 CAR = "independent_suspension_vehicle"
 
