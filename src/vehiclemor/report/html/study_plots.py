@@ -12,6 +12,7 @@ from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.interactive import (
     HINT,
     as_items,
+    legend_name,
     look,
     new_figure,
     tapped,
@@ -58,7 +59,7 @@ def _paths(dataset: xr.Dataset) -> tuple[list[Any], str]:
     for label, (outputs, style) in curves.items():
         x, y = outputs.sel(output=PATH).transpose("output", "time").values[:, every].astype("f4")
         data: dict[str, Any] = {"x": x, "y": y, "time": times, "name": [label] * len(x)}
-        made.line("x", "y", source=data, legend_label=label, **look(style))
+        made.line("x", "y", source=data, legend_label=legend_name(label), **look(style))
     at = f" at {words}" if words else ""
     return [with_legend(made)], f"Interactive: paths of all methods{at}. {HINT}"
 
@@ -137,7 +138,7 @@ def _curves(tables: dict[str, Any], axis: str, label: str) -> Any:
     told |= {n.replace("_", " "): f"@{{{n}}}" for n in places} | {"at": "@cell"}
     made = new_figure(axis.replace("_", " "), label, told, y_axis_type="log")
     for (method, source), style in zip(tables.items(), styles(tables).values(), strict=True):
-        common = {"source": source, "legend_label": method_text(method)}
+        common = {"source": source, "legend_label": legend_name(method_text(method))}
         if "sample" not in places:
             made.line(axis, "error", **common, **look(style))
         made.scatter(axis, "error", size=6, color=style["color"], **common)
