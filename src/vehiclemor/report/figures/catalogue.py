@@ -15,6 +15,7 @@ from vehiclemor.report.figures import (
     pareto,
     paths,
     perturbations,
+    sobol,
     spectrum,
     spread,
     suspension_schematic,
@@ -22,7 +23,7 @@ from vehiclemor.report.figures import (
     vehicle_schematic,
 )
 from vehiclemor.report.figures.lines import Results
-from vehiclemor.resources import data_folder
+from vehiclemor.resources import data_folder, data_names
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
@@ -40,6 +41,7 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "unseen inputs": unseen.figure_unseen,
     "equation order": equation_order.figure_equation_order,
     "pareto": pareto.figure_pareto,
+    "sobol": sobol.figure_sobol,
 }
 
 
@@ -103,6 +105,8 @@ OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
 def find(name: str, results: Path) -> Entry:
     """The figure of a name such as `6`, or `histories-<model>`, which every model has.
 
+    `sobol-<model>` has each model of which `data/sobol` declares a box of parameters.
+
     Studies of a model that declares none are written to the results folder.
 
     Raises
@@ -113,8 +117,14 @@ def find(name: str, results: Path) -> Entry:
     if name in FIGURES:
         return FIGURES[name]
     kind, _, model = name.partition("-")
+    boxes = data_names("sobol")
+    if kind == "sobol" and model in boxes:
+        options = {"model": model, "results": str(results)}
+        caption = f"{model}: first and total Sobol indices of objectives over a box of parameters"
+        return Entry(name=name, draw="sobol", caption=caption, options=options)
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
+        known += [f"sobol-{box}" for box in boxes]
         raise unknown("figure", name, [*FIGURES, *known])
     return _of_a_model(kind, model, results)
 
