@@ -15,7 +15,7 @@ WIDTH = 0.8
 
 
 def figure_sobol(*, model: str, results: str) -> Figure:
-    """A panel for each objective: bars of each parameter, 95 % intervals of the total order."""
+    """A panel for each objective: bars of each parameter, with intervals of 95 %."""
     data = sobol_dataset(model, Path(results))
     names = data["objective"].values
     figure, axes = panels(len(names), 1, (6.7, 1.2 + 2.2 * len(names)), sharex=True)
@@ -43,11 +43,14 @@ def _draw(axis: Axes, data: xr.Dataset) -> None:
     for k, (label, color) in enumerate(zip(data["model"].values, COLORS, strict=False)):
         own, width = data.isel(model=k), WIDTH / count
         at = places + (k - 0.5 * (count - 1)) * width
-        total, first = own["total_order"].values, own["first_order"].values
-        ends = np.array([total - own["total_order_low"], own["total_order_high"] - total])
-        bars = {"ecolor": "black", "error_kw": {"elinewidth": 0.8}, "capsize": 2}
-        axis.bar(at, total, width, color=color, alpha=0.35, yerr=np.maximum(ends, 0.0), **bars)
-        axis.bar(at, first, width, color=color, label=str(label))
+        for name, opacity, shift in (("total_order", 0.35, 0.2), ("first_order", 1.0, -0.2)):
+            values = own[name].values
+            ends = np.array([values - own[f"{name}_low"], own[f"{name}_high"] - values])
+            text = str(label) if opacity == 1.0 else None
+            axis.bar(at, values, width, color=color, alpha=opacity, label=text)
+            # Of the first order on the left of a bar, of the total on its right.
+            interval = {"yerr": np.maximum(ends, 0.0), "fmt": "none", "ecolor": "black"}
+            axis.errorbar(at + shift * width, values, elinewidth=0.8, capsize=2, **interval)
     axis.bar(places[:1], [0.0], color="#666666", alpha=0.35, label="with interactions (total)")
     axis.axhline(0.0, color="black", linewidth=0.8)
     axis.tick_params(axis="x", length=0)
