@@ -20,9 +20,10 @@ from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
+from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import (
     FeatureTable,
     Ranges,
@@ -30,14 +31,14 @@ from vehiclemor.reduction.vehicle.slow_features import (
     ranges_of,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, as_of
-from vehiclemor.reduction.vehicle.trajectory_fit import improved_together, spread, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import improved_together, targets
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
-# Gauss-Newton steps of the common fit, first on a part of the runs.
-FEW, FIRST_SWEEPS, SWEEPS = 0.34, 7, 4
+# Gauss-Newton steps of the common fit.
+SWEEPS = 6
 # Time (s) before a car is steered, in which its starts are seen, and samples in it.
 STILL, SAMPLES = 1.0, 101
 RIDGE = 1e-10
@@ -52,17 +53,27 @@ class Member(NamedTuple):
     shape: VehicleShape
     modes: SlowModes
 
-    @property
-    def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Deviations of the shape and inputs, of all runs after landing."""
-        runs = [after_landing(self.modes.symmetric, self.shape, run) for run in self.runs]
-        shapes = np.concatenate([self.shape.of(run.states) for run in runs])
-        return shapes - self.shape.reference, np.concatenate([run.inputs for run in runs])
+    samples: ShapeSamples
 
     @property
     def ranges(self) -> Ranges:
         """Ranges of its runs."""
-        return ranges_of(self.shape, self.modes, *self.samples)
+        return ranges_of(self.shape, self.modes, self.samples.deviations, self.samples.inputs)
+
+    def columns(self, features: Features, parameters: np.ndarray) -> np.ndarray:
+        """Features (samples, terms) of its samples."""
+        u = self.samples.inputs
+        z = np.column_stack(self.modes.coordinates(self.samples.deviations, u))
+        return feature_columns(features, z, u, parameters)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Rates of the slow coordinates and the speed, then psi', U and V (samples, states + 3)."""
+        samples, modes = self.samples, self.modes
+        slow = samples.rates @ modes.left.T
+        further = samples.inputs.shape[1] - 1
+        slow -= samples.inputs[:, 1:] @ modes.feedthrough[:, :further].T
+        return np.column_stack([slow, samples.rates @ modes.speed_left, samples.motion])
 
 
 def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, list[Training]]:
@@ -90,7 +101,9 @@ def member(training: Training, like: SlowModes) -> Member:
     """A car by its runs, in coordinates like those of the first one."""
     model = training[0].model
     shape = VehicleShape(model)
-    return Member(model, training, [r.recorded() for r in training], shape, as_of(shape, like))
+    modes, runs = as_of(shape, like), [run.recorded() for run in training]
+    samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
+    return Member(model, training, runs, shape, modes, samples)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +222,7 @@ def fitted_box(
         plain = replace(vehicle, encoding=np.vstack([m.modes.left, m.modes.speed_left]))
         goals.append(targets(plain, m.training, m.runs))
         vehicles.append(vehicle)
-    few = [spread(own, FEW) for own in goals]
-    change = improved_together(vehicles, few, rows, table.free, FIRST_SWEEPS)
+    change = _by_rates(vehicles, members, rows, table)
     change = improved_together(vehicles, goals, rows, table.free, SWEEPS, change=change)
     coefficients = np.zeros((rows.shape[1], *first.coefficients.shape))
     coefficients[0] = first.coefficients
@@ -225,6 +237,30 @@ def fitted_box(
     )
 
 
+def _by_rates(
+    vehicles: Sequence[ReducedVehicle],
+    members: Sequence[Member],
+    rows: np.ndarray,
+    table: FeatureTable,
+) -> np.ndarray:
+    """Change (monomials, free coefficients) with which the rates of all cars fit best."""
+    m, terms = rows.shape[1], len(table.features.terms)
+    squares, products = np.zeros((m, terms, m, terms)), 0.0
+    for vehicle, car, row in zip(vehicles, members, rows, strict=True):
+        columns = car.columns(table.features, vehicle.parameters)
+        rest = car.rates - columns @ vehicle.coefficients
+        part = columns.T @ columns / len(columns)
+        squares += np.einsum("i,j,kl->ikjl", row, row, part)
+        products = products + np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
+    found = []
+    for chosen, column in table.free:
+        kept = np.ix_(range(m), chosen)
+        square = squares[kept][:, :, :, chosen].reshape(m * len(chosen), -1)
+        square = square + RIDGE * len(members) * np.eye(len(square))
+        found.append(np.linalg.solve(square, products[kept][:, :, column].ravel()).reshape(m, -1))
+    return np.hstack(found)
+
+
 def _lifting(
     vehicles: Sequence[ReducedVehicle], members: Sequence[Member], rows: np.ndarray
 ) -> np.ndarray:
@@ -233,9 +269,7 @@ def _lifting(
     terms, m, n = len(features.terms), rows.shape[1], len(vehicles[0].shape.kept)
     normal, values = np.zeros((m * terms, m * terms)), np.zeros((m * terms, n))
     for vehicle, car, row in zip(vehicles, members, rows, strict=True):
-        deviations, inputs = car.samples
-        z = np.column_stack(car.modes.coordinates(deviations, inputs))
-        columns = feature_columns(features, z, inputs, vehicle.parameters)
+        columns, deviations = car.columns(features, vehicle.parameters), car.samples.deviations
         normal += np.kron(np.outer(row, row), columns.T @ columns) / len(columns)
         values += np.kron(row[:, None], columns.T @ deviations) / len(columns)
     normal += RIDGE * len(members) * np.eye(len(normal))
