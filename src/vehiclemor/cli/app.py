@@ -20,6 +20,7 @@ from vehiclemor.cli.report import report
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
+from vehiclemor.cli.status import status
 from vehiclemor.resources import handbook_folder
 
 app = App(
@@ -38,6 +39,7 @@ COMMANDS = {
     "simulate": simulate,
     "plot": plot,
     "run": run,
+    "status": status,
     "compare": compare,
     "leaderboard": leaderboard,
     "figures": figures,

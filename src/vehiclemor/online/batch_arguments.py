@@ -10,11 +10,13 @@ import numpy as np
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.online.batch_result import Selection
 from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.online.training import training_set
+from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.reduction.methods.full_order import FullOrderModel
-from vehiclemor.registry import unknown
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.checks import checked_path
@@ -34,7 +36,9 @@ def model_behind(model: Any) -> ReducedOrderModel:
         ("newton", NEWTON_TOLERANCE) if full.kind == "ae" else ("dopri5", REFERENCE_TOLERANCE)
     )
     settings = {"solver": solver, "tolerance": tolerance}
-    return ReducedOrderModel(full, "full_order", settings, (), FullOrderModel(full, **settings))
+    training = training_set(full, "full_order", "nominal")
+    fitted = FullOrderModel(full, **settings)
+    return ReducedOrderModel(full, "full_order", settings, training, fitted)
 
 
 def count_of(signals: Any, model: Model) -> int:
@@ -91,15 +95,12 @@ def parameter_sets(
     """Parameters (name, value) of each run, none if all have the model's own."""
     if parameters is None:
         return None
-    if reduced.method != "full_order":
-        raise InputError(
-            f"parameters: {reduced.method} was fitted to one parameter set; "
-            f"other ones are for the full model"
-        )
-    declared = reduced.model.definition.parameters
+    # What is fitted to one car says so.
+    reduced.for_parameters({})
+    of = reduced.model.definition
     if isinstance(parameters, Mapping):
         columns = {
-            name: [*map(_plain, _parameter(name, value, declared, runs))]
+            name: [*map(_plain, _parameter(name, value, of, runs))]
             for name, value in parameters.items()
         }
         names = [*columns]
@@ -110,22 +111,22 @@ def parameter_sets(
     if not whole or not all(isinstance(own, Mapping) for own in parameters):
         raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
     return [
-        tuple((name, _plain(_parameter(name, value, declared))) for name, value in own.items())
+        tuple((name, _plain(_parameter(name, value, of))) for name, value in own.items())
         for own in parameters
     ]
 
 
 def _parameter(
-    name: str, value: Any, declared: Mapping[str, Any], runs: int | None = None
+    name: str, value: Any, model: ModelDefinition, runs: int | None = None
 ) -> np.ndarray:
     """Value (size,) of a parameter, or values (runs, size) of all runs; no axis for size 1."""
-    if name not in declared:
-        raise unknown("parameter", name, declared)
+    whole, axis = parameter_and_axis(model.name, model.parameters, name)
     try:
         array = real_array(value)
     except (TypeError, ValueError):
         raise InputError(f"parameter {name}: {quoted(value)} is not a number") from None
-    own = () if declared[name].size == 1 else (declared[name].size,)
+    size = model.parameters[whole].size
+    own = () if size == 1 or axis is not None else (size,)
     shapes = [own] if runs is None else [own, (runs, *own)]
     if array.shape not in shapes:
         wanted = " or ".join(map(str, shapes))

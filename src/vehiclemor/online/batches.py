@@ -6,7 +6,6 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +26,6 @@ from vehiclemor.online.batch_result import Found, Selection, dataset, selected
 from vehiclemor.online.batch_runners import Runner, SingleRuns, runner_of
 from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
-from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 from vehiclemor.study.linear_algebra import one_thread
@@ -72,8 +70,8 @@ def simulate_many(
         Initial condition of the full model by name, or as a state (n,), for all runs; or a list of
         these, or states (runs, n).
     parameters
-        Of a full model, in SI units: name -> value for all runs, or values by run; or one mapping
-        for each run.
+        In SI units: name -> value for all runs, or values by run; or one mapping for each run.  Of
+        a model whose method gives other cars than its own, see `ReducedOrderModel.for_parameters`.
     outputs
         Names of outputs, coordinates or speeds to be kept; all outputs by default.
     times
@@ -203,9 +201,7 @@ class _Work:
         with self._lock:
             runner = self._runners.get(given)
         if runner is None:
-            model = reparametrised(self.reduced.model, dict(given))
-            full = replace(self.reduced.reduced, model=model)  # type: ignore[type-var]
-            runner = runner_of(replace(self.reduced, model=model, reduced=full), self.chosen)
+            runner = runner_of(self.reduced.for_parameters(dict(given)), self.chosen)
             with self._lock:
                 if len(self._runners) >= MOST_SETS:
                     self._runners.clear()

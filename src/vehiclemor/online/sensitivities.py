@@ -60,25 +60,23 @@ def sensitivities(
     """
     import xarray as xr
 
+    from vehiclemor.online.reduced_sensitivities import reduced_sensitivities
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.sensitivities import sensitivities as sensitivities_of
     from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
-    if isinstance(model, ReducedOrderModel):
-        if model.method != "full_order":
-            raise InputError(
-                f"{model.method} was fitted to one parameter set: its runs have no derivatives by "
-                f"parameters"
-            )
-        model = model.model
-    if not isinstance(model, str | Model):
+    if not isinstance(model, str | Model | ReducedOrderModel):
         raise InputError(f"model is {quoted(model)}, neither a model nor its name")
-    full = kept_build(model) if isinstance(model, str) else model
+    ready = kept_build(model) if isinstance(model, str) else model
+    full = ready.model if isinstance(ready, ReducedOrderModel) else ready
     chosen = full.definition.maneuver if maneuver is None else maneuver
     if isinstance(chosen, str):
         chosen = component("maneuver", chosen)
-    error = None if tolerance is None else number("tolerance", tolerance)
-    found = sensitivities_of(full, chosen, parameters, start, error)
+    how = parameters, start, None if tolerance is None else number("tolerance", tolerance)
+    if isinstance(ready, ReducedOrderModel) and ready.method != "full_order":
+        found = reduced_sensitivities(ready, chosen, *how)
+    else:
+        found = sensitivities_of(full, chosen, *how)
     n = len(full.coordinates)
     further: dict[str, tuple[Any, ...]] = {}
     for name, values in (

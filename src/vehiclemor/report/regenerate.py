@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder, write_text
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,14 +44,15 @@ def regenerate_figures(
     # What is wrong is named before anything is computed.
     styled(style, dpi)
     missing = left_out(results)
-    chosen = {name: find(name, results) for name in only or FIGURES if only or name not in missing}
+    wanted = only or [name for name in FIGURES if name not in missing]
+    chosen = {entry.name: entry for name in wanted for entry in find(name, results)}
     make_folder(out)
     data: dict[str, xr.Dataset] = {}
     for entry in chosen.values():
         for study in entry.studies:
             if not only and not entry.default:
                 data[study] = read_dataset(_stored(results, study), "study", study)
-            elif study not in data:
+            elif not data.keys() >= set(entry.names):
                 data |= run_studies(study, results, jobs)
     written: list[Path] = []
     index = ["# Figures", "", PARAMETERS, ""]

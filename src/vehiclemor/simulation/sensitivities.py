@@ -1,15 +1,12 @@
-"""Derivatives of whole runs by parameters: tangents of all states beside the run itself.
+"""Derivatives of whole runs of the full models by their parameters.
 
-Forward sensitivities (A. C. Hindmarsh et al., SUNDIALS, ACM Trans. Math. Softw. 31 (2005), section
-2.5): the tangents of the states along each parameter are integrated with the states, by the tangent
-of the model's own kernel, and the step size control covers both.  Mechanisms have theirs at each
-sample by the implicit function theorem.
+Equations of motion are integrated with their tangents, see `tangent_runs`.  Mechanisms have theirs
+at each sample by the implicit function theorem.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,17 +16,22 @@ from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.constants import SMALLEST, constants_along, starts_along
 from vehiclemor.simulation.constants import components as numbers_of
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
-from vehiclemor.simulation.kernel_derivatives import address_of_tangent, lanes_of
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.paths import path_loops, results
+from vehiclemor.simulation.paths import results
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.run_plans import Solver
+from vehiclemor.simulation.run_plans import Run
+from vehiclemor.simulation.tangent_runs import (
+    Tangents,
+    apart,
+    side_by_side,
+    tangent_run,
+    tangents_along,
+)
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
@@ -52,24 +54,6 @@ class Component(NamedTuple):
     unit: str
     number: int
     value: float
-
-
-class Tangents(NamedTuple):
-    """What the tangents of a run start with.
-
-    Attributes
-    ----------
-    start
-        Derivatives (components, states) of the start.
-    directions
-        Derivatives (components, constants) of the hoisted constants.
-    sizes
-        Magnitudes (components,) of the parameters, for the control of errors.
-    """
-
-    start: np.ndarray
-    directions: np.ndarray
-    sizes: np.ndarray
 
 
 class Sensitivities(NamedTuple):
@@ -142,76 +126,71 @@ def sensitivities(
         If the run fails.
     """
     along = components(model, names)
-    numbers, flat = [component.number for component in along], model.parameters.flat()
-    directions = constants_along(model.definition, flat, model.equations, numbers)
+    directions = directions_of(model, along)
     if isinstance(model, AlgebraicModel):
         run = model.simulate(maneuver, start, tolerance=tolerance)
         moved = _implicit(model, run, directions)
     else:
         assert isinstance(model, DynamicModel)
-        begun = np.zeros((len(along), len(model.definition.states)))
-        if start is None or isinstance(start, str):
-            model.start(start)
-            starts = starts_along(model.definition, flat, model.equations, numbers)
-            begun = starts[start or model.starts[0]]
-        sizes = np.array([max(abs(component.value), SMALLEST) for component in along])
+        begun = starts_of(model, along, start), directions, sizes_of(along)
         chosen = REFERENCE_TOLERANCE if tolerance is None else tolerance
-        run, moved = _integrated(
-            model, maneuver, model.start(start), chosen, Tangents(begun, directions, sizes)
-        )
-    path = np.hstack((run.states, moved.reshape(len(moved), -1)))
-    outputs = _tangents(model, "outputs", path, run.inputs, directions)
+        maneuver = checked_maneuver(maneuver, model.definition)
+        space, tangents = whole_space(len(model.definition.states)), Tangents(*begun)
+        found = tangent_run(model.system, space, maneuver, model.start(start), tangents, chosen)
+        states, moved = apart(found.path, along)
+        run = recorded(model, maneuver, found, states)
+    return observed(model, along, run, moved)
+
+
+def observed(
+    model: Model, along: tuple[Component, ...], run: Trajectory, moved: np.ndarray
+) -> Sensitivities:
+    """A run of the model with derivatives (samples, components, states) of its states."""
+    paths = side_by_side(run.states, moved), run.inputs
+    constants = model.constants, directions_of(model, along)
+    outputs = tangents_along(model.kernels, "outputs", constants, paths, len(model.outputs))
     return Sensitivities(run, along, moved, outputs)
 
 
-def _integrated(
-    model: DynamicModel, maneuver: Maneuver, state: np.ndarray, tolerance: float, tangents: Tangents
-) -> tuple[Trajectory, np.ndarray]:
-    """A run and its tangents (samples, components, states)."""
-    n, count = len(state), len(tangents.sizes)
-    scale = np.concatenate([[1.0], 1.0 / tangents.sizes])[:, None] * model.error_scale
-    start = np.concatenate([state, tangents.start.ravel()])
-    system = replace(
-        model.system,
-        reference=start,
-        error_scale=scale.ravel(),
-        directions=tangents.directions,
-    )
-    windows = replace(whole_space(len(start)), formulation="sensitivities")
-    maneuver = checked_maneuver(maneuver, model.definition)
-    run = system.run(maneuver, start, windows, Solver("dopri5", tolerance))
-    path, inputs = run.path, recorded_inputs(maneuver)[1]
-    found = model.trajectory(run.times, inputs, path[:, :n], run.counts, run.seconds, run.failure)
+def directions_of(model: Model, along: Sequence[Component]) -> np.ndarray:
+    """Derivatives (components, constants) of the model's constants."""
+    numbers, flat = [component.number for component in along], model.parameters.flat()
+    return constants_along(model.definition, flat, model.equations, numbers)
+
+
+def sizes_of(along: Sequence[Component]) -> np.ndarray:
+    """Magnitudes (components,) of the parameters."""
+    return np.array([max(abs(component.value), SMALLEST) for component in along])
+
+
+def starts_of(model: Model, along: Sequence[Component], start: Start | None) -> np.ndarray:
+    """Derivatives (components, states) of a start; none of one that is a state."""
+    model.start(start)
+    if not (start is None or isinstance(start, str)):
+        return np.zeros((len(along), len(model.definition.states)))
+    numbers, flat = [component.number for component in along], model.parameters.flat()
+    found = starts_along(model.definition, flat, model.equations, numbers)
+    return found[start or model.starts[0]]
+
+
+def recorded(model: DynamicModel, maneuver: Maneuver, run: Run, states: np.ndarray) -> Trajectory:
+    """Trajectory of a run; `ConvergenceError` if it has failed."""
+    inputs = recorded_inputs(maneuver)[1]
+    found = model.trajectory(run.times, inputs, states, run.counts, run.seconds, run.failure)
     if found.status != "ok":
         raise ConvergenceError(f"{model.name}: {found.message}", found)
-    return found, path[:, n:].reshape(-1, count, n)
+    return found
 
 
 def _implicit(model: AlgebraicModel, run: Trajectory, directions: np.ndarray) -> np.ndarray:
     """Derivatives (samples, components, n) of coordinates: dq = -Phi_q^-1 Phi_p dp."""
     samples, n = run.coordinates.shape
-    held = np.hstack((run.coordinates, np.zeros((samples, n * len(directions)))))
-    change = _tangents(model, "residual", held, run.inputs, directions)
-    paths = run.coordinates, run.inputs
-    parts = results(model.kernels, "residual_jacobian", model.constants, paths, n * (n + 1))
+    held = np.zeros((samples, len(directions), n))
+    paths = side_by_side(run.coordinates, held), run.inputs
+    constants = model.constants, directions
+    change = tangents_along(model.kernels, "residual", constants, paths, n)
+    own = run.coordinates, run.inputs
+    parts = results(model.kernels, "residual_jacobian", model.constants, own, n * (n + 1))
     jacobians = parts.reshape(samples, n, n + 1)[:, :, :n]
     moved = -np.linalg.solve(jacobians, change.swapaxes(1, 2))
     return np.ascontiguousarray(moved.swapaxes(1, 2))
-
-
-def _tangents(
-    model: Model, function: str, path: np.ndarray, inputs: np.ndarray, directions: np.ndarray
-) -> np.ndarray:
-    """Derivatives (samples, components, size) of a function of the equations along a run.
-
-    Parameters
-    ----------
-    path
-        States and, after them, their derivatives by each component.
-    """
-    lanes, size = lanes_of(len(directions)), model.equations.shapes[function][0]
-    kernel = np.array([address_of_tangent(model.kernels, function, lanes)], dtype=np.int64)
-    found = np.empty((len(path), len(directions), size))
-    given = loop_array(path), loop_array(inputs), kernel, model.constants, directions
-    path_loops()["tangent_path"](*given, found, lanes)
-    return found

@@ -60,6 +60,7 @@ CALLED = {
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
     "sensitivities": ("derivative",),
+    "state_sensitivities": ("derivative",),
 }
 
 

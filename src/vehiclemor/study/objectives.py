@@ -96,7 +96,8 @@ class Objective(ShortRepr):
         time, attributes = result["time"].values, {"units": self.unit, "long_name": self.text}
         if all(history.ndim == 1 for history in histories):
             return self.measured(time, histories).value
-        columns = [history.transpose("run", "time").values for history in histories]
+        each = xr.broadcast(*histories)
+        columns = [history.transpose("run", "time").values for history in each]
         values = [self.measured(time, own).value for own in zip(*columns, strict=True)]
         return xr.DataArray(values, {"run": result["run"]}, "run", self.name, attributes)
 

@@ -22,10 +22,10 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
     cell_path,
+    finished_cells,
     prepare_folder,
-    read_dataset,
+    read_cell,
     remove_partial,
-    result_path,
     write_cell,
 )
 
@@ -71,7 +71,7 @@ class Workers:
         remove_partial(self.folder)
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
-        self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        self.finished |= finished_cells(self.folder, keys - self.finished)
         if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
@@ -94,8 +94,7 @@ class Workers:
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        path = result_path(self.folder, experiment.key)
-        return read_dataset(path, "cell", experiment.key)
+        return read_cell(self.folder, experiment.key)
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -144,14 +143,21 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     # Another driver may have stored it, or a worker that was killed before it could say so.
     there = {e.key for e in experiments if cell_path(folder, e.key).exists()}
     left = [e for e in experiments if e.key not in there]
-    finished, fault = evaluated(left, lambda key, dataset: write_cell(dataset, folder, key))
+
+    def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
+        write_cell(dataset, folder, key, seconds)
+
+    finished, fault = evaluated(left, keep)
     return [*there, *finished], fault
 
 
-def evaluated(experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset], object]) -> Done:
-    """Evaluate some experiments, and keep what each gives under its key."""
+def evaluated(
+    experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset, float], object]
+) -> Done:
+    """Evaluate some experiments, and keep what each gives, under its key, and its seconds."""
     finished, fault = [], ""
     for experiment in experiments:
+        began = time.perf_counter()
         try:
             dataset = evaluate(experiment)
         except Exception as error:
@@ -159,7 +165,7 @@ def evaluated(experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset
             if not fault:
                 raise
             continue
-        keep(experiment.key, dataset)
+        keep(experiment.key, dataset, time.perf_counter() - began)
         finished.append(experiment.key)
     return finished, fault
 

@@ -12,6 +12,7 @@ from vehiclemor.study.store import read_dataset, result_path
 
 # A value whose JSON is longer stands apart, once for all cells that have it.
 LONG = 240
+UNNAMED = "Stored by an older version, which did not name the cells of a study."
 MISSING = "The cell's own file is not among the results: this is what the study's file says of it."
 
 

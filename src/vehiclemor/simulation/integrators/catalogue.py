@@ -331,7 +331,10 @@ def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, steps: str) 
     return scratch_end(n, inputs) + own
 
 
-FORMULATIONS = ("inputs", "full", "vehicle_frame", "state", "coordinates", "sensitivities")
+FORMULATIONS = (
+    *("inputs", "full", "vehicle_frame", "state", "coordinates"),
+    *("sensitivities", "state_sensitivities"),
+)
 # All source that a run may be compiled from.
 LOOP_SOURCES = (
     *(f"simulation.formulations.{name}" for name in FORMULATIONS),
