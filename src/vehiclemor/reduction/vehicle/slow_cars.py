@@ -22,6 +22,7 @@ from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
+from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import (
@@ -31,7 +32,13 @@ from vehiclemor.reduction.vehicle.slow_features import (
     ranges_of,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, as_of
-from vehiclemor.reduction.vehicle.trajectory_fit import improved_together, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import (
+    changed,
+    improved_together,
+    normal_matrix,
+    spread,
+    targets,
+)
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -39,6 +46,8 @@ from vehiclemor.simulation.trajectory import Trajectory
 
 # Gauss-Newton steps of the common fit.
 SWEEPS = 6
+# Share of the cars that tell how sure the coefficients are; tolerance of runs that correct them.
+PRIOR_CARS, FINE = 0.15, 1e-6
 # Time (s) before a car is steered, in which its starts are seen, and samples in it.
 STILL, SAMPLES = 1.0, 101
 RIDGE = 1e-10
@@ -123,6 +132,9 @@ class Box(ShortRepr):
         Changes (monomials, terms, states + 3) of the coefficients.
     lifting
         Coefficients (monomials, terms, n) of the lifting.
+    inputs, prior
+        Inputs of runs of each car itself, and normal matrix of a run of the training; see
+        `own_runs`.
     """
 
     cars: Cars
@@ -133,6 +145,8 @@ class Box(ShortRepr):
     degree: int
     coefficients: np.ndarray
     lifting: np.ndarray
+    inputs: tuple[Input, ...]
+    prior: np.ndarray
 
     def monomials(self, model: DynamicModel) -> np.ndarray:
         """Monomials (m,) of the place of a car."""
@@ -162,8 +176,10 @@ class SlowVehicle(ReducedVehicle):
         for name in model.starts:
             state = model.start(name)
             left.append(found.remainder(state[None], no_input, found.excited(state))[0])
-        reach = self.reach.with_starts(np.array(left))
-        return replace(found, reach=reach, offline=offline_cost(began, model))
+        found = replace(found, reach=self.reach.with_starts(np.array(left)))
+        plain = replace(_plain(found, modes), solver="dopri5", tolerance=FINE)
+        found = corrected(found, plain, box.inputs, box.table.free, box.prior)
+        return replace(found, offline=offline_cost(began, model))
 
 
 def of_car(
@@ -190,6 +206,11 @@ def of_car(
         transient=modes.symmetric,
     )
     return landed(found, modes, _before_steering(shape.model))
+
+
+def _plain(vehicle: ReducedVehicle, modes: SlowModes) -> ReducedVehicle:
+    """The vehicle as it encodes states that are no starts."""
+    return replace(vehicle, encoding=np.vstack([modes.left, modes.speed_left]))
 
 
 def _before_steering(model: DynamicModel) -> list[Trajectory]:
@@ -219,8 +240,7 @@ def fitted_box(
     vehicles, goals = [], []
     for m in members:
         vehicle = of_car(first, table, hull, turning, m.shape, m.modes)
-        plain = replace(vehicle, encoding=np.vstack([m.modes.left, m.modes.speed_left]))
-        goals.append(targets(plain, m.training, m.runs))
+        goals.append(targets(_plain(vehicle, m.modes), m.training, m.runs))
         vehicles.append(vehicle)
     change = _by_rates(vehicles, members, rows, table)
     change = improved_together(vehicles, goals, rows, table.free, SWEEPS, change=change)
@@ -231,7 +251,13 @@ def fitted_box(
         coefficients[:, list(terms), column] += change[:, place : place + len(terms)]
         place += len(terms)
     lifting = _lifting(vehicles, members, rows)
-    box = Box(cars, table, members[0].modes, turning, hull, degree, coefficients, lifting)
+    some = spread(list(zip(vehicles, goals, rows @ change, strict=True)), PRIOR_CARS)
+    normals = [normal_matrix(changed(v, table.free, c), own, table.free) for v, own, c in some]
+    prior = np.sum(normals, axis=0) / sum(len(own) for _, own, _ in some)
+    inputs = chosen_inputs(members[0].training)
+    box = Box(
+        cars, table, members[0].modes, turning, hull, degree, coefficients, lifting, inputs, prior
+    )
     return SlowVehicle(
         **{name: getattr(first, name) for name in first.__dataclass_fields__}, box=box
     )
