@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from vehiclemor.report.comparison.kinds import compare as compare
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.report.regenerate import figures as figures
+    from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -48,6 +49,7 @@ _DEFINED_IN = {
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
     "compare": "vehiclemor.report.comparison.kinds",
     "figures": "vehiclemor.report.regenerate",
@@ -64,6 +66,7 @@ __all__ = [
     "Signals",
     "VehiclemorError",
     "compare",
+    "convert",
     "describe",
     "export",
     "figures",

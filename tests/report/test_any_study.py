@@ -20,8 +20,8 @@ from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
 from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset, write_dataset
 
 MODAL = Path(__file__).parents[1] / "plugin" / "vehiclemor_modal_method"
 STUDY = """

@@ -14,8 +14,8 @@ from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.report.predictive.rows import STUDY, draws_of, method_rows, protocol_of
 from vehiclemor.report.printing import Line, fixed, short, table_text, terms, wrapped
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.store import read_dataset
 
 Row = dict[str, Any]
 RULE = "fewest silent misses first, then fewest misses, then the largest speed-up of whole calls"
