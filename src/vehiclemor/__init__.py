@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import plot as plot
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
+    from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
     from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
+    from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -40,10 +43,13 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies", "write_report"), "vehiclemor.api"),
+    **dict.fromkeys(
+        ("run_study", "simulate", "status", "studies", "write_report"), "vehiclemor.api"
+    ),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
     "leaderboard": "vehiclemor.report.leaderboard",
     "reduce": "vehiclemor.online.rom",
@@ -51,12 +57,14 @@ _DEFINED_IN = {
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
     "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
+    "sobol_indices": "vehiclemor.online.sobol",
 }
 __all__ = [
     "Signal",
     "Signals",
     "VehiclemorError",
     "compare",
+    "convert",
     "describe",
     "export",
     "figures",
@@ -75,6 +83,8 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
+    "sobol_indices",
+    "status",
     "studies",
     "write_report",
 ]

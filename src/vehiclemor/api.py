@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
     from vehiclemor.study.scenario import Scenario
+    from vehiclemor.study.status import StudyStatus
 
 RESULTS = Path("results")
 
@@ -272,6 +273,25 @@ def run_study(
         study, out = str(file_path("study", study)), file_path("out", out)
         results = run_studies(study, out, jobs, scheduler)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
+
+
+def status(study: str | Path, out: str | Path = RESULTS) -> dict[str, StudyStatus]:
+    """How far a study, or every one of a collection, is; nothing is computed.
+
+    Parameters
+    ----------
+    study, out
+        As of `run_study`.
+
+    Returns
+    -------
+    dict
+        Study name -> cells that are done, failed (with reasons) and to do, and the estimated
+        seconds left.
+    """
+    from vehiclemor.study.status import status_of
+
+    return status_of(str(file_path("study", study)), file_path("out", out))
 
 
 def plot(

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from vehiclemor import api
 from vehiclemor.cli.exit_status import MISSED
 from vehiclemor.cli.progress import shown_progress
+from vehiclemor.cli.table import print_json
 
 
 def compare(
@@ -38,7 +39,7 @@ def compare(
     with shown_progress():
         rows = api.compare(what, out, jobs)
     if json_output:
-        print(rows.to_json(orient="records", indent=2))
+        print_json(rows)
     else:
         from vehiclemor.report.comparison.kinds import comparison_text
 

@@ -217,28 +217,6 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
     return figure_grid_errors(dataset, shown_outputs(dataset)) or _errors_of_a_point(dataset)
 
 
-def error_axes(dataset: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
-    """Axes over which errors are drawn: both factors, else the longest one of numbers, if any.
-
-    Returns
-    -------
-    dataset, list of str, list of str
-        The dataset at one place of all other dimensions, the axes, and that place in words.
-    """
-    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
-    grid = {d: values for d, values in grid.items() if len(values) > 1}
-    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
-    drawn = sorted(axes, key=lambda d: len(grid[d]))[-1:]
-    drawn = list(FACTORS) if set(FACTORS) <= set(axes) else drawn
-    at = []
-    for dimension in (d for d in grid if d not in drawn):
-        values = grid[dimension].tolist()
-        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
-        dataset = dataset.sel({dimension: value})
-        at.append(f"{dimension} {value}")
-    return dataset, drawn, at
-
-
 def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
     """RMS errors of all outputs as shares of their ranges, a mark for each method."""
     points = {m: p for m, p in _points(dataset).items() if not m.startswith("full_order")}

@@ -13,6 +13,7 @@ from vehiclemor.report.figures.saving import styled
 from vehiclemor.report.html.cells import UNNAMED, stored_cell
 from vehiclemor.report.html.interactive import available
 from vehiclemor.report.html.parts import (
+    MISSING,
     Cell,
     Entry,
     Picture,
@@ -26,10 +27,11 @@ from vehiclemor.report.html.protocol_plots import runs_plot
 from vehiclemor.report.html.provenance import facts, source_text
 from vehiclemor.report.html.vector import svg_element
 from vehiclemor.report.labels import label_of, unit_of
-from vehiclemor.report.predictive.rows import STUDY, method_rows, protocol_of
+from vehiclemor.report.leaderboard import RULE, rank
+from vehiclemor.report.predictive.rows import draws_of, method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row, chosen, error_columns, target_rows
 from vehiclemor.study.plans.choice import outcomes
-from vehiclemor.study.plans.ledger import Drawn, Ledger
+from vehiclemor.study.plans.ledger import Drawn
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part, judged_set
 
@@ -41,9 +43,8 @@ COUNTS = ("misses", "silent", "flagged")
 def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
     """Everything that a combined dataset of a protocol holds, within a bounded size."""
     name, protocol = str(dataset.attrs["study"]), protocol_of(dataset)
-    stem = name.removeprefix(f"{STUDY}-")
-    draws = Ledger(stem, folder, bool(dataset.attrs["own"])).entries()
-    rows = method_rows(dataset, protocol, draws)
+    draws = draws_of(dataset, folder)
+    rows = sorted(method_rows(dataset, protocol, draws), key=rank)
     anchors = _anchors(dataset)
     winner = chosen(rows)
     tables = [_targets(target_rows(dataset, protocol, rows), anchors)]
@@ -143,7 +144,7 @@ def _contestants(
         entries.append(line)
     note = (
         "misses: runs outside of a bound; silent: of these with the status ok; flagged: runs of "
-        "which the model says that it has left what it knows. Each number leads to its cell."
+        f"which the model says that it has left what it knows. In order: {RULE}."
     )
     return Table("Contestants on the judged runs", tuple(heads), entries, note)
 
@@ -184,7 +185,7 @@ def _draws(draws: Sequence[Drawn]) -> Table:
     for draw in draws:
         label, row = next(((n, r) for n, r in draw.rows.items() if r.winner), ("", None))
         found = [getattr(row, name) if row else None for name in COUNTS]
-        told = [Entry("–") if value is None else count(value) for value in found]
+        told = [MISSING if value is None else count(value) for value in found]
         head = [Entry(draw.date[:10]), Entry(draw.digest[:10]), count(draw.runs), Entry(label)]
         entries.append([*head, *told])
     return Table("Draws of the ledger under the same rules", heads, entries)

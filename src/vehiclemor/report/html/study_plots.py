@@ -8,7 +8,7 @@ import numpy as np
 
 from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures.lines import FULL, styles
-from vehiclemor.report.figures.result_plot import error_axes, shown_outputs
+from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.interactive import (
     HINT,
     as_items,
@@ -20,6 +20,7 @@ from vehiclemor.report.html.interactive import (
 from vehiclemor.report.html.parts import Plot
 from vehiclemor.report.labels import label_of, method_text, unit_of
 from vehiclemor.report.result_selection import drawn
+from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +64,7 @@ def _paths(dataset: xr.Dataset) -> tuple[list[Any], str]:
 
 def _errors(dataset: xr.Dataset) -> tuple[list[Any], str]:
     """RMS errors of the first shown output over the grid: curves over one axis, maps over two."""
-    part, axes, words = error_axes(dataset)
+    part, axes, words = _error_axes(dataset)
     methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
     if not axes or not methods:
         return [], ""
@@ -74,6 +75,9 @@ def _errors(dataset: xr.Dataset) -> tuple[list[Any], str]:
     if values.size > POINTS:
         return [], ""
     tables = {m: _table(values, keys, m, axes) for m in methods}
+    tables = {m: source for m, source in tables.items() if len(source.data["error"])}
+    if not tables:
+        return [], ""
     at = f", at {', '.join(words)}" if words else ""
     if len(axes) == 1:
         caption = f"Interactive: {label} over {axes[0].replace('_', ' ')}{at}; a tap on a point "
@@ -83,6 +87,26 @@ def _errors(dataset: xr.Dataset) -> tuple[list[Any], str]:
         f"Interactive: {label} over the grid{at}; a tap leads to the cell, where it is listed."
     )
     return _maps(shown, axes), caption
+
+
+def _error_axes(dataset: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
+    """Axes of the plot, both factors or the longest of numbers, and the place of all others.
+
+    Returns
+    -------
+    dataset, list of str, list of str
+        The dataset at one place of all other dimensions, the axes, and that place in words.
+    """
+    grid = {str(d): dataset.sizes[d] for d in dataset["status"].dims if d != "method"}
+    grid = {d: size for d, size in grid.items() if size > 1}
+    numbers = [d for d in grid if np.issubdtype(dataset[d].dtype, np.number)]
+    axes = sorted(numbers, key=lambda d: grid[d])[-1:]
+    axes = [str(f) for f in FACTORS] if set(FACTORS) <= set(numbers) else axes
+    at = {
+        d: 1.0 if d in FACTORS and 1.0 in dataset[d].values else dataset[d].values[0] for d in grid
+    }
+    at = {d: value for d, value in at.items() if d not in axes}
+    return dataset.sel(at), axes, [f"{d.replace('_', ' ')} {value}" for d, value in at.items()]
 
 
 def _table(values: xr.DataArray, keys: xr.DataArray | None, method: str, axes: list[str]) -> Any:
@@ -98,7 +122,8 @@ def _table(values: xr.DataArray, keys: xr.DataArray | None, method: str, axes: l
     names = np.full(found.shape, "", dtype=object)
     if keys is not None:
         names = keys.sel({"method": method}).squeeze(drop=True).transpose(*axes).values.ravel()
-    return ColumnDataSource(columns | {"cell": [f"cell-{name}" for name in names[good]]})
+    columns |= {"cell": [f"cell-{name}" for name in names[good]]}
+    return ColumnDataSource(columns)
 
 
 def _curves(tables: dict[str, Any], axis: str, label: str) -> Any:
@@ -125,12 +150,10 @@ def _maps(tables: dict[str, Any], axes: list[str]) -> list[Any]:
     from bokeh.transform import transform
 
     errors = np.concatenate([source.data["error"] for source in tables.values()])
-    if not errors.size:
-        return []
     low, high = float(errors.min()), float(errors.max())
-    colors = LogColorMapper(palette="Viridis256", low=low, high=high)
     made = []
     for method, source in tables.items():
+        colors = LogColorMapper(palette="Viridis256", low=low, high=high)
         told = {a.replace("_", " "): f"@{a}" for a in axes}
         told |= {"error": "@error{0.00e}", "at": "@cell"}
         x, y = axes

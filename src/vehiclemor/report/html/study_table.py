@@ -7,7 +7,7 @@ import xarray as xr
 
 from vehiclemor.report.errors import flat
 from vehiclemor.report.figures.result_plot import shown_outputs
-from vehiclemor.report.html.parts import Entry, Table, count, quantity
+from vehiclemor.report.html.parts import MISSING, Entry, Table, count, quantity
 from vehiclemor.report.labels import label_of, method_text, unit_of
 
 # A table with more rows is summed up.
@@ -79,7 +79,7 @@ def _summary(rows: Sequence[Place], outputs: dict[str, str], grid: list[str]) ->
             column = f"rms_{output}"
             ordered = sorted(good, key=lambda row, column=column: float(row[column]))
             chosen = [ordered[i] for i in (0, (len(ordered) - 1) // 2, -1)] if ordered else []
-            line += [quantity(r[column], str(r["anchor"])) for r in chosen] or [Entry("–")] * 3
+            line += [quantity(r[column], str(r["anchor"])) for r in chosen] or [MISSING] * 3
         entries.append(line)
     return Table("Errors over the grid", _words(heads), entries, SUMMED)
 
