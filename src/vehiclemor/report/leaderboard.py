@@ -78,7 +78,7 @@ def leaderboard(out: str | Path = "results") -> pd.DataFrame:
 
 def _rows_of(dataset: xr.Dataset, folder: Path) -> list[Row]:
     rows = method_rows(dataset, protocol_of(dataset), draws_of(dataset, folder))
-    head = {name: str(dataset.attrs[name]) for name in ("title", "drawn_on")}
+    head: Row = {name: str(dataset.attrs[name]) for name in ("title", "drawn_on")}
     head["sealed"] = bool((dataset["scenario_set"] == "drawn").any())
     return [{**head, "place": n, **row} for n, row in enumerate(sorted(rows, key=rank), 1)]
 
