@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import studies as studies
-    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.report.html.document import write_report as write_report
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
@@ -40,12 +40,13 @@ _DEFINED_IN = {
         ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies", "write_report"), "vehiclemor.api"),
+    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "export": "vehiclemor.exporting.export",
     "leaderboard": "vehiclemor.report.leaderboard",
+    "write_report": "vehiclemor.report.html.document",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),

@@ -329,6 +329,13 @@ def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys
     assert list(tmp_path.glob("*.html")) == []
 
 
+@pytest.mark.parametrize("studies", [3, [3], ["no-such-study"]])
+def test_wrong_names_in_python_are_one_line(studies, tmp_path):
+    with pytest.raises(vm.VehiclemorError, match="stud") as caught:
+        vm.write_report(studies, tmp_path / "d.html", tmp_path)
+    assert "\n" not in str(caught.value)
+
+
 # Both frames tell how far their pages are wider than they; a frame can be as narrow as a telephone.
 FRAMES = """<!DOCTYPE html><body><p id="told">nothing</p>
 <iframe src="{name}" width="400" height="3000"></iframe>
