@@ -8,9 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vehiclemor.api import compare as compare
     from vehiclemor.api import describe as describe
-    from vehiclemor.api import figures as figures
     from vehiclemor.api import maneuvers as maneuvers
     from vehiclemor.api import methods as methods
     from vehiclemor.api import model as model
@@ -18,6 +16,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import plot as plot
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
+    from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
@@ -27,8 +26,12 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
+    from vehiclemor.online.sobol import sobol_indices as sobol_indices
+    from vehiclemor.report.comparison.kinds import compare as compare
     from vehiclemor.report.html.document import write_report as write_report
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
+    from vehiclemor.report.regenerate import figures as figures
+    from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -37,14 +40,17 @@ __version__ = "0.1.0"
 # Name -> module that defines it.
 _DEFINED_IN = {
     **dict.fromkeys(
-        ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
+        ("describe", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(("run_study", "simulate", "studies"), "vehiclemor.api"),
+    **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
+    "compare": "vehiclemor.report.comparison.kinds",
+    "figures": "vehiclemor.report.regenerate",
     "leaderboard": "vehiclemor.report.leaderboard",
     "write_report": "vehiclemor.report.html.document",
     "reduce": "vehiclemor.online.rom",
@@ -52,12 +58,14 @@ _DEFINED_IN = {
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
     "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
+    "sobol_indices": "vehiclemor.online.sobol",
 }
 __all__ = [
     "Signal",
     "Signals",
     "VehiclemorError",
     "compare",
+    "convert",
     "describe",
     "export",
     "figures",
@@ -76,6 +84,8 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulate_many",
+    "sobol_indices",
+    "status",
     "studies",
     "write_report",
 ]

@@ -207,16 +207,17 @@ STUDY = GRID.replace("[2, 3]", "[1, 2, 3, 4, 5, 6, 7, 8]") + "[[methods]]\nmetho
 def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(tmp_path, caplog):
     path = tmp_path / "eight.toml"
     path.write_text(STUDY)
-    processes = []
+    processes, killed = [], []
 
     def stop(_, done, __):
-        if done == 5:
+        if done >= 5:
             processes.extend(active_children())
             raise KeyboardInterrupt
 
     def kill(_, done, __):
-        if done == 9:
-            os.kill(active_children()[0].pid, signal.SIGKILL)
+        if done >= 9 and not killed:
+            killed.append(active_children()[0].pid)
+            os.kill(*killed, signal.SIGKILL)
 
     with pytest.raises(KeyboardInterrupt), listening(stop):
         run_studies(str(path), tmp_path, jobs=2)

@@ -14,6 +14,7 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.online.batch_result import Selection
 from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.online.training import training_set
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
@@ -35,7 +36,9 @@ def model_behind(model: Any) -> ReducedOrderModel:
         ("newton", NEWTON_TOLERANCE) if full.kind == "ae" else ("dopri5", REFERENCE_TOLERANCE)
     )
     settings = {"solver": solver, "tolerance": tolerance}
-    return ReducedOrderModel(full, "full_order", settings, (), FullOrderModel(full, **settings))
+    training = training_set(full, "full_order", "nominal")
+    fitted = FullOrderModel(full, **settings)
+    return ReducedOrderModel(full, "full_order", settings, training, fitted)
 
 
 def count_of(signals: Any, model: Model) -> int:

@@ -32,6 +32,9 @@ class Runner(Protocol):
 def runner_of(reduced: ReducedOrderModel, chosen: Selection) -> Runner:
     """What does batches of runs of a model quickest."""
     fitted = reduced.reduced
+    if reduced.outside or (isinstance(fitted, GuardedModel) and fitted.car and fitted.car.reason):
+        # Of all runs there is more to tell than a loop knows.
+        return SingleRuns(reduced, chosen)
     if _in_one_loop(fitted):
         return BatchRuns(fitted, chosen)  # type: ignore[arg-type]
     if isinstance(fitted, GuardedModel) and np.isinf(fitted.back):

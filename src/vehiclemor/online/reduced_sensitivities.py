@@ -28,7 +28,13 @@ from vehiclemor.simulation.sensitivities import (
     recorded,
     sizes_of,
 )
-from vehiclemor.simulation.tangent_runs import Tangents, apart, tangent_run, tangents_along
+from vehiclemor.simulation.tangent_runs import (
+    Tangents,
+    apart,
+    tangent_run,
+    tangents_along,
+    with_tangents,
+)
 from vehiclemor.simulation.trajectory import Start
 
 
@@ -50,7 +56,11 @@ def reduced_sensitivities(
     model, own = reduced.model, reduced.state_space
     along = components(model, names)
     if not isinstance(own, ReducedSystem) or not _lifts(own):
-        raise InputError(f"{reduced.method}: its runs have no derivatives by parameters")
+        raise InputError(
+            f"{reduced.method}: its runs have no derivatives by parameters; those of projections "
+            f"of the state, frozen_inertia, independent_coordinates and softened_slip have"
+        )
+    with_tangents(own.spaces)
     maneuver = checked_maneuver(maneuver, model.definition)
     begun = model.starts[0] if start is None else start
     first = recorded_inputs(maneuver)[1][0]
@@ -95,8 +105,8 @@ def _of_cars(
             for name in ("means", "trial_basis", "test_basis")
         ):
             raise InputError(
-                f"{reduced.method}: its subspaces follow from the car, so its runs have no "
-                f"derivatives by parameters"
+                f"{reduced.method}: its subspaces follow from {', '.join(changed)}, so its runs "
+                f"have no derivatives (they don't with inner_product='euclidean' and one basis)"
             )
         state = car.encode(car.model.start(start), inputs)
         return np.concatenate([car.system.constants, state])

@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.online.training import Box, of_cars, training_set
+from vehiclemor.online.training import training_set
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -25,6 +25,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.study.input_range import InputRange, input_range
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.training_cars import Box, of_cars
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -111,8 +112,8 @@ class ReducedOrderModel(ShortRepr):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
         run = self.reduced.simulate(chosen, begun)
-        if self._outside and not (run.trust and run.trust.reason):
-            return run.judged(self._outside)
+        if self.outside and not (run.trust and run.trust.reason):
+            return run.judged(self.outside)
         if run.trust or self._range is None:
             return run
         own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
@@ -143,7 +144,7 @@ class ReducedOrderModel(ShortRepr):
         return replace(self, model=car, reduced=reduced, known=self.input_range)
 
     @cached_property
-    def _outside(self) -> Trust | None:
+    def outside(self) -> Trust | None:
         """What is told of the car, if it lies beyond those of the training."""
         return self.input_range.outside(component("method", self.method), self.model)
 
@@ -364,10 +365,10 @@ def reduce(
         the model's own protocol, which is the default of the methods that compete there.  Or a
         list of maneuvers, or of scenarios.
     cars
-        Cars whose runs are learnt from beside the model's own, each with all of the training: names
-        of parameters with the two ends of their ranges, in which some cars are chosen, or a list
-        of cars, each its parameters in SI units.  `for_parameters` then gives the reduced model of
-        any car between them.
+        Cars whose runs are learnt from beside the model's own, each with a few of the training:
+        names of parameters with the two ends of their ranges, in which some cars are chosen, or a
+        list of cars, each its parameters in SI units.  `for_parameters` then gives the reduced
+        model of any car between them.
     preset, **settings
         Of the method; see `describe()`.
 

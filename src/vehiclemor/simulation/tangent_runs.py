@@ -59,13 +59,9 @@ def tangent_run(
     Raises
     ------
     InputError
-        If the equations are projected in a form that has no tangents.
+        As of `with_tangents`, or if the tolerance is out of bounds.
     """
-    formulation = WITH_TANGENTS.get(windows.formulation)
-    if formulation is None:
-        raise InputError(
-            f"the projection of {windows.formulation} has no tangents: choose formulation='state'"
-        )
+    formulation = with_tangents(windows)
     parts = 1 + len(tangents.sizes)
     scale = np.concatenate([[1.0], 1.0 / tangents.sizes])[:, None] * system.error_scale
     start = np.concatenate([state, tangents.start.ravel()])
@@ -74,6 +70,15 @@ def tangent_run(
     )
     spaces = replace(windows, formulation=formulation, ranks=windows.ranks * parts)
     return wide.run(maneuver, start, spaces, Solver("dopri5", tolerance))
+
+
+def with_tangents(windows: ProjectionWindows) -> str:
+    """Formulation of a system with tangents; `InputError` if there is none."""
+    if windows.formulation not in WITH_TANGENTS:
+        raise InputError(
+            f"the projection of {windows.formulation} has no tangents: choose formulation='state'"
+        )
+    return WITH_TANGENTS[windows.formulation]
 
 
 def tangents_along(

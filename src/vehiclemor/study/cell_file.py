@@ -189,5 +189,5 @@ def _runs(dataset: xr.Dataset) -> Counter[tuple[str, str]]:
     """(status, message) -> number of runs."""
     if not {"status", "message"} <= set(dataset.variables):
         return Counter()
-    ends = (dataset[name].values.ravel().tolist() for name in ("status", "message"))
+    ends = (dataset.variables[n].values.ravel().tolist() for n in ("status", "message"))
     return Counter(zip(*ends, strict=True))

@@ -42,7 +42,7 @@ class Experiment(ShortRepr):
     test: tuple[Scenario, ...]
     keep: Keep = "trajectories"
 
-    @property
+    @cached_property
     def configuration(self) -> str:
         """Canonical JSON text of the experiment."""
         texts = {name: _text(getattr(self, name)) for name in sorted(self.__dataclass_fields__)}

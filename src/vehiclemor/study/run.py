@@ -13,8 +13,9 @@ from vehiclemor.arguments import count, within
 from vehiclemor.errors import InputError
 from vehiclemor.progress import telling
 from vehiclemor.study.cluster import LOCAL, reached
+from vehiclemor.study.netcdf_file import Parts
 from vehiclemor.study.plans.grid import Grid, expand
-from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
+from vehiclemor.study.plans.grid_results import cells_digest, combined
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import StudyFile, owner, studies_and_files
@@ -70,18 +71,18 @@ def run_studies(
                 "cells",
                 cells_digest(grid),
                 partial(_combined, grid, workers),
-                [cell_path(folder, key) for key in grid.unique],
+                lambda grid=grid: (cell_path(folder, key) for key in grid.unique),
                 of,
             )
             tell(grid.name, len(grid.unique), len(grid.unique))
     return results
 
 
-def _combined(grid: Grid, workers: Workers) -> xr.Dataset:
+def _combined(grid: Grid, workers: Workers) -> xr.Dataset | Parts:
     experiments = iter(grid.unique.values())
     while part := [[cell] for cell in islice(experiments, AT_ONCE)]:
         workers(part)
-    return grid_dataset(grid, workers.folder)
+    return combined(grid, workers.folder)
 
 
 def _expanded(name: str, definition: StudyFile) -> Grid:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,15 @@ from vehiclemor.files import (
     write_whole,
 )
 from vehiclemor.study import cell_file
-from vehiclemor.study.netcdf_file import global_attributes, read_dataset, write_dataset
+from vehiclemor.study.netcdf_file import (
+    LARGE,
+    Parts,
+    global_attributes,
+    opened_lazily,
+    read_dataset,
+    write_dataset,
+    write_parts,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,7 +94,7 @@ def result_path(folder: Path, key: str) -> Path:
 
 def write_cell(dataset: xr.Dataset, folder: Path, key: str, seconds: float = np.nan) -> None:
     """Store the result of an experiment, and the seconds that it took."""
-    broken = "error" in dataset["status"].values
+    broken = "error" in dataset.variables["status"].values
     write_encoded(cell_file.encoded(dataset, key, seconds), folder, key, broken=broken)
 
 
@@ -95,7 +103,8 @@ def write_encoded(content: bytes, folder: Path, key: str, *, broken: bool) -> No
     path = (broken_path if broken else cell_path)(folder, key)
 
     def write(temporary: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.parent.is_dir():
+            path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(content)
 
     # Where parts of files are looked for there are no other files.
@@ -122,6 +131,15 @@ def read_arrays(folder: Path, key: str) -> dict[str, np.ndarray]:
         return cell_file.arrays_of(content, key)
 
 
+def cell_end(folder: Path, key: str) -> tuple[cell_file.End, bool]:
+    """How an experiment has ended, and whether it is finished; errors as of `read_cell`."""
+    path = result_path(folder, key)
+    try:
+        return cell_file.end_of(path, key), not path.name.endswith(BROKEN)
+    except OSError as error:
+        raise _unreadable(path, error) from None
+
+
 @contextmanager
 def _found(folder: Path, key: str) -> Iterator[bytes]:
     path = result_path(folder, key)
@@ -134,14 +152,18 @@ def _found(folder: Path, key: str) -> Iterator[bytes]:
 def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except IsADirectoryError:
-        raise SpoiledError("is a folder, not a result file") from None
-    except FileNotFoundError:
-        raise FileError(f"{path}: no such result file; run again") from None
     except OSError as error:
-        machine = machine_reason(error)
-        kind = MachineError if machine else FileError
-        raise kind(f"{path}: can't be read ({machine or error.strerror})") from None
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: OSError) -> FileError | MachineError:
+    if isinstance(error, IsADirectoryError):
+        return SpoiledError("is a folder, not a result file")
+    if isinstance(error, FileNotFoundError):
+        return FileError(f"{path}: no such result file; run again")
+    machine = machine_reason(error)
+    kind = MachineError if machine else FileError
+    return kind(f"{path}: can't be read ({machine or error.strerror})")
 
 
 def finished_cells(folder: Path, keys: Iterable[str]) -> set[str]:
@@ -228,38 +250,59 @@ def stored(
     path: Path,
     attribute: str,
     key: str,
-    make: Callable[[], xr.Dataset],
-    sources: Sequence[Path] = (),
+    make: Callable[[], xr.Dataset | Parts],
+    sources: Callable[[], Iterable[Path]] = list,
     owner: Owner | None = None,
 ) -> xr.Dataset:
     """What is stored for this key, here or under another name, else what `make` gives.
 
-    It is stored at `path`, to which the encoding `source` of what is returned leads.
+    The results of a study are then stored at `path`.  Where the file is tells the encoding `source`
+    of what is returned.
 
     Parameters
     ----------
     attribute
         Global attribute that holds the key.
     sources
-        Files that it was made from; if one of them is missing or as new, it is made again.
+        Gives the files that it was made from; if one of them is missing or as new, it is made
+        again.
     owner
         Of the result of a study.
     """
     dataset = _current(path, attribute, key, sources)
-    if dataset is None:
-        others = (p for p in sorted(path.parent.glob("[!.]*.nc")) if p != path)
-        same = (p for p in others if global_attributes(p).get(attribute) == key)
-        found = (_current(p, attribute, key, sources) for p in same)
-        dataset = next((d for d in found if d is not None), None)
-        make_folder(path.parent)
-        dataset = (make() if dataset is None else dataset).assign_attrs({attribute: key})
-        dataset.attrs |= owner._asdict() if owner else {}
+    if dataset is not None:
+        return dataset
+    same = _under_another_name(path, attribute, key, sources)
+    if same is not None and owner is None:
+        return same
+    make_folder(path.parent)
+    made = make() if same is None else same
+    further = {attribute: key} | (owner._asdict() if owner else {})
+    if isinstance(made, Parts):
+        write_parts(made, path, further)
+        dataset = opened_lazily(path)
+    else:
+        dataset = made.assign_attrs(further)
         write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
 
 
-def _current(path: Path, attribute: str, key: str, sources: Sequence[Path]) -> xr.Dataset | None:
+def _under_another_name(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
+    """As `_current`, of any file beside that can be held: its study was renamed since."""
+    for other in sorted(path.parent.glob("[!.]*.nc")):
+        if other == path or other.stat().st_size >= LARGE:
+            continue
+        if global_attributes(other).get(attribute) == key:
+            return _current(other, attribute, key, sources)
+    return None
+
+
+def _current(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
     """What a file holds, if that was made for this key from these sources as they are."""
     if not path.exists():
         return None
@@ -272,7 +315,8 @@ def _current(path: Path, attribute: str, key: str, sources: Sequence[Path]) -> x
         return None
     written = path.stat().st_mtime_ns
     try:
-        newest = max((source.stat().st_mtime_ns for source in sources), default=-1)
+        newest = max((source.stat().st_mtime_ns for source in sources()), default=-1)
     except FileNotFoundError:
         return None
+    dataset.encoding["source"] = str(path)
     return dataset if newest < written else None

@@ -35,10 +35,16 @@ from vehiclemor.reduction.vehicle.lifting_terms import fitted_lifting
 from vehiclemor.reduction.vehicle.pruning import pruned
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.regression import largest, ridge_fit
+from vehiclemor.reduction.vehicle.regression import ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
-from vehiclemor.reduction.vehicle.slow_features import FeatureTable, feature_table
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.slow_cars import Member, fitted_box, member, own_and_others
+from vehiclemor.reduction.vehicle.slow_features import (
+    FeatureTable,
+    feature_table,
+    ranges_of,
+    widest,
+)
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes, as_of, slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import (
     Target,
     finishes,
@@ -48,6 +54,8 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 
+# Runs of its own car that a box of cars is fitted to, beside fewer of each other one.
+OWN = 36
 # Accuracy of the reduced runs that are compared with training runs.
 REFIT_TOLERANCE = 1e-6
 # Heading (rad) below which its error counts absolutely.
@@ -101,18 +109,30 @@ class SlowManifoldSettings(OnlineSettings):
 def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.process_time()
+    training, others = own_and_others(model, training)
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest, settings.symmetric)
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
+    ranges = ranges_of(shape, modes, samples.deviations, samples.inputs)
+    members: list[Member] = []
+    if others:
+        modes = as_of(shape, modes)
+        members = [member(some, modes) for some in (spread(training, OWN / len(training)), *others)]
+        own = ranges_of(shape, modes, samples.deviations, samples.inputs)
+        ranges = widest([own, *(m.ranges for m in members)])
     table = feature_table(
-        shape, modes, samples, settings.nonlinearity, settings.hull, settings.trusted
+        shape, modes, ranges, settings.nonlinearity, settings.hull, settings.trusted
     )
     reduced = _fitted_on_rates(shape, modes, table, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
         reduced = _fitted_on_runs(reduced, table, goals, settings)
+    if members:
+        (odd, _), (even, _) = reduced.features.groups
+        table = replace(table, features=reduced.features, odd=list(odd), even=list(even))
+        reduced = fitted_box(reduced, table, members, settings.hull).for_car(model)
     reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,
@@ -133,21 +153,15 @@ def _fitted_on_rates(
     u, motion, ridge = samples.inputs, samples.motion, settings.ridge
     z, speed = modes.coordinates(samples.deviations, u)
     k, n, inputs = modes.lateral, len(modes.rates), u.shape[1]
-    odd, even = table.odd, table.even
+    odd = table.odd
     odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
     columns = feature_columns(table.features, np.column_stack([z, speed]), u, table.parameters)
     slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
     slow_rates -= z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
     c = np.zeros((len(table.features.terms), n + 1 + PLANAR))
     c[odd_nonlinear, :k] = ridge_fit(columns[:, odd_nonlinear], slow_rates[:, :k], ridge)
-    # Linear terms are scaled by the ranges of the training runs.
-    ranges = largest(z)
-    c[odd[:k], :k] = modes.rates[:k, :k].T * ranges[:k, None]
-    c[odd[k], :k] = modes.drive[:k] * largest(u)[0]
-    # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
-    own, forward = even[2 : table.straight_count], shape.linearised.motion_a[1] @ modes.right[:, k:]
-    c[own, k:n] = modes.rates[k:, k:].T * ranges[k:, None]
-    c[even[0], n + 2], c[even[1], n + 2], c[own, n + 2] = shape.speed, 1.0, forward * ranges[k:]
+    table.set_linear(c, shape, modes)
+    forward = shape.linearised.motion_a[1] @ modes.right[:, k:]
     even_columns, ahead = columns[:, even_nonlinear], motion[:, 1] - shape.speed - speed
     c[even_nonlinear, k:n] = ridge_fit(even_columns, slow_rates[:, k:], ridge)
     c[even_nonlinear, n] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
@@ -166,7 +180,7 @@ def _fitted_on_rates(
         lifting,
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
-        np.concatenate([3.0 * ranges, [10.0, HEADING, 10.0, 10.0]]),
+        np.concatenate([3.0 * table.ranges.states, [10.0, HEADING, 10.0, 10.0]]),
         Offline(),
         "dopri5",
         REFIT_TOLERANCE,
@@ -200,6 +214,7 @@ def _fitted_on_runs(
 METHOD = Method(
     name="slow_manifold",
     summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
+    learns_from="any",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
     refusal=no_steered_vehicle,

@@ -14,9 +14,9 @@ from vehiclemor.reduction.vehicle.training_reach import (
     LONGER,
     NOTHING_KNOWN,
     SHORTEST,
-    UNLIKE,
     TrainingReach,
     durations,
+    known_starts,
 )
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -49,8 +49,6 @@ def training_reach(
         left.append(np.abs(reduced.remainder(later.states, later.inputs)).max(axis=0))
         starts.append(reduced.remainder(run.states[:1], run.inputs[:1], excited)[0])
     leaves, steered = np.max(left, axis=0), np.max(decaying, axis=0)
-    _, sizes, directions = np.linalg.svd(np.array(starts) / leaves, full_matrices=False)
-    directions = directions[sizes > UNLIKE]
     lasted, longest = np.max(lasted, axis=0), max(run.time[-1] for run in runs)
     # A little may last as long as any run does, and no longer.
     lasted[:lateral, 0], lasted[lateral:, 0] = longest, longest**2
@@ -62,6 +60,5 @@ def training_reach(
         min(faded, default=0.0) / LONGER,
         np.maximum(amplitudes, ROUNDING * amplitudes.max(initial=0.0)),
         leaves,
-        directions,
-        np.abs(np.array(starts) / leaves @ directions.T).max(axis=0),
+        **known_starts(np.array(starts), leaves),
     )

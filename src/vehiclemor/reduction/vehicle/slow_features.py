@@ -8,13 +8,14 @@ lateral equations and even ones in the others.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.reduction.vehicle.features import Features, monomials
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.regression import largest
-from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
 VARIABLES = ("front", "rear", "roll", "rolling", "steer")
@@ -23,6 +24,25 @@ MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of 
 AFTER_LANDING = 0.3
 # And how much of it, in parts of what samples show, a car may have that is steered.
 STEERED = 1.2
+
+
+class Ranges(NamedTuple):
+    """Largest magnitudes in training runs.
+
+    Attributes
+    ----------
+    arguments
+        Of the arguments of the nonlinear terms (5,).
+    states, inputs
+        Of the slow coordinates (k,) and the inputs.
+    speed
+        Of the change of speed in m/s.
+    """
+
+    arguments: np.ndarray
+    states: np.ndarray
+    inputs: np.ndarray
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -39,6 +59,28 @@ class FeatureTable:
     even: list[int]
     linear_count: int
     straight_count: int
+    ranges: Ranges
+
+    def set_linear(self, c: np.ndarray, shape: VehicleShape, modes: SlowModes) -> None:
+        """Write what is exact at straight running into coefficients (terms, states + 3)."""
+        k, n, states = modes.lateral, len(modes.rates), self.ranges.states[:, None]
+        odd, even = self.odd, self.even
+        # Linear terms are scaled by the ranges of the training runs.
+        c[odd[:k], :k] = modes.rates[:k, :k].T * states[:k]
+        c[odd[k], :k] = modes.drive[:k] * self.ranges.inputs[0]
+        # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
+        own = even[2 : self.straight_count]
+        c[own, k:n] = modes.rates[k:, k:].T * states[k:]
+        c[even[0], n + 2], c[even[1], n + 2] = shape.speed, 1.0
+        c[own, n + 2] = shape.linearised.motion_a[1] @ modes.right[:, k:] * states[k:, 0]
+
+    def turning(self, shape: VehicleShape, modes: SlowModes) -> np.ndarray:
+        """Coefficients (k + 1, 2) of psi' and V by lateral states and steering, without lag."""
+        linear, k = shape.linearised, modes.lateral
+        moved = np.column_stack([modes.right[:, :k], modes.follow])
+        found = (linear.motion_a[[0, 2]] @ moved).T
+        found[k] += linear.motion_b[[0, 2], 0]
+        return found * np.append(self.ranges.states[:k], self.ranges.inputs[0])[:, None]
 
     @property
     def odd_nonlinear(self) -> list[int]:
@@ -72,30 +114,46 @@ class FeatureTable:
         return replace(self, features=features, odd=first, even=rest)
 
 
+def ranges_of(
+    shape: VehicleShape, modes: SlowModes, deviations: np.ndarray, u: np.ndarray
+) -> Ranges:
+    """Ranges of deviations of the shape (samples, n) of one car, at inputs (samples, inputs)."""
+    z, speed = modes.coordinates(deviations, u)
+    k, rows = modes.lateral, _variables(shape, modes)
+    # The axles' slips go as one over the speed where they come from motion, not from steering.
+    at_speed = shape.speed / (shape.speed + speed)
+    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
+    values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
+    moved = float(largest(speed[:, None])[0] or 1.0)
+    return Ranges(largest(values), largest(z), largest(u), moved)
+
+
+def widest(ranges: Sequence[Ranges]) -> Ranges:
+    """Ranges that hold all of these."""
+    parts = (np.max(part, axis=0) for part in zip(*ranges, strict=True))
+    return Ranges(*parts)
+
+
+def feature_parameters(
+    shape: VehicleShape, modes: SlowModes, ranges: Ranges, hull: float
+) -> np.ndarray:
+    """Parameters in the text of the features."""
+    rows = _variables(shape, modes) * (1.0 / (hull * ranges.arguments))[:, None]
+    own = [1.0 / ranges.states, 1.0 / ranges.inputs]
+    return np.concatenate([rows.ravel(), *own, [shape.speed, 1.0 / (hull * ranges.speed)]])
+
+
 def feature_table(
     shape: VehicleShape,
     modes: SlowModes,
-    samples: ShapeSamples,
+    ranges: Ranges,
     nonlinearity: str,
     hull: float,
     trusted: float,
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
-    u = samples.inputs
-    z, speed = modes.coordinates(samples.deviations, u)
-    k, n, inputs = modes.lateral, z.shape[1], u.shape[1]
-    rows = _variables(shape, modes)
-    # The axles' slips go as one over the speed where they come from motion, not from steering.
-    at_speed = shape.speed / (shape.speed + speed)
-    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
-    values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    reach = hull * float(largest(speed[:, None])[0] or 1.0)
-    scales = 1.0 / (hull * largest(values))
-    rows[:2] *= scales[:2, None]
-    rows[2:] *= scales[2:, None]
-    parameters = np.concatenate(
-        [rows.ravel(), 1.0 / largest(z), 1.0 / largest(u), [shape.speed, 1.0 / reach]]
-    )
+    k, n, inputs = modes.lateral, len(ranges.states), len(ranges.inputs)
+    parameters = feature_parameters(shape, modes, ranges, hull)
     width = k + 2
 
     def held(text: str) -> str:
@@ -147,7 +205,7 @@ def feature_table(
         n + 1, inputs, tuple(lines), terms, groups, modes.blocks, tuple(watched), len(MEANINGS)
     )
     counts = k + inputs, 2 + n - k
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts)
+    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
 
 
 def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:

@@ -5,10 +5,11 @@ that hop of the wheels, spins and stabilised constraints leave no trace in z.  T
 of eigenvalue zero.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vehiclemor.errors import InputError
 from vehiclemor.reduction.vehicle.lifting import Transient
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
@@ -42,6 +43,8 @@ class SlowModes:
         Mode of the speed (n,), scaled so that U grows by one.
     symmetric
         The other modes that steering does not move, as the transient of a start.
+    blocks
+        Sizes of the diagonal blocks of `rates`.
     """
 
     lateral: int
@@ -54,16 +57,7 @@ class SlowModes:
     speed_left: np.ndarray
     speed_right: np.ndarray
     symmetric: Transient
-
-    @property
-    def blocks(self) -> tuple[int, ...]:
-        """Sizes of the diagonal blocks of `rates`: 2 for a conjugate pair, else 1."""
-        sizes: list[int] = []
-        while sum(sizes) < len(self.rates):
-            i = sum(sizes)
-            paired = i + 1 < len(self.rates) and abs(self.rates[i, i + 1]) > STILL
-            sizes.append(2 if paired else 1)
-        return tuple(sizes)
+    blocks: tuple[int, ...]
 
     def coordinates(
         self, deviations: np.ndarray, inputs: np.ndarray
@@ -75,10 +69,17 @@ class SlowModes:
         )
 
 
-def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
+def slow_modes(
+    shape: VehicleShape, fastest: float, symmetric: int = 0, lateral: int | None = None
+) -> SlowModes:
     """Slow modes with |lambda| up to `fastest` (1/s), and so many symmetric ones (or pairs).
 
     The inputs are the steering and its derivatives, as many as the model has.
+
+    Parameters
+    ----------
+    lateral
+        How many modes that steering moves are kept at most, a pair counting twice; all by default.
     """
     linear = shape.linearised
     values, vectors = np.linalg.eig(linear.a.T)
@@ -90,8 +91,11 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     still = int(np.argmin(np.abs(values)))
     moving = np.abs(values) >= STILL
     moving[still] = False
-    w, v = real_modes(values, left, right, steers & moving & (np.abs(values) <= fastest))
-    lateral = len(w)
+    wanted = steers & moving & (np.abs(values) <= fastest)
+    order = np.flatnonzero(wanted)[np.argsort(np.abs(values[wanted]))]
+    wanted[order[len(order) if lateral is None else lateral :]] = False
+    w, v = real_modes(values, left, right, wanted)
+    count = len(w)
     quiet = np.flatnonzero(
         ~steers & (np.imag(values) >= 0.0) & (np.arange(len(values)) != still) & apart(values)
     )
@@ -108,7 +112,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     scale = linear.motion_a[1] @ right[:, still].real
     double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
     return SlowModes(
-        lateral,
+        count,
         rates,
         w,
         v,
@@ -118,7 +122,56 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         left[still].real * scale,
         right[:, still].real / scale,
         Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
+        _blocks(rates),
     )
+
+
+def as_of(shape: VehicleShape, like: SlowModes) -> SlowModes:
+    """Slow modes of another car in coordinates that are near those of a first one.
+
+    Modes of one frequency turn when parameters change, their span does not: so the coordinates are
+    those of the span, z = w^T d with w^T v = 1 for the first car's v, of the lateral modes and of
+    the symmetric ones.
+
+    Raises
+    ------
+    InputError
+        If the car has not as many slow modes.
+    """
+    found = slow_modes(shape, np.inf, len(_uppers(like)), like.lateral)
+    same = found.left.shape == like.left.shape and found.lateral == like.lateral
+    if not same or len(found.symmetric.rates) != len(like.symmetric.rates):
+        raise InputError(f"this {shape.model.name} has other slow modes than the first car")
+    k = like.lateral
+    turn = np.zeros_like(found.rates)
+    for part in (slice(k), slice(k, None)):
+        turn[part, part] = np.linalg.inv(found.left[part] @ like.right[:, part])
+    back = np.linalg.inv(turn)
+    return replace(
+        found,
+        rates=turn @ found.rates @ back,
+        left=turn @ found.left,
+        right=found.right @ back,
+        drive=turn @ found.drive,
+        feedthrough=turn @ found.feedthrough,
+        blocks=tuple(size for size in (k, len(turn) - k) if size),
+    )
+
+
+def _uppers(modes: SlowModes) -> np.ndarray:
+    """Eigenvalues of the symmetric modes, one of each conjugate pair."""
+    values = np.linalg.eigvals(modes.rates[modes.lateral :, modes.lateral :])
+    return values[values.imag >= 0.0]
+
+
+def _blocks(rates: np.ndarray) -> tuple[int, ...]:
+    """Sizes of the diagonal blocks: 2 for a conjugate pair, else 1."""
+    sizes: list[int] = []
+    while sum(sizes) < len(rates):
+        i = sum(sizes)
+        paired = i + 1 < len(rates) and abs(rates[i, i + 1]) > STILL
+        sizes.append(2 if paired else 1)
+    return tuple(sizes)
 
 
 def real_modes(

@@ -7,7 +7,7 @@ slow motion, is known for the starts of the training alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,6 +79,12 @@ class TrainingReach:
         larger = max(float((sizes / self.steered).max()) / FADED, 1.0)
         return max(settled, self.faded * np.log(larger) / -np.log(FADED))
 
+    def with_starts(self, remainders: np.ndarray) -> TrainingReach:
+        """The same with other known starts, by what lifting leaves of them (starts, n)."""
+        if not len(self.left):
+            return self
+        return replace(self, **known_starts(remainders, self.left))
+
     def unlike(self, remainder: np.ndarray) -> float:
         """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
         if not len(self.left):
@@ -86,6 +92,14 @@ class TrainingReach:
         scaled = remainder / self.left
         known = np.clip(self.starts @ scaled, -LONGER * self.begun, LONGER * self.begun)
         return float(np.abs(scaled - known @ self.starts).max()) / UNLIKE
+
+
+def known_starts(remainders: np.ndarray, left: np.ndarray) -> dict[str, np.ndarray]:
+    """`starts` and `begun` of starts of which lifting leaves so much (starts, n)."""
+    scaled = remainders / left
+    _, sizes, directions = np.linalg.svd(scaled, full_matrices=False)
+    directions = directions[sizes > UNLIKE]
+    return {"starts": directions, "begun": np.abs(scaled @ directions.T).max(axis=0)}
 
 
 NOTHING_KNOWN = TrainingReach(

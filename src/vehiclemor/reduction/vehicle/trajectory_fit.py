@@ -10,6 +10,7 @@ Levenberg and Marquardt.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -92,37 +93,95 @@ def targets(
 def improved(
     reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int, power: float = 2.0
 ) -> ReducedVehicle:
-    """The reduced vehicle after so many sweeps, damped Gauss-Newton steps.
+    """The reduced vehicle after so many sweeps, see `improved_together`."""
+    change = improved_together([reduced], [goals], np.ones((1, 1)), free, sweeps, power)
+    return _changed(reduced, free, change[0])
+
+
+def improved_together(
+    vehicles: Sequence[ReducedVehicle],
+    goals: Sequence[Sequence[Target]],
+    rows: np.ndarray,
+    free: Free,
+    sweeps: int,
+    power: float = 2.0,
+    change: np.ndarray | None = None,
+) -> np.ndarray:
+    """Change (m, free coefficients) of several cars by so many damped Gauss-Newton steps.
 
     Parameters
     ----------
+    goals
+        Of each vehicle.
+    rows
+        Rows (vehicles, m): the coefficients of each change by its row times the result.
     power
         Of the runs' errors in the sum that is made small.  With 1 the worst runs count no more than
         the others (iteratively reweighted least squares): of use from a first guess on, where the
         errors of some are too large to say much.
+    change
+        That is begun with; zero by default.
     """
-    paths, error = _compared(reduced, goals, power)
+    if change is None:
+        change = np.zeros((rows.shape[1], sum(len(terms) for terms, _ in free)))
+    moved = _all_changed(vehicles, rows, free, change)
+    every, error = _all_compared(moved, goals, power)
     damping = DAMPING
     for _ in range(sweeps):
         if not np.isfinite(error):
             break
-        normal, gradient = _normal_equations(reduced, goals, paths, free, power)
-        scaled, scale = unit_diagonal(normal)
+        parts = [
+            _normal_equations(vehicle, own, paths, free, power)
+            for vehicle, own, paths in zip(moved, goals, every, strict=True)
+        ]
+        gradient = rows.T @ np.array([slope for _, slope in parts])
+        scaled, scale = unit_diagonal(_all_together(rows, np.array([part for part, _ in parts])))
         while damping < MOST_DAMPING:
-            step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
-            candidate = _changed(reduced, free, -step)
-            new_paths, new_error = _compared(candidate, goals, power)
+            step = (
+                np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient.ravel() / scale)
+                / scale
+            )
+            further = change - step.reshape(change.shape)
+            candidates = _all_changed(vehicles, rows, free, further)
+            new, new_error = _all_compared(candidates, goals, power)
             if new_error < error:
-                reduced, paths, error = candidate, new_paths, new_error
+                change, moved, every, error = further, candidates, new, new_error
                 damping *= 0.1
                 break
             damping *= 10.0
-    return reduced
+    return change
 
 
-def spread(goals: Sequence[Target], share: float) -> list[Target]:
-    """A share of the goals, spread over them without a period (multiples of the golden ratio)."""
-    return [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
+def _all_changed(
+    vehicles: Sequence[ReducedVehicle], rows: np.ndarray, free: Free, change: np.ndarray
+) -> list[ReducedVehicle]:
+    """Cars with their coefficients changed, see `improved_together`."""
+    return [_changed(v, free, row @ change) for v, row in zip(vehicles, rows, strict=True)]
+
+
+def _all_together(rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Sum over cars of the Kronecker products of their rows' squares and normal matrices."""
+    (cars, m), n = rows.shape, parts.shape[1]
+    squares = (rows[:, :, None] * rows[:, None, :]).reshape(cars, m * m)
+    found = (squares.T @ parts.reshape(cars, n * n)).reshape(m, m, n, n)
+    return found.transpose(0, 2, 1, 3).reshape(m * n, m * n)
+
+
+def _all_compared(
+    vehicles: Sequence[ReducedVehicle], goals: Sequence[Sequence[Target]], power: float
+) -> tuple[list[list[np.ndarray]], float]:
+    """Reduced runs of all cars, and the sum of their errors; infinite if one has failed."""
+    found, total = [], 0.0
+    for vehicle, own in zip(vehicles, goals, strict=True):
+        paths, error = _compared(vehicle, own, power)
+        found.append(paths)
+        total += error
+    return found, total
+
+
+def spread(goals: Sequence[Any], share: float, first: float = 0.0) -> list[Any]:
+    """A share of goals or runs, spread without a period: multiples of the golden ratio."""
+    return [goal for i, goal in enumerate(goals) if (first + i * GOLDEN) % 1.0 < share]
 
 
 def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:

@@ -22,11 +22,7 @@ from vehiclemor.report.figures.curves import (
     draw_largest_errors,
     positions,
 )
-from vehiclemor.report.figures.grid_errors import (
-    figure_grid_errors,
-    figure_samples,
-    sample_axis,
-)
+from vehiclemor.report.figures.grid_errors import figure_grid_errors
 from vehiclemor.report.figures.lines import (
     CROSS,
     FULL,
@@ -36,10 +32,10 @@ from vehiclemor.report.figures.lines import (
     styles,
 )
 from vehiclemor.report.figures.places import tick_decades
+from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import method_text, unit_of
 from vehiclemor.report.result_selection import drawn
-from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -216,28 +212,6 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
     if sample_axis(dataset):
         return figure_samples(dataset, shown_outputs(dataset))
     return figure_grid_errors(dataset, shown_outputs(dataset)) or _errors_of_a_point(dataset)
-
-
-def error_axes(dataset: xr.Dataset) -> tuple[xr.Dataset, list[str], list[str]]:
-    """Axes over which errors are drawn: both factors, else the longest one of numbers, if any.
-
-    Returns
-    -------
-    dataset, list of str, list of str
-        The dataset at one place of all other dimensions, the axes, and that place in words.
-    """
-    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
-    grid = {d: values for d, values in grid.items() if len(values) > 1}
-    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
-    drawn = sorted(axes, key=lambda d: len(grid[d]))[-1:]
-    drawn = list(FACTORS) if set(FACTORS) <= set(axes) else drawn
-    at = []
-    for dimension in (d for d in grid if d not in drawn):
-        values = grid[dimension].tolist()
-        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
-        dataset = dataset.sel({dimension: value})
-        at.append(f"{dimension} {value}")
-    return dataset, drawn, at
 
 
 def _errors_of_a_point(dataset: xr.Dataset) -> Figure:

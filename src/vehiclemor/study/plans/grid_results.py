@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.simulation.model import Model
+from vehiclemor.study.netcdf_file import PART, Parts, Region, regions
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.plans.study_file import PARAMETER
 from vehiclemor.study.provenance import attributes, layout_digest, versions
@@ -20,8 +22,6 @@ from vehiclemor.study.variables import meaning_of, variables
 if TYPE_CHECKING:
     import xarray as xr
 
-# Slices of the dimensions of a grid.
-Region = tuple[slice, ...]
 # Dimensions of a cell's errors; each has the units of its labels beside it.
 QUANTITIES = ("output", "coordinate", "speed")
 
@@ -34,15 +34,22 @@ def cells_digest(grid: Grid) -> str:
     return digest.hexdigest()[:20]
 
 
-def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
-    """Read all cells of a grid and put them together.
+def combined(grid: Grid, folder: Path) -> xr.Dataset | Parts:
+    """All cells of a grid put together; in parts if they are too large to be held.
 
     Raises
     ------
     FileError
         If a cell is missing, corrupt or foreign.
     """
-    return _part(grid, folder, tuple(slice(None) for _ in grid.sizes))
+    size = read_cell(folder, next(iter(grid.unique))).nbytes
+    parts = regions(grid.sizes, max(PART // size, 1))
+    whole = tuple(slice(0, length) for length in grid.sizes)
+    first = next(parts)
+    if first == whole:
+        return _part(grid, folder, whole)
+    made = ((region, _part(grid, folder, region)) for region in itertools.chain([first], parts))
+    return Parts(tuple(grid.dimensions), made)
 
 
 def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:

@@ -1,14 +1,14 @@
 """Protocols: training, validation and test scenarios of a model, and who competes on them."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
-from vehiclemor.resources import data_folder
+from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
@@ -17,11 +17,14 @@ from vehiclemor.study.plans.boxes import check_boxes
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
+from vehiclemor.study.training_cars import by_cars, of_cars
 from vehiclemor.toml_files import read_toml
 
 SETS = ("training", "validation", "test", "outside")
 # Drawn when all that they test is settled.
 DRAWN = ("drawn", "drawn_outside")
+# Folder of the package's protocols over cars.
+OF_CARS = "car_protocols"
 FULL_ORDER, CONTENDER = "full order", "contender"
 
 
@@ -90,7 +93,8 @@ def load_protocol(protocol: str) -> Protocol:
     VehiclemorError
         If the file or anything that it names is wrong.
     """
-    path = named_file("protocol", "protocols", protocol)
+    folder = OF_CARS if protocol in data_names(OF_CARS) else "protocols"
+    path = named_file("protocol", folder, protocol)
     definition = read_toml(path, ProtocolFile)
     try:
         return _resolved(path, definition)
@@ -106,10 +110,10 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     for output in outputs:
         if output not in model.outputs:
             raise unknown(f"output of {model.name}", output, model.outputs)
-    sets = {key: _scenarios(model, key, getattr(definition, key)) for key in SETS}
+    sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
     check_boxes(model, definition)
-    contestants = tuple(_contestant(model, entry, sets) for entry in definition.contestants)
+    contestants = tuple(_contestant(model, e, definition, sets) for e in definition.contestants)
     labels = [label for contestant in contestants for label in contestant.row_labels]
     for label in labels:
         if labels.count(label) > 1:
@@ -121,12 +125,13 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     return Protocol(path, definition, model, sets, contestants)
 
 
-def _scenarios(model: Model, key: str, groups: list[Group]) -> tuple[Scenario, ...]:
+def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenario, ...]:
     """Scenarios of one set, checked against the model."""
     found: list[Scenario] = []
-    for number, group in enumerate(groups, start=1):
+    for number, group in enumerate(getattr(definition, key), start=1):
         try:
-            found += _of_group(model, group)
+            runs = _of_group(model, group)
+            found += by_cars(model, runs, definition.cars) if group.cars else runs
         except InputError as error:
             raise InputError(f"{key}, group {number}: {error}") from None
     return tuple(found)
@@ -161,7 +166,10 @@ def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
 
 
 def _contestant(
-    model: Model, entry: ContestantEntry, sets: dict[str, tuple[Scenario, ...]]
+    model: Model,
+    entry: ContestantEntry,
+    definition: ProtocolFile,
+    sets: dict[str, tuple[Scenario, ...]],
 ) -> Contestant:
     method: Method = component("method", entry.method)
     where = f"contestant {entry.label!r}"
@@ -181,4 +189,8 @@ def _contestant(
     training = tuple(
         s for s in sets["training"] if not entry.train_on or s.maneuver.name in entry.train_on
     )
+    if entry.cars == "own":
+        training = tuple(replace(scenario, parameters=None) for scenario in training)
+    elif entry.cars == "box" and definition.cars and method.learns_from != "inputs":
+        training = of_cars(model, training, definition.cars)
     return Contestant(entry.label, entry.method, entry.role, tuple(candidates), training)

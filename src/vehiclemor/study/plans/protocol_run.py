@@ -82,7 +82,7 @@ def run_protocol(
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
         lambda: protocol_dataset(protocol, rows, found, (timed, apart), digest),
-        [_beside("timing", path), *(result_path(folder, key) for key in keys)],
+        lambda: [Path(timed.encoding["source"]), *(result_path(folder, key) for key in keys)],
         of,
     )
     if "drawn" in sets:
@@ -101,9 +101,7 @@ def validate(
 
     Of a full-order contestant every candidate becomes a row.
     """
-    experiments = [
-        [c.experiment(model, i, validation) for i in range(len(c.candidates))] for c in contestants
-    ]
+    experiments = [_candidates(model, contestant, validation) for contestant in contestants]
     # Most candidates of a contestant share a fit.
     workers(experiments)
     rows: list[Row] = []
@@ -116,6 +114,20 @@ def validate(
         chosen = range(len(candidates)) if every else [choose(results)]
         rows += [Row(contestant, candidate, results) for candidate in chosen]
     return rows
+
+
+def validation_experiments(protocol: Protocol) -> list[Experiment]:
+    """What is computed before anything is chosen."""
+    validation = protocol.sets["validation"]
+    found = (_candidates(protocol.model, c, validation) for c in protocol.contestants)
+    return [experiment for candidates in found for experiment in candidates]
+
+
+def _candidates(
+    model: Model, contestant: Contestant, validation: tuple[Scenario, ...]
+) -> list[Experiment]:
+    candidates = range(len(contestant.candidates))
+    return [contestant.experiment(model, candidate, validation) for candidate in candidates]
 
 
 def test(

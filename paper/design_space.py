@@ -1,0 +1,191 @@
+"""Measures reduced models of a box of cars on a Latin hypercube of its cars.
+
+Usage: python paper/design_space.py [--cars N] [--results DIR] [--figures DIR] [MODEL ...]
+
+Each vehicle is fitted once for the box of its protocol over cars; then every car drives the nominal
+lane change, on which all bases are trained, and another one.  Writes DIR/design_space-MODEL.nc and
+a figure, and prints a table: errors in parts of the protocol's bounds, misses, silent misses (those
+of which the model says nothing), warnings, and what a car and its run take.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.figure import Figure
+
+import vehiclemor as vm
+from vehiclemor.files import make_folder
+from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.registry import component
+from vehiclemor.report.figures.lines import legend_outside, panels, styles
+from vehiclemor.report.figures.saving import save_figure, styled
+from vehiclemor.study.netcdf_file import write_dataset
+from vehiclemor.study.plans.protocol import Protocol, load_protocol
+from vehiclemor.study.plans.protocol_file import Bound
+from vehiclemor.study.provenance import attributes
+
+SEED = 1000
+# Frequency and amplitude factors of the runs; bases are trained on the first.
+RUNS = {"trained input": (1.0, 1.0), "other input": (1.3, -1.2)}
+FITS: dict[str, dict[str, Any]] = {
+    "replay": {"method": "replay"},
+    "POD, nominal basis": {"method": "pod", "cars": ()},
+    "POD, concatenated basis": {"method": "pod"},
+    "POD, interpolated bases": {"method": "pod", "bases": "interpolated"},
+}
+REFITTED = "POD, refitted"
+MANIFOLD = "nonlinearity = 'rich', terms = 32"
+BEST: dict[str, dict[str, Any]] = {
+    "independent_suspension_vehicle": {
+        "method": "guarded",
+        "training": "protocol",
+        "fast_settings": MANIFOLD,
+        "tolerance": 2e-3,
+        "safe_solver": "exponential_adams",
+        "safe_tolerance": 1e-7,
+    },
+    "high_fidelity_vehicle": {"method": "frozen_inertia", "tolerance": 1e-4, "cars": ()},
+}
+
+
+def fits(protocol: Protocol) -> dict[str, ReducedOrderModel]:
+    """One reduced model for all cars by each method."""
+    found, model, box = {}, protocol.model, protocol.definition.cars
+    best = BEST[model.name]
+    for label, given in (FITS | {best["method"]: best}).items():
+        began = time.perf_counter()
+        found[label] = vm.reduce(model, **{"training": "nominal", "cars": box} | given)
+        print(f"{label}: fitted in {time.perf_counter() - began:.1f} s", flush=True)
+    return found
+
+
+def score(error: np.ndarray, outputs: list[str], bounds: Mapping[str, Bound]) -> np.ndarray:
+    """Errors (outputs,) of a run (samples, outputs) in parts of their bounds."""
+    found = []
+    for output, bound in bounds.items():
+        part = error[:, outputs.index(output)]
+        size = np.abs(part).max() if bound.measure == "max" else np.sqrt(np.mean(part**2))
+        found.append(size / bound.bound)
+    return np.array(found)
+
+
+def measured(protocol: Protocol, count: int) -> xr.Dataset:
+    """Errors, warnings and times of all methods on a Latin hypercube of cars."""
+    from scipy.stats import qmc
+
+    model, definition = protocol.model, protocol.definition
+    names, (low, high) = list(definition.cars), np.transpose(list(definition.cars.values()))
+    places = qmc.LatinHypercube(len(names), rng=SEED).random(count)
+    values = low + places * (high - low)
+    base = component("maneuver", model.definition.maneuver)
+    maneuvers = [base.perturbed(*factors) for factors in RUNS.values()]
+    reduced = fits(protocol)
+    labels = [*reduced, REFITTED]
+    shape = (len(labels), count, len(RUNS))
+    scores, warned = np.full((*shape, len(definition.bounds)), np.inf), np.zeros(shape, dtype=bool)
+    made, run_times = np.zeros(shape[:2]), np.zeros(shape)
+    for number, row in enumerate(values.tolist()):
+        changed = dict(zip(names, row, strict=True))
+        car = vm.model(model.name, parameters=changed)
+        full = [car.simulate(maneuver) for maneuver in maneuvers]
+        for place, label in enumerate(labels):
+            began = time.thread_time()
+            if label == REFITTED:
+                own = vm.reduce(car, "pod", training="nominal")
+            else:
+                own = reduced[label].for_parameters(changed)
+            made[place, number] = time.thread_time() - began
+            for k, (maneuver, true) in enumerate(zip(maneuvers, full, strict=True)):
+                began = time.thread_time()
+                run = own.simulate(maneuver)
+                run_times[place, number, k] = time.thread_time() - began
+                told = run.trust is not None and bool(run.trust.reason)
+                warned[place, number, k] = run.status != "ok" or told
+                if run.finished:
+                    error = run.outputs - true.outputs
+                    scores[place, number, k] = score(error, list(car.outputs), definition.bounds)
+        if (number + 1) % 100 == 0:
+            print(f"{number + 1} of {count} cars", flush=True)
+    found = {
+        "score": (("row", "car", "run", "output"), scores),
+        "warned": (("row", "car", "run"), warned),
+        "seconds_to_make": (("row", "car"), made),
+        "seconds": (("row", "car", "run"), run_times),
+        "parameters": (("car", "parameter"), values),
+    }
+    axes = {"row": labels, "run": list(RUNS), "output": list(definition.bounds), "parameter": names}
+    title = f"{model.name}: reduced models on {count} cars"
+    return xr.Dataset(found, axes, attributes(title, model.kernel_hash, model=model.name))
+
+
+def table(data: xr.Dataset) -> pd.DataFrame:
+    """One line for each method and run."""
+    lines = []
+    for run in data["run"].values:
+        for row in data["row"].values:
+            part = data.sel(row=row, run=run)
+            worst = part["score"].max("output").values
+            missed, warned = worst > 1.0, part["warned"].values
+            lines.append(
+                {
+                    "run": run,
+                    "method": row,
+                    "median score": np.median(worst),
+                    "95 %": np.quantile(worst, 0.95, method="higher"),
+                    "worst": worst.max(),
+                    "missed, %": 100.0 * missed.mean(),
+                    "silent, %": 100.0 * (missed & ~warned).mean(),
+                    "warned, %": 100.0 * warned.mean(),
+                    "ms a car": 1e3 * float(part["seconds_to_make"].median()),
+                    "ms a run": 1e3 * float(part["seconds"].median()),
+                }
+            )
+    return pd.DataFrame(lines).set_index(["run", "method"])
+
+
+def figure(data: xr.Dataset) -> Figure:
+    """Share of the cars whose largest error, in parts of its bound, is above a value."""
+    drawn, axes = panels(1, len(data["run"]), (6.7, 3.4), sharey=True, sharex=True)
+    drawn.set_layout_engine("constrained")
+    share = 100.0 * (1.0 - np.arange(data.sizes["car"]) / data.sizes["car"])
+    lines = styles(str(row) for row in data["row"].values)
+    for axis, run in zip(axes.flat, data["run"].values, strict=True):
+        for row, style in lines.items():
+            worst = np.sort(data["score"].sel(row=row, run=run).max("output").values)
+            axis.semilogx(worst, share, label=row, **style)
+        axis.axvline(1.0, color="black", linewidth=0.8)
+        axis.set_title(str(run))
+        axis.set_xlabel("largest error / its bound")
+    axes[0, 0].set_ylabel("cars above (%)")
+    legend_outside(drawn, axes.flat, columns=3)
+    return drawn
+
+
+def main() -> None:
+    """Measure, write and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("models", nargs="*", default=list(BEST), metavar="MODEL")
+    parser.add_argument("--cars", type=int, default=1000, help="cars of the Latin hypercube")
+    parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
+    parser.add_argument("--figures", type=Path, default=Path("paper/figures"), help="of figures")
+    given = parser.parse_args()
+    make_folder(given.results)
+    make_folder(given.figures)
+    for model in given.models:
+        data = measured(load_protocol(f"cars-{model}"), given.cars)
+        write_dataset(data, given.results / f"design_space-{model}.nc")
+        with styled():
+            save_figure(figure(data), given.figures / f"design-space-{model}.png")
+        print(f"\n{data.attrs['title']}\n{table(data).round(3).to_string()}\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()
