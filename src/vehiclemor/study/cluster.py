@@ -28,6 +28,7 @@ from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.store import write_encoded
 from vehiclemor.study.workers import (
     KILLED,
+    LARGEST,
     Done,
     Engine,
     Groups,
@@ -106,8 +107,13 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
             )
         client = stack.enter_context(_client(address))
         topic = f"vehiclemor-{uuid.uuid4().hex}"
-        client.subscribe_topic(topic, partial(_answer, client, topic))
-        yield partial(evaluated_by_cluster, client=client, topic=topic)
+        asked: set[str] = set()
+        client.subscribe_topic(topic, partial(_answer, client, topic, asked))
+        try:
+            yield partial(evaluated_by_cluster, client=client, topic=topic)
+        finally:
+            for name in asked:
+                distributed.Variable(name, client=client).delete()
 
 
 @contextmanager
@@ -132,6 +138,7 @@ def _client(address: Any) -> Iterator[Client]:
 def _knock(address: str) -> None:
     """Raise `InputError` if there is no scheduler: a client that fails hangs when it is deleted."""
     import asyncio
+    from concurrent.futures import ThreadPoolExecutor
 
     from distributed.core import connect
     from distributed.security import Security
@@ -143,7 +150,9 @@ def _knock(address: str) -> None:
         connection.abort()
 
     try:
-        asyncio.run(knock())
+        # A notebook has a loop of its own in this thread.
+        with ThreadPoolExecutor(1) as other:
+            other.submit(lambda: asyncio.run(knock())).result()
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
         reason = " ".join(str(error).split()) or f"no answer in {REACH:g} s"
         raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
@@ -170,33 +179,42 @@ def _versions(entry: dict[str, Any] | None) -> dict[str, str]:
     return found | {"python": ".".join(found["python"].split(".")[:2])}
 
 
-async def _answer(client: Client, topic: str, event: tuple[float, str]) -> None:
+async def _answer(client: Client, topic: str, asked: set[str], event: tuple[float, str]) -> None:
     """Give a worker a file of this process's cache; nothing if it has none."""
     import asyncio
 
     from distributed import Variable
 
     name = event[1]
+    shared = f"{topic} {name}"
+    asked.add(shared)
     content = await asyncio.to_thread(held, name)
-    answer = b"" if content is None else packed(name, content)
-    await Variable(f"{topic} {name}", client=client).set(answer)
+    await Variable(shared, client=client).set(b"" if content is None else packed(name, content))
 
 
 def evaluated_by_cluster(
     groups: Groups,
     folder: Path,
+    alone: bool = False,
+    *,
     client: Client,
     topic: str,
     work: Callable[..., tuple[Done, Sent]] | None = None,
 ) -> Generator[Done, None, None]:
-    """What `evaluate_and_store` gives for each batch, by the workers of a cluster."""
+    """What `evaluate_and_store` gives for each batch, by the workers of a cluster.
+
+    Parameters
+    ----------
+    alone
+        Whether each group is a batch of its own, so that one that kills workers spoils no other.
+    """
     from distributed.cfexecutor import ClientExecutor
 
     folder = folder.absolute()
     token = temporary_path(folder / "cells" / "token")
     place = Place(folder, token, uuid.uuid4().hex, topic)
     pool = ClientExecutor(client, pure=False)
-    seen, number = 0.0, 0
+    seen, number, most = 0.0, 0, 1 if alone else LARGEST
 
     def submit(batch: list[Experiment]) -> Future[Timed]:
         return pool.submit(timed_batch, work or on_worker, batch, place)
@@ -209,7 +227,7 @@ def evaluated_by_cluster(
 
     try:
         write_text(token, place.text)
-        for done, results in in_batches(groups, submit, places, _taken):
+        for done, results in in_batches(groups, submit, places, _taken, most):
             for key, (content, broken) in results.items():
                 write_encoded(content, folder, key, broken=broken)
             yield done
@@ -279,7 +297,7 @@ def _sees(place: Place) -> bool:
 
 def _same_source(experiments: Sequence[Experiment]) -> None:
     """Raise `InputError` if results would be those of other source or another compiler."""
-    for e in experiments:
+    for e in {(e.model, e.method): e for e in experiments}.values():
         what = ""
         if code_digest(e.model, e.method) != e.code:
             what = "another version of vehiclemor, or of the package of"

@@ -26,6 +26,7 @@ from vehiclemor.files import (
 )
 from vehiclemor.study import cell_file
 from vehiclemor.study.netcdf_file import (
+    LARGE,
     Parts,
     global_attributes,
     opened_lazily,
@@ -255,7 +256,8 @@ def stored(
 ) -> xr.Dataset:
     """What is stored for this key, here or under another name, else what `make` gives.
 
-    It is stored at `path`, to which the encoding `source` of what is returned leads.
+    The results of a study are then stored at `path`.  Where the file is tells the encoding `source`
+    of what is returned.
 
     Parameters
     ----------
@@ -270,15 +272,11 @@ def stored(
     dataset = _current(path, attribute, key, sources)
     if dataset is not None:
         return dataset
-    for other in sorted(path.parent.glob("[!.]*.nc")):
-        if other != path and global_attributes(other).get(attribute) == key:
-            dataset = _current(other, attribute, key, sources)
-            if dataset is not None and owner is None:
-                return dataset
-            if dataset is not None:
-                break
+    same = _under_another_name(path, attribute, key, sources)
+    if same is not None and owner is None:
+        return same
     make_folder(path.parent)
-    made = make() if dataset is None else dataset
+    made = make() if same is None else same
     further = {attribute: key} | (owner._asdict() if owner else {})
     if isinstance(made, Parts):
         write_parts(made, path, further)
@@ -288,6 +286,18 @@ def stored(
         write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
+
+
+def _under_another_name(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
+    """As `_current`, of any file beside that can be held: its study was renamed since."""
+    for other in sorted(path.parent.glob("[!.]*.nc")):
+        if other == path or other.stat().st_size >= LARGE:
+            continue
+        if global_attributes(other).get(attribute) == key:
+            return _current(other, attribute, key, sources)
+    return None
 
 
 def _current(
@@ -308,4 +318,5 @@ def _current(
         newest = max((source.stat().st_mtime_ns for source in sources()), default=-1)
     except FileNotFoundError:
         return None
+    dataset.encoding["source"] = str(path)
     return dataset if newest < written else None

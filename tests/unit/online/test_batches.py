@@ -317,10 +317,11 @@ def test_wrong_input_is_one_line(changes, line, full):
     assert "\n" not in str(error.value)
 
 
-def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
+def test_what_can_not_be_kept_is_refused(full, tmp_path, monkeypatch):
     signals = vm.Signals(TIMES, steering(2))
+    fitted = vm.reduce(full.model, "operator_inference", training="nominal")
     with pytest.raises(InputError, match="is fitted to one car"):
-        vm.simulate_many(reduced, signals, parameters={"sprung_mass": 1400.0})
+        vm.simulate_many(fitted, signals, parameters={"sprung_mass": 1400.0})
     (tmp_path / "runs.nc").mkdir()
     with pytest.raises(FileError, match="exists already"):
         vm.simulate_many(full, signals, path=tmp_path / "runs.nc")

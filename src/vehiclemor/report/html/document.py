@@ -16,11 +16,12 @@ from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.html.page import page
 from vehiclemor.report.html.parts import Section
 from vehiclemor.report.html.protocol_section import protocol_section
+from vehiclemor.report.html.provenance import name_of
 from vehiclemor.report.html.study_section import study_section
 from vehiclemor.report.html.verdict_section import verdict_section
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset
 
 PAPER = "paper"
 
@@ -65,7 +66,8 @@ def write_report(studies: Sequence[str], out: Path, folder: Path, jobs: int = 1)
 
 def _run(studies: Sequence[str], folder: Path, jobs: int) -> Found:
     chosen = [name for study in studies for name in _studies_of(study, folder)]
-    found = {k: v for name in chosen for k, v in run_studies(name, folder, jobs).items()}
+    datasets = [d for name in chosen for d in run_studies(name, folder, jobs).values()]
+    found = {name_of(dataset): dataset for dataset in datasets}
     timed = printed_models() if PAPER in studies else []
     return Found(found, {model: timing_of(model, folder) for model in timed}, {})
 

@@ -12,6 +12,8 @@ DASHES = {"--": [8, 4], "-.": [8, 4, 2, 4], ":": [2, 3]}
 TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 # Said below every plot.
 HINT = "Drag to move, zoom with the tools beside it, tap a name in the legend to hide or show it."
+# Names of a legend in two columns, and the longest name of all.
+SHORT, LONGEST = 20, 44
 # What a tap on a point does: the page goes to its cell, if that is listed.
 GO_TO_CELL = """
 const row = source.selected.indices[0];
@@ -52,8 +54,14 @@ def new_figure(x: str, y: str, told: Mapping[str, str], **options: Any) -> Figur
 def with_legend(figure: Figure) -> Figure:
     """The same with its legend below, whose names hide and show."""
     for legend in figure.legend:
+        names = [item.label.value for item in legend.items]
         figure.add_layout(legend, "below")
-        legend.update(click_policy="hide", ncols=2, location="bottom_left", spacing=8)
+        legend.update(
+            click_policy="hide",
+            ncols=2 if max(map(len, names)) <= SHORT else 1,
+            location="bottom_left",
+            spacing=8,
+        )
         legend.update(
             label_text_font_size="11px",
             glyph_width=30,
@@ -62,6 +70,11 @@ def with_legend(figure: Figure) -> Figure:
             border_line_alpha=0,
         )
     return figure
+
+
+def legend_name(text: str) -> str:
+    """A name as a legend has room for it on a telephone."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
 def tapped(figure: Figure, source: Any) -> None:

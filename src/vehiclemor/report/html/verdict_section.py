@@ -13,7 +13,7 @@ from vehiclemor.report.comparison.rows import from_start
 from vehiclemor.report.costs import LEGEND, cost_rows
 from vehiclemor.report.criteria import CRITERIA, VARIANTS, variants
 from vehiclemor.report.html.parts import Cell, Entry, Section, Table, judged_entry, quantity
-from vehiclemor.report.html.provenance import facts
+from vehiclemor.report.html.provenance import facts, name_of
 from vehiclemor.report.published import Published, load_published
 from vehiclemor.report.verdicts import counted
 
@@ -77,7 +77,10 @@ def _origin(row: dict[str, Any], published: Published, results: Studies) -> tupl
         CRITERIA[name](asked, next(iter(variants(name))))
         if not asked.names:
             return "", "from the training runs alone"
-        return f"study-{asked.names[0]}", f"from {', '.join(dict.fromkeys(asked.names))}"
+        return (
+            f"study-{name_of(results[asked.names[0]])}",
+            f"from {', '.join(dict.fromkeys(asked.names))}",
+        )
     if number.kind == "time_reduction":
         return f"costs-{number.model}", ""
     label = next((label for label, text in VARIANTS.items() if text == row["variant"]), "")

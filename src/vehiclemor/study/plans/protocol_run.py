@@ -82,7 +82,7 @@ def run_protocol(
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
         lambda: protocol_dataset(protocol, rows, found, (timed, apart), digest),
-        lambda: [_beside("timing", path), *(result_path(folder, key) for key in keys)],
+        lambda: [Path(timed.encoding["source"]), *(result_path(folder, key) for key in keys)],
         of,
     )
     if "drawn" in sets:

@@ -233,7 +233,8 @@ def read_study(path: Path) -> StudyFile:
     """A study file; of a protocol's file the study of it alone."""
     if not has_table(path, "contestants"):
         return read_toml(path, StudyFile)
-    return StudyFile(title=read_toml(path, ProtocolFile).title, protocols=[str(path)])
+    title = read_toml(path, ProtocolFile).title
+    return StudyFile.model_validate({"title": title, "protocols": [str(path)]})
 
 
 def load_studies(study: str) -> dict[str, StudyFile]:
