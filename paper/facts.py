@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import in_use
+import scaling
 from fragments import ROOT, manifest, printed_numbers, rendered, rewritten
 
 from vehiclemor import VehiclemorError
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 FACTS = ROOT / "paper" / "facts.json"
 # Kinds of sources that one file of the results folder holds.
-FILES = {"benchmark": "benchmark.json", "in_use": in_use.FILE}
+FILES = {"benchmark": "benchmark.json", "in_use": in_use.FILE, "scaling": scaling.FILE}
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")
 # What an expression may call; everything else is arithmetic.
@@ -110,6 +111,8 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         return pd.DataFrame.from_dict(values, "index").rename_axis("name").to_xarray()
     if kind == "in_use":
         return in_use.measured(folder)
+    if kind == "scaling":
+        return scaling.measured(folder)
     if kind == "published":
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
@@ -152,6 +155,7 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
         "operations": "python paper/regenerate.py",
         "predictive": "vehiclemor compare predictive",
         "in_use": "python paper/in_use.py",
+        "scaling": "python paper/scaling.py",
     }
     written = max((path.stat().st_mtime for path in files), default=None)
     when = datetime.now(UTC) if written is None else datetime.fromtimestamp(written, UTC)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import runpy
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -23,15 +22,13 @@ from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
 
 import numpy as np
+from named_values import Values, measured_values
 
 import vehiclemor as vm
 from vehiclemor.codegen.loops import Prepared
-from vehiclemor.files import make_folder
 from vehiclemor.online.rom import ReducedOrderModel as Car
 from vehiclemor.online.saved import shipped_folder
 from vehiclemor.registry import component
-from vehiclemor.study.provenance import attributes
-from vehiclemor.study.store import read_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,8 +45,6 @@ COARSE = {"solver": "ros34pw2", "tolerance": 2e-3}
 TIMES = np.linspace(0.0, 10.0, 1001)
 MULTISINE = component("maneuver", "multisine").at(TIMES)
 ASIDE = "lateral_position"
-# `name, unit` -> value.
-Values = dict[str, float]
 
 
 def cars(short: str) -> dict[str, Car]:
@@ -319,22 +314,8 @@ def plans() -> Values:
 
 def measured(folder: Path, anew: bool = False) -> xr.Dataset:
     """What the results folder holds; measured where it lacks it, or once more."""
-    import xarray as xr
-
-    path = folder / FILE
-    if anew or not path.exists():
-        values: Values = {}
-        parts = (steps, runs, batches, scipy, files, exports, closed_loops, restarts, kinks, plans)
-        for part in parts:
-            began = time.perf_counter()
-            values |= part()
-            print(f"{part.__name__}: {time.perf_counter() - began:.0f} s", file=sys.stderr)
-        names, units = zip(*(name.rsplit(", ", 1) for name in values), strict=True)
-        coordinates = {"name": list(names), "output_unit": ("name", list(units))}
-        data = xr.Dataset({"value": ("name", [*map(float, values.values())])}, coordinates)
-        make_folder(folder)
-        write_dataset(data.assign_attrs(attributes(TITLE, "")), path)
-    return read_dataset(path, "title", TITLE)
+    parts = (steps, runs, batches, scipy, files, exports, closed_loops, restarts, kinks, plans)
+    return measured_values(folder / FILE, TITLE, parts, anew)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""The Python interface: models, methods, simulations, studies, comparison, figures."""
+"""The Python interface: models, methods, simulations, studies, reports."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
 
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
     from vehiclemor.study.scenario import Scenario
+    from vehiclemor.study.status import StudyStatus
 
 RESULTS = Path("results")
 
@@ -274,6 +274,25 @@ def run_study(
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
 
 
+def status(study: str | Path, out: str | Path = RESULTS) -> dict[str, StudyStatus]:
+    """How far a study, or every one of a collection, is; nothing is computed.
+
+    Parameters
+    ----------
+    study, out
+        As of `run_study`.
+
+    Returns
+    -------
+    dict
+        Study name -> cells that are done, failed (with reasons) and to do, and the estimated
+        seconds left.
+    """
+    from vehiclemor.study.status import status_of
+
+    return status_of(str(file_path("study", study)), file_path("out", out))
+
+
 def plot(
     result: xr.Dataset | str | Path,
     kind: str = "histories",
@@ -313,74 +332,6 @@ def plot(
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
     return ResultAccessor(result).plot(kind, path, **at)
-
-
-def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:
-    """A comparison as a table; studies and timings that are missing are run first.
-
-    Parameters
-    ----------
-    what
-        `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
-        not seen, beside full-order integrators.  The name of a model: every method that fits it,
-        nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
-        name or TOML file: errors of every method over the grid, or on the protocol's inputs.
-    out
-        Results folder.
-    jobs
-        Number of processes.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
-        floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
-        that the paper doesn't have), measure, reason, threshold_source; described at
-        `comparison.rows.Row`, those of the others at `predictive_comparison`,
-        `model_comparison` and `study_comparison` in `vehiclemor.report`.
-    """
-    from vehiclemor.report.comparison.kinds import comparison
-
-    return comparison(what, file_path("out", out), count("jobs", jobs))
-
-
-def figures(
-    only: Sequence[str] = (),
-    out: str | Path = RESULTS,
-    results: str | Path = RESULTS,
-    jobs: int = 1,
-    *,
-    style: str = "",
-    dpi: int | None = None,
-) -> list[Path]:
-    """Regenerate figures of the paper from stored results; studies that are missing are run first.
-
-    Parameters
-    ----------
-    only
-        Figure names such as `6`, or `histories-`, `errors-`, `map-` or `pareto-` and the name of a
-        model; the paper's by default.
-    out
-        Folder of the figures.
-    results
-        Results folder.
-    jobs
-        Number of processes for missing studies.
-    style, dpi
-        Name or file of a Matplotlib style on top of the package's, and dots an inch of PNG files.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-    """
-    from vehiclemor.report.regenerate import regenerate_figures
-
-    folders = file_path("results", results), file_path("out", out)
-    chosen = [only] if isinstance(only, str) else only
-    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
-        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
-    return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)
 
 
 def write_report(

@@ -26,6 +26,20 @@ class FileError(VehiclemorError):
     """A file is missing, unreadable, foreign or can't be written."""
 
 
+class SpoiledError(FileError):
+    """A stored result is damaged, or not the one that belongs there: never read, made again.
+
+    Attributes
+    ----------
+    reason
+        Without the path.
+    """
+
+    def __init__(self, reason: str, path: object = "", mend: str = "") -> None:
+        super().__init__(f"{path}: {reason}{mend}" if path else reason)
+        self.reason = reason
+
+
 class MachineError(VehiclemorError):
     """The machine has failed, not the input: no space, no memory, a killed process.
 

@@ -1,15 +1,19 @@
 """Writing files whole: under a temporary name first, then moved into place."""
 
+import hashlib
 import os
+import platform
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from vehiclemor.errors import FileError, MachineError, machine_reason
 
-TEMPORARY = ".partial-"
+TEMPORARY, DAY = ".partial-", 86400.0
 
 
 def make_folder(folder: Path) -> None:
@@ -44,8 +48,8 @@ def not_written(path: Path, error: Exception) -> FileError | MachineError:
     return (MachineError if machine else FileError)(f"{path}: can't be written ({reason})")
 
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside `path`, then move it there.
+def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None = None) -> Path:
+    """Let `write` fill a temporary file in a folder, by default that of `path`; then move it there.
 
     A reader sees the old content or the new one, never a part.
 
@@ -53,6 +57,8 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     ----------
     write
         Called with the temporary path, which ends like `path`.
+    folder
+        On the same disk.
 
     Raises
     ------
@@ -61,7 +67,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     MachineError
         If the disk is full or fails.
     """
-    temporary = temporary_path(path)
+    temporary = temporary_path((folder or path.parent) / path.name)
     try:
         write(temporary)
         os.replace(temporary, path)
@@ -81,16 +87,29 @@ def write_text(path: Path, text: str) -> Path:
 
 def temporary_path(path: Path) -> Path:
     """Name beside `path` that no other process or thread writes under."""
-    owner = f"{os.getpid()}-{threading.get_ident()}"
+    owner = f"{os.getpid()}-{threading.get_ident()}-{_machine()}"
     return path.with_name(f"{TEMPORARY}{owner}-{path.name}")
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that are no more; finished files are never touched."""
+    """Remove temporary files of processes that are no more; finished files are never touched.
+
+    Of another machine's processes, which share the folder, nothing is known: theirs stay for a day.
+    """
     for path in folder.glob(f"{TEMPORARY}*"):
-        process = path.name.removeprefix(TEMPORARY).split("-")[0]
-        if process.isdigit() and not _alive(int(process)):
-            path.unlink(missing_ok=True)
+        process, _, machine, *_ = [*path.name.removeprefix(TEMPORARY).split("-"), "", ""]
+        with suppress(OSError):
+            if machine == _machine() and process.isdigit():
+                ended = not _alive(int(process))
+            else:
+                ended = time.time() - path.stat().st_mtime > DAY
+            if ended:
+                path.unlink()
+
+
+@cache
+def _machine() -> str:
+    return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
 
 
 def _alive(process: int) -> bool:

@@ -1,10 +1,12 @@
 """Where the data files are: inside an installed package, or beside `src` in a checkout."""
 
+from functools import cache
 from pathlib import Path
 
 from vehiclemor.errors import FileError
 
 
+@cache
 def data_folder() -> Path:
     """Folder with `parameters`, `published`, `studies`, `protocols` and `reference`.
 

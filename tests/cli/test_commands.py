@@ -15,7 +15,7 @@ import vehiclemor as vm
 from vehiclemor import api
 from vehiclemor.cli import main, progress
 from vehiclemor.study import run as study_run
-from vehiclemor.study.store import write_dataset
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.workers import Workers
 
 

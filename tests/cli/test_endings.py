@@ -113,14 +113,3 @@ def test_a_terminal_that_cannot_show_a_name_ends_no_study(study, tmp_path, monke
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
     sys.stdout.flush()
     assert shown.getvalue().startswith(rb"\u8eca: 6 cells, 8 grid points: 8 ok")
-
-
-def test_a_folder_in_the_place_of_a_cell_is_named(fails, study, tmp_path, capsys):
-    out = tmp_path / "out"
-    assert main(["run", str(study), "--out", str(out)]) == 0
-    capsys.readouterr()
-    (cell, *_) = (out / "cells").iterdir()
-    cell.unlink()
-    cell.mkdir()
-    (out / "studies" / "small.nc").unlink()
-    fails(["run", study, "--out", out], str(cell), "is a folder, not a result file")

@@ -1,14 +1,12 @@
 """Wrong input: one clear line on standard error, exit status 2, and nothing is lost."""
 
 import os
-import shutil
 import stat
 import sys
 from pathlib import Path
 
 import pytest
 
-from vehiclemor.cli import main
 from vehiclemor.resources import data_folder
 
 STUDY = """
@@ -151,26 +149,6 @@ def test_study_file_that_is_no_text(fails, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(bytes(range(256)))
     fails(["run", path], "UTF-8")
-
-
-def test_corrupt_and_foreign_cells_are_named_and_kept(fails, study, tmp_path, capsys):
-    path, out = study(), tmp_path / "results"
-    assert main(["run", str(path), "--out", str(out)]) == 0
-    capsys.readouterr()
-    (cell,) = (out / "cells").glob("*.nc")
-    complete = cell.read_bytes()
-    for damaged in (complete[: len(complete) // 2], b"", b"not netCDF at all"):
-        cell.write_bytes(damaged)
-        fails(["run", path, "--out", out], str(cell), "move it away")
-        assert cell.read_bytes() == damaged
-    cell.write_bytes(complete)
-    combined = out / "studies" / "mine.nc"
-    shutil.copy(combined, cell)
-    fails(["run", path, "--out", out], str(cell), "move it away")
-    cell.write_bytes(complete)
-    combined.write_text("my notes")
-    fails(["run", path, "--out", out], str(combined), "move it away")
-    assert combined.read_text() == "my notes"
 
 
 def test_output_folder_that_is_a_file(fails, study, tmp_path):

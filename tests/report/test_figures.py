@@ -1,7 +1,5 @@
 """Every figure as data: what its texts, lines and limits are."""
 
-from itertools import combinations
-
 import matplotlib
 import numpy as np
 import pytest
@@ -9,23 +7,21 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
-from matplotlib.text import Text
-from mpl_toolkits.mplot3d.art3d import Text3D
-from mpl_toolkits.mplot3d.proj3d import proj_transform
 
+from tests.report.figure_texts import check_texts
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.accessor import ResultAccessor
 from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.figures.error_map import luminance, two_digits
 from vehiclemor.report.figures.lines import panels
 from vehiclemor.report.figures.pareto import figure_pareto
-from vehiclemor.report.figures.perturbations import luminance, two_digits
-from vehiclemor.report.figures.result_plot import _outputs, plot_result
+from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.regenerate import left_out
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.store import write_dataset
 
 FREQUENCY, AMPLITUDE = np.linspace(0.7, 1.3, 7), np.linspace(0.7, 1.3, 7)
 SCHEMATICS = {"1", "5", "8"}
@@ -124,41 +120,9 @@ def drawn(results):
     return figures
 
 
-def texts_of(figure):
-    """All texts that are seen, with what they take of the canvas."""
-    axes = [
-        getattr(a, f"{name}axis")
-        for a in figure.axes
-        for name in "xyz"
-        if hasattr(a, name + "axis")
-    ]
-    every = {label for axis in axes for label in axis.get_ticklabels(which="both")}
-    ticks = [tick.label1 for axis in axes if axis.axes.axison for tick in axis._update_ticks()]
-    found = [text for text in figure.findobj(Text) if text not in every] + ticks
-    seen = [text for text in found if text.get_visible() and text.get_text().strip()]
-    for text in seen:
-        if isinstance(text, Text3D):
-            # Its place on the canvas is known only while it is drawn.
-            x, y, _ = proj_transform(*text.get_position_3d(), text.axes.get_proj())
-            Text.set_position(text, (x, y))
-    return [(text, Text.get_window_extent(text)) for text in seen]
-
-
 @pytest.mark.parametrize("name", FIGURES)
 def test_texts_are_on_the_canvas_and_apart(drawn, name):
     check_texts(drawn[name])
-
-
-def check_texts(figure):
-    texts = texts_of(figure)
-    canvas = figure.bbox.padded(1.0)
-    for text, box in texts:
-        assert canvas.x0 <= box.x0, text
-        assert canvas.y0 <= box.y0, text
-        assert box.x1 <= canvas.x1, text
-        assert box.y1 <= canvas.y1, text
-    for (one, first), (other, second) in combinations(texts, 2):
-        assert not first.padded(-1.0).overlaps(second.padded(-1.0)), (one, other)
 
 
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - SCHEMATICS))
@@ -356,13 +320,18 @@ def test_what_cannot_be_drawn_is_said(results, study, kind, words):
         plot_result(results[study].isel(rank=0), None, kind)
 
 
-def test_errors_over_one_axis_name_the_value_of_the_other(results):
+def test_errors_over_settings_have_whole_ticks_and_a_line_for_each_input(results):
     study = results["figure-14"].sel({"method": ["pod"]})
-    moved = study.assign_coords(frequency_factor=[2.0])
-    both = xr.concat([study.assign_coords(frequency_factor=[1.0]), moved], "frequency_factor")
-    figure = plot_result(both, None, "errors")
-    assert figure.get_suptitle().endswith("; frequency_factor 1.0")
-    assert all(float(tick).is_integer() for tick in figure.axes[0].get_xticks())
+    assert all(
+        tick.is_integer() for tick in plot_result(study, None, "errors").axes[0].get_xticks()
+    )
+    other = study.assign_coords(frequency_factor=[1.0])
+    other["rms_error"] = 0.1 * other["rms_error"]
+    figure = plot_result(xr.concat([other, study], "frequency_factor"), None, "errors")
+    assert figure.axes[-1].get_xlabel() == "frequency perturbation (%)"
+    (legend,) = figure.legends
+    ranks = {f"POD, rank {rank}" for rank in study["rank"].values}
+    assert ranks <= {text.get_text() for text in legend.get_texts()}
 
 
 def test_marks_of_rms_errors_are_named(results):
@@ -378,7 +347,7 @@ def test_full_order_alone_has_no_errors(results):
 
 def test_chosen_outputs_are_drawn_though_the_model_shows_others(results):
     point = results["figure-11"].isel(rank=0)
-    others = [name for name in point["output"].values if name not in _outputs(point)][:1]
+    others = [name for name in point["output"].values if name not in shown_outputs(point)][:1]
     figure = plot_result(point.sel(output=others))
     assert others == ["spindle_x"]
     assert figure.axes[0].get_ylabel().startswith("spindle displacement\nx")

@@ -1,6 +1,7 @@
 """The runner of protocols: nothing is chosen by what it is tested on."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from vehiclemor.study.plans.protocol_file import SpeedTarget
 from vehiclemor.study.plans.protocol_results import judged_part
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import training_run
+from vehiclemor.study.store import read_cell
 
 OTHER_TEST = '[[test]]\nmaneuver = "sine_travel"\npoints = [[2.0, 0.3]]\n'
 OUTSIDE = '\n[[outside]]\nmaneuver = "sine_travel"\npoints = [[1.0, 1.5]]\n'
@@ -48,12 +50,10 @@ def files(folder, name=""):
     """Content of the results of a set, or of all, without seconds, by name of the file."""
     labels = [s.label for s in load_protocol(str(folder / "small0.toml")).sets.get(name, ())]
     found = {}
-    for path in sorted((folder / "cells").glob("*.nc")):
-        with xr.open_dataset(path) as dataset:
-            if not name or list(dataset["scenario"].values) == labels:
-                found[path.name] = dataset.load().drop_vars(
-                    [*SECONDS, "offline_seconds"], errors="ignore"
-                )
+    for path in sorted((folder / "cells").glob("??/*")):
+        dataset = read_cell(folder, path.stem)
+        if not name or list(dataset["scenario"].values) == labels:
+            found[path.name] = dataset.drop_vars([*SECONDS, "offline_seconds"], errors="ignore")
     assert found
     return found
 
@@ -157,13 +157,27 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
     done, tmp_path, protocol_text, monkeypatch
 ):
     folder, study, dataset = done
-    written = {path: path.stat().st_mtime_ns for path in (folder / "cells").iterdir()}
+    written = {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")}
     again = run_studies(study, folder)["predictive-small0"]
-    assert {path: path.stat().st_mtime_ns for path in (folder / "cells").iterdir()} == written
+    assert {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")} == written
     xr.testing.assert_identical(again, dataset)
     monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
     run_studies(study_of(tmp_path, protocol_text), tmp_path, jobs=2)
     assert_same(files(folder), files(tmp_path))
+
+
+def test_a_protocol_that_was_renamed_is_the_same(done, tmp_path, monkeypatch):
+    folder, _, dataset = done
+    place = shutil.copytree(folder, tmp_path / "place")
+    (place / "small0.toml").rename(place / "renamed.toml")
+    (place / "mine.toml").write_text(f'title = "mine"\nprotocols = ["{place}/renamed.toml"]\n')
+    for name in ("workers.evaluate", "timing.timed_tests"):
+        monkeypatch.setattr(f"vehiclemor.study.{name}", None)
+    again = run_studies(str(place / "mine.toml"), place)["predictive-renamed"]
+    xr.testing.assert_equal(again, dataset)
+    for name in ("digest", "drawn_on", "content"):
+        assert again.attrs[name] == dataset.attrs[name]
+    assert (place / "studies" / "predictive-renamed.nc").exists()
 
 
 def test_the_best_candidate_that_is_stable_everywhere_is_chosen():

@@ -1,5 +1,6 @@
 """A study killed half-way resumes to the same dataset; the number of processes changes nothing."""
 
+import os
 import subprocess
 import sys
 import time
@@ -9,10 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from vehiclemor.files import TEMPORARY
+from vehiclemor.files import TEMPORARY, temporary_path
 from vehiclemor.study import workers
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import write_dataset
 
 STUDY = """
 title = "for the tests"
@@ -62,19 +63,20 @@ def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_pa
     process = subprocess.Popen([*command, "--out", str(tmp_path)], stdout=subprocess.PIPE)
     cells = tmp_path / "cells"
     deadline = time.monotonic() + 120
-    while len(list(cells.glob("[!.]*.nc"))) < 20:
+    while len(list(cells.glob("??/*"))) < 20:
         assert process.poll() is None, "the study ended before it could be killed"
         assert time.monotonic() < deadline
         time.sleep(0.01)
     process.kill()
     # Workers hold this end of the pipe for as long as they live, which was 330 s.
     process.communicate(timeout=60)
-    finished = {path.name: path.stat().st_mtime_ns for path in cells.glob("[!.]*.nc")}
-    (cells / f"{TEMPORARY}{process.pid}-left.nc").write_bytes(b"half a file")
+    finished = {path: path.stat().st_mtime_ns for path in cells.glob("??/*")}
+    half = temporary_path(cells / "left").name.replace(str(os.getpid()), str(process.pid))
+    (cells / half).write_bytes(b"half a file")
     resumed = run_studies(str(study), tmp_path)["small"]
     assert 20 <= len(finished) < 140
-    for name, written in finished.items():
-        assert (cells / name).stat().st_mtime_ns == written, "a finished cell was computed again"
+    for path, written in finished.items():
+        assert path.stat().st_mtime_ns == written, "a finished cell was computed again"
     assert not list(cells.glob(f"{TEMPORARY}*"))
     assert_same(uninterrupted, resumed)
 

@@ -1,12 +1,20 @@
 """Files are written whole or not at all."""
 
+import itertools
 import os
 from pathlib import Path
 
 import pytest
 
 from vehiclemor.errors import FileError, MachineError
-from vehiclemor.files import TEMPORARY, make_folder, remove_leftovers, write_text, write_whole
+from vehiclemor.files import (
+    TEMPORARY,
+    make_folder,
+    remove_leftovers,
+    temporary_path,
+    write_text,
+    write_whole,
+)
 
 # Above any process number of the kernel.
 NO_PROCESS = 2**30
@@ -59,8 +67,15 @@ def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_leftovers_of_dead_processes_alone_are_removed(tmp_path: Path) -> None:
-    names = [f"{TEMPORARY}{process}-1-a.nc" for process in (NO_PROCESS, os.getpid())]
-    for name in (*names, "a.nc"):
-        (tmp_path / name).touch()
+    mine = temporary_path(tmp_path / "a.nc")
+    pid, thread, machine, name = mine.name.removeprefix(TEMPORARY).split("-", 3)
+    owners = itertools.product((NO_PROCESS, pid), (machine, "x"))
+    left = [f"{TEMPORARY}{process}-{thread}-{where}-{name}" for process, where in owners]
+    for path in (*left, "a.nc"):
+        (tmp_path / path).touch()
     remove_leftovers(tmp_path)
-    assert names_in(tmp_path) == sorted([names[1], "a.nc"])
+    # Of another machine's processes nothing is known.
+    assert names_in(tmp_path) == sorted([*left[1:], "a.nc"])
+    os.utime(tmp_path / left[1], (0, 0))
+    remove_leftovers(tmp_path)
+    assert names_in(tmp_path) == sorted([*left[2:], "a.nc"])

@@ -9,6 +9,7 @@ from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
 from vehiclemor.cli.conversion import strict
+from vehiclemor.cli.convert import convert
 from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.export import export
@@ -20,6 +21,7 @@ from vehiclemor.cli.report import report
 from vehiclemor.cli.run import run
 from vehiclemor.cli.show import show
 from vehiclemor.cli.simulate import simulate
+from vehiclemor.cli.status import status
 from vehiclemor.resources import handbook_folder
 
 app = App(
@@ -38,11 +40,13 @@ COMMANDS = {
     "simulate": simulate,
     "plot": plot,
     "run": run,
+    "status": status,
     "compare": compare,
     "leaderboard": leaderboard,
     "figures": figures,
     "report": report,
     "export": export,
+    "convert": convert,
     "cite": cite,
 }
 for name, command in COMMANDS.items():

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from vehiclemor import api
 from vehiclemor.cli.exit_status import MISSED
 from vehiclemor.cli.progress import shown_progress
+from vehiclemor.cli.table import print_json
 
 
 def compare(
@@ -35,13 +36,14 @@ def compare(
     jobs
         Number of processes for missing studies.
     """
-    with shown_progress():
-        rows = api.compare(what, out, jobs)
-    if json_output:
-        print(rows.to_json(orient="records", indent=2))
-    else:
-        from vehiclemor.report.comparison.kinds import comparison_text
+    from vehiclemor.report.comparison.kinds import compare as compared
+    from vehiclemor.report.comparison.kinds import comparison_text
 
+    with shown_progress():
+        rows = compared(what, out, jobs)
+    if json_output:
+        print_json(rows)
+    else:
         print(comparison_text(what, rows, out))
     # A protocol that a model has by default, and a grid, judge nothing.
     judged = what not in api.models() and "verdict" in rows

@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from vehiclemor import api
+from vehiclemor.cli.table import print_json
 
 
 def leaderboard(
@@ -31,7 +32,7 @@ def leaderboard(
 
     board = ranked(out)
     if json_output:
-        print(board.to_json(orient="records", indent=2))
+        print_json(board)
     elif len(board):
         print(leaderboard_text(board.to_dict(orient="records")))
     for path, reason in board.attrs["left_out"].items():

@@ -47,7 +47,7 @@ def result_file(option: str, path: Path) -> Path:
     InputError, FileError
         If it can't be written, or what stands there is something else.
     """
-    from vehiclemor.study.store import read_dataset
+    from vehiclemor.study.netcdf_file import read_dataset
 
     if _exists(option, path):
         read_dataset(path, "source", "vehiclemor")

@@ -46,7 +46,7 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
         count = Counter(str(status) for status in dataset["status"].values.ravel())
         counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
         places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
-        print(wrapped(f"{name}: {places}; {out / 'studies' / f'{name}.nc'}", 0, 2))
+        print(wrapped(f"{name}: {places}; {dataset.encoding['source']}", 0, 2))
         errors += count["error"]
     print(f"{time.perf_counter() - began:.1f} s")
     if errors:

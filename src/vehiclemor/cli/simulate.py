@@ -105,7 +105,7 @@ def _settings(given: Sequence[str]) -> dict[str, Any]:
 
 def _keep(dataset: xr.Dataset, out: Path | None, picture: Path | None) -> None:
     if out is not None:
-        from vehiclemor.study.store import write_dataset
+        from vehiclemor.study.netcdf_file import write_dataset
 
         write_dataset(dataset, out)
         print(f"written: {out}")

@@ -1,8 +1,31 @@
-"""Tables of text on the terminal: every column but the first is wrapped where needed."""
+"""Tables on the terminal: as text, every column but the first wrapped where needed; as JSON."""
 
+from __future__ import annotations
+
+import json
+import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from vehiclemor.report.printing import width
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def print_json(table: pd.DataFrame) -> None:
+    """Print rows as JSON with all digits; what is missing or infinite is null.
+
+    (`DataFrame.to_json` rounds to ten places behind the point: errors would lose their digits.)
+    """
+    plain = [
+        {key: _finite(value) for key, value in row.items()} for row in table.to_dict("records")
+    ]
+    print(json.dumps(plain, indent=2))
+
+
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_table(rows: Sequence[Mapping[str, object]]) -> None:

@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.kernel_statements import KernelText
 from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.llvm_kernels import kernel_module
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.codegen.vector_statements import NAMES
 from vehiclemor.reduction.methods.path_map import PathMapModel
@@ -37,6 +39,8 @@ def check(part: Any) -> None:
         case Kernels():
             for source in part.sources.values():
                 _require(not WHOLE_VECTORS.search(source.text), f"kernel {source.name}")
+                # Whatever is no straight-line arithmetic is found now, not at the first run.
+                kernel_module([KernelText(source.text)])
         case Features():
             _check_features(part)
         case ReducedVehicle():

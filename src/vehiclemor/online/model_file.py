@@ -27,12 +27,12 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.input_range import InputRange
 from vehiclemor.study.method_settings import Settings, for_method
+from vehiclemor.study.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.study.provenance import attributes, code_digest
 from vehiclemor.study.scenario import parameters_of
-from vehiclemor.study.store import INTEGRITY, opened, write_dataset
 
 # Of the layout of these files.
-SCHEMA = 1
+SCHEMA = 2
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
 # What is taken apart.
@@ -40,6 +40,8 @@ PARTS = ("reduced", "known")
 # Differences of what a model's equations give that rounding explains: relative, and as part of the
 # largest number.
 SAME, ROUNDING = 1e-8, 1e-12
+# Length (s) of the step by which reduced models are known.
+STEP = 0.01
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,8 @@ def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
     variables: dict[str, Any] = {
         name: ((), json.dumps(text)) for name, text in zip(TEXTS, texts, strict=True)
     }
-    for name, array in (writer.arrays | {"fingerprint": fingerprint(model)}).items():
+    prints = {"fingerprint": fingerprint(model), "response": response(model, saved.reduced)}
+    for name, array in (writer.arrays | prints).items():
         dimensions = [f"{name}_{axis}" for axis in range(array.ndim)]
         variables[name] = dimensions, array, {}, {"zlib": True, "_FillValue": None}
     described = attributes(
@@ -137,6 +140,8 @@ def read(path: Any) -> Saved:
         checked_fit(method, made["reduced"])
         if not isinstance(made["known"], InputRange):
             raise TypeError(f"known is {quoted(made['known'])}, no InputRange")
+        if not _alike(stored["response"], response(model, made["reduced"])):
+            raise FileError(f"{method} makes something else of these numbers")
         return Saved(model, method, settings, tuple(training), **made)
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
@@ -153,8 +158,23 @@ def fingerprint(model: Model) -> np.ndarray:
     return np.concatenate(parts)
 
 
+def response(model: Model, reduced: Any) -> np.ndarray:
+    """What a reduced model gives after one step, full states too; none if it can't be stepped.
+
+    Equal for equal models, whatever version of this package has made them.
+    """
+    if not hasattr(reduced, "state_space"):
+        return np.empty(0)
+    space, u = reduced.state_space, 1e-3 * np.cos(np.arange(len(model.inputs)))
+    try:
+        state = space.step(space.begin(model.starts[0], u), u, None, STEP, 0.0)
+        return np.concatenate([state, space.full_states(state[None], u[None])[0]])
+    except VehiclemorError:
+        return np.empty(0)
+
+
 def _alike(then: np.ndarray, now: np.ndarray) -> bool:
-    rounding = ROUNDING * np.abs(now).max()
+    rounding = ROUNDING * np.abs(now).max(initial=0.0)
     return then.shape == now.shape and np.allclose(then, now, SAME, rounding)
 
 
@@ -167,7 +187,7 @@ def _model(name: str, parameters: Mapping[str, Any]) -> Model:
 
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a file that is whole and of this version.
+    """Variables and attributes of a file that is whole and of this format.
 
     Raises
     ------
@@ -178,10 +198,9 @@ def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:
             raise FileError(f"{path}: not a saved model")
-        for name, here in (("saved_model", SCHEMA), ("vehiclemor", version("vehiclemor"))):
-            if attrs.get(name) != here:
-                was = f"{name} {shortened(str(attrs.get(name)))} where this is {here}"
-                raise FileError(f"{path}: saved by another version, {was}; reduce the model again")
+        if attrs["saved_model"] != SCHEMA:
+            was = f"format {shortened(str(attrs['saved_model']))} where this is {SCHEMA}"
+            raise FileError(f"{path}: saved by another version, {was}; reduce the model again")
         return {name: variable[...] for name, variable in file.variables.items()}, attrs
 
 

@@ -146,7 +146,8 @@ class Reader:
                 return Kernels(kernel_sources(text))
             case {"class": name, "fields": fields}:
                 made = named(name)
-                if set(_fields(made)) != set(fields):
+                # What has a default may have come since.
+                if not _required(made) <= set(fields) <= set(_fields(made)):
                     raise ValueError(f"{name} has other fields here")
                 return made(**{key: self.value(v, f"{place}.{key}") for key, v in fields.items()})
             case {"tuple": items}:
@@ -208,6 +209,15 @@ def _fields(kind: Any) -> tuple[str, ...]:
     if dataclasses.is_dataclass(kind):
         return tuple(f.name for f in dataclasses.fields(kind) if f.init)
     return getattr(kind, "_fields", ()) if issubclass(kind, tuple) else ()
+
+
+def _required(kind: type) -> set[str]:
+    """Names of those without a default."""
+    if not dataclasses.is_dataclass(kind):
+        return {*_fields(kind)} - {*getattr(kind, "_field_defaults", ())}
+    missing = dataclasses.MISSING
+    given = (f for f in dataclasses.fields(kind) if f.init)
+    return {f.name for f in given if f.default is missing and f.default_factory is missing}
 
 
 def _name(value: Any, definition: Any, place: str) -> str:

@@ -30,7 +30,11 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         solver), errors, `offline_us`, and the number of runs after which a reduced model has paid
         for its training against either baseline (missing where it never does).
     """
-    data = _timing(model, folder)
+    return cost_rows(model, timing_of(model, folder))
+
+
+def cost_rows(model: str, data: xr.Dataset) -> pd.DataFrame:
+    """The cost table of a stored timing of a model."""
     rows = [
         _row(data.sel(start=start, case=case), list(component("model", model).shown.counts))
         for start in data["start"].values
@@ -39,7 +43,8 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _timing(model: str, folder: Path) -> xr.Dataset:
+def timing_of(model: str, folder: Path) -> xr.Dataset:
+    """Stored timing of the cases of a model, measured first if it is missing."""
     cases = component("model", model).shown.timing
     return timed_model(build(model), cases, folder, f"timing-{model}")
 
@@ -80,7 +85,7 @@ def costs_text(model: str, folder: Path, brief: bool = False) -> str:
 
     A brief one is of the published start alone.
     """
-    data, table = _timing(model, folder), cost_table(model, folder)
+    data, table = timing_of(model, folder), cost_table(model, folder)
     definition = component("model", model)
     counts, outputs = definition.shown.counts, definition.shown.printed_outputs
     baseline, strongest = definition.shown.baselines

@@ -36,6 +36,8 @@ LABELS = {
 
 # Words of an axis that leave no room for more beside them.
 LONG = 16
+# Of a label beside a low panel in one line.
+LONGEST = 26
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
@@ -73,5 +75,6 @@ def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
 
 
 def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> str:
-    """An error of an output, its symbol and unit, such as `RMS error`."""
-    return f"{kind} of {label_of(output).symbol} ({unit or unit_of(dataset, output)})"
+    """An error of an output, its symbol and unit, such as `RMS error`; long ones in two lines."""
+    label = f"{kind} of {label_of(output).symbol} ({unit or unit_of(dataset, output)})"
+    return label if len(label.replace("$", "")) <= LONGEST else label.replace(" of ", " of\n", 1)

@@ -14,8 +14,8 @@ from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.report.predictive.rows import STUDY, draws_of, method_rows, protocol_of
 from vehiclemor.report.printing import Line, fixed, short, table_text, terms, wrapped
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.store import read_dataset
 
 Row = dict[str, Any]
 RULE = "fewest silent misses first, then fewest misses, then the largest speed-up of whole calls"
@@ -63,7 +63,8 @@ def leaderboard(out: str | Path = "results") -> pd.DataFrame:
     left_out: dict[str, str] = {}
     for path in files:
         try:
-            rows += _rows_of(read_dataset(path, "source", "vehiclemor"), folder)
+            dataset = read_dataset(path, "source", "vehiclemor")
+            rows += [{**row, "study": path.stem} for row in _rows_of(dataset, folder)]
         except FileError as error:
             left_out[str(path)] = str(error).removeprefix(f"{path}: ")
         except KeyError as error:
@@ -77,7 +78,7 @@ def leaderboard(out: str | Path = "results") -> pd.DataFrame:
 
 def _rows_of(dataset: xr.Dataset, folder: Path) -> list[Row]:
     rows = method_rows(dataset, protocol_of(dataset), draws_of(dataset, folder))
-    head = {name: str(dataset.attrs[name]) for name in ("study", "title", "drawn_on")}
+    head: Row = {name: str(dataset.attrs[name]) for name in ("title", "drawn_on")}
     head["sealed"] = bool((dataset["scenario_set"] == "drawn").any())
     return [{**head, "place": n, **row} for n, row in enumerate(sorted(rows, key=rank), 1)]
 

@@ -35,7 +35,7 @@ class Footnotes:
         """The letters of phrases, such as `[a][c]`; an empty one has none."""
         for phrase in phrases:
             if phrase:
-                self._letters.setdefault(phrase, _letter(len(self._letters)))
+                self._letters.setdefault(phrase, alphabetic(len(self._letters)))
         return "".join(f"[{self._letters[phrase]}]" for phrase in phrases if phrase)
 
     def text(self) -> str:
@@ -45,10 +45,10 @@ class Footnotes:
         )
 
 
-def _letter(index: int) -> str:
-    """A, b ... z, aa, ab ..."""
+def alphabetic(index: int) -> str:
+    """A letter for each index: a, b ... z, aa, ab ..."""
     alphabet = string.ascii_lowercase
-    head = _letter(index // len(alphabet) - 1) if index >= len(alphabet) else ""
+    head = alphabetic(index // len(alphabet) - 1) if index >= len(alphabet) else ""
     return head + alphabet[index % len(alphabet)]
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.study_file import FACTORS, load_studies, study_path
-from vehiclemor.study.store import read_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -65,6 +65,7 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
             )
 
 
+@lru_cache(maxsize=64)
 def check_resolved(maneuver: Maneuver) -> None:
     """Raise `InputError` if the output times are too far apart to show the inputs.
 

@@ -21,12 +21,14 @@ from vehiclemor.codegen.object_cache import asking, cache_folder, held, packed, 
 from vehiclemor.codegen.once import once
 from vehiclemor.errors import FileError, InputError, MachineError, one_line
 from vehiclemor.files import probe_folder, temporary_path, write_text
+from vehiclemor.study.cell_file import encoded
 from vehiclemor.study.evaluate import model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.provenance import code_digest
-from vehiclemor.study.store import write_cell
+from vehiclemor.study.store import write_encoded
 from vehiclemor.study.workers import (
     KILLED,
+    LARGEST,
     Done,
     Engine,
     Groups,
@@ -44,8 +46,12 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LOCAL = "local"
+# Key -> content of a cell's file, and whether a bug has ended it: what the driver is to write.
+Sent = dict[str, tuple[bytes, bool]]
 # Seconds: to reach a scheduler, until the driver has answered, between two looks at who works.
 REACH, ANSWER, LOOK = 10.0, 20.0, 1.0
+# Ctrl-C reaches all processes of a terminal, and the driver ends the workers.
+NO_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 # Packages that must be the same everywhere; that of Python is its first two numbers.
 SAME = ("python", "distributed")
 _LOG = logging.getLogger("vehiclemor")
@@ -81,7 +87,11 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
         import distributed
     except ImportError:
         raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
+    from distributed.utils import silence_logging_cmgr
+
     with ExitStack() as stack:
+        # What matters is said in one line; it would add a traceback for each lost connection.
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))
         address: Any = scheduler
         if scheduler == LOCAL:
             address = stack.enter_context(
@@ -90,36 +100,62 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
                     threads_per_worker=1,
                     processes=True,
                     dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.ERROR,
+                    silence_logs=logging.CRITICAL,
+                    preload=[NO_INTERRUPT],
                     env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"},
                 )
             )
         client = stack.enter_context(_client(address))
         topic = f"vehiclemor-{uuid.uuid4().hex}"
-        client.subscribe_topic(topic, partial(_answer, client, topic))
-        yield partial(evaluated_by_cluster, client=client, topic=topic)
+        asked: set[str] = set()
+        client.subscribe_topic(topic, partial(_answer, client, topic, asked))
+        try:
+            yield partial(evaluated_by_cluster, client=client, topic=topic)
+        finally:
+            for name in asked:
+                distributed.Variable(name, client=client).delete()
 
 
 @contextmanager
 def _client(address: Any) -> Iterator[Client]:
     from distributed import Client
 
+    if isinstance(address, str):
+        _knock(address)
     with warnings.catch_warnings():
         # What differs is an error below.
         warnings.simplefilter("ignore")
-        try:
-            client = Client(address, timeout=REACH, set_as_default=False)
-        except (OSError, ValueError, TypeError, ImportError) as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
+        client = Client(address, timeout=REACH, set_as_default=False)
     with client:
         _same_versions(client)
         number = sum(client.nthreads().values())
         work = f"{number} places for cells" if number else "no worker yet, cells wait for the first"
-        _LOG.info(
-            "scheduler %s: %s; dashboard %s", client.scheduler.address, work, client.dashboard_link
-        )
+        at, dashboard = client.scheduler.address, client.dashboard_link
+        _LOG.info("scheduler %s: %s; dashboard %s", at, work, dashboard)
         yield client
+
+
+def _knock(address: str) -> None:
+    """Raise `InputError` if there is no scheduler: a client that fails hangs when it is deleted."""
+    import asyncio
+    from concurrent.futures import ThreadPoolExecutor
+
+    from distributed.core import connect
+    from distributed.security import Security
+
+    async def knock() -> None:
+        arguments = Security().get_connection_args("client")
+        # What is no scheduler may accept the connection, and never answer.
+        connection = await asyncio.wait_for(connect(address, timeout=REACH, **arguments), REACH + 1)
+        connection.abort()
+
+    try:
+        # A notebook has a loop of its own in this thread.
+        with ThreadPoolExecutor(1) as other:
+            other.submit(lambda: asyncio.run(knock())).result()
+    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
+        reason = " ".join(str(error).split()) or f"no answer in {REACH:g} s"
+        raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
 
 
 def _same_versions(client: Client) -> None:
@@ -143,33 +179,42 @@ def _versions(entry: dict[str, Any] | None) -> dict[str, str]:
     return found | {"python": ".".join(found["python"].split(".")[:2])}
 
 
-async def _answer(client: Client, topic: str, event: tuple[float, str]) -> None:
+async def _answer(client: Client, topic: str, asked: set[str], event: tuple[float, str]) -> None:
     """Give a worker a file of this process's cache; nothing if it has none."""
     import asyncio
 
     from distributed import Variable
 
     name = event[1]
+    shared = f"{topic} {name}"
+    asked.add(shared)
     content = await asyncio.to_thread(held, name)
-    answer = b"" if content is None else packed(name, content)
-    await Variable(f"{topic} {name}", client=client).set(answer)
+    await Variable(shared, client=client).set(b"" if content is None else packed(name, content))
 
 
 def evaluated_by_cluster(
     groups: Groups,
     folder: Path,
+    alone: bool = False,
+    *,
     client: Client,
     topic: str,
-    work: Callable[..., tuple[Done, dict[str, xr.Dataset]]] | None = None,
+    work: Callable[..., tuple[Done, Sent]] | None = None,
 ) -> Generator[Done, None, None]:
-    """What `evaluate_and_store` gives for each batch, by the workers of a cluster."""
+    """What `evaluate_and_store` gives for each batch, by the workers of a cluster.
+
+    Parameters
+    ----------
+    alone
+        Whether each group is a batch of its own, so that one that kills workers spoils no other.
+    """
     from distributed.cfexecutor import ClientExecutor
 
     folder = folder.absolute()
     token = temporary_path(folder / "cells" / "token")
     place = Place(folder, token, uuid.uuid4().hex, topic)
     pool = ClientExecutor(client, pure=False)
-    seen, number = 0.0, 0
+    seen, number, most = 0.0, 0, 1 if alone else LARGEST
 
     def submit(batch: list[Experiment]) -> Future[Timed]:
         return pool.submit(timed_batch, work or on_worker, batch, place)
@@ -182,9 +227,9 @@ def evaluated_by_cluster(
 
     try:
         write_text(token, place.text)
-        for done, results in in_batches(groups, submit, places, _taken):
-            for key, dataset in results.items():
-                write_cell(dataset, folder, key)
+        for done, results in in_batches(groups, submit, places, _taken, most):
+            for key, (content, broken) in results.items():
+                write_encoded(content, folder, key, broken=broken)
             yield done
     finally:
         pool.shutdown(wait=False)
@@ -215,21 +260,23 @@ def _taken(future: Future[Timed]) -> Timed:
 # On a worker
 
 
-def on_worker(
-    experiments: Sequence[Experiment], place: Place
-) -> tuple[Done, dict[str, xr.Dataset]]:
+def on_worker(experiments: Sequence[Experiment], place: Place) -> tuple[Done, Sent]:
     """Evaluate some experiments; gives their results too, if the driver is to write them."""
     with _turn(), asking(partial(_from_others, place.topic)):
         _same_source(experiments)
         if _sees(place):
             return evaluate_and_store(experiments, place.folder), {}
-        results: dict[str, xr.Dataset] = {}
-        return evaluated(experiments, results.__setitem__), results
+        results: Sent = {}
+
+        def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
+            results[key] = encoded(dataset, key, seconds), "error" in dataset["status"].values
+
+        return evaluated(experiments, keep), results
 
 
 @once
 def _turn() -> threading.Lock:
-    """Cells of one process take turns, with linear algebra on one thread: netCDF allows no two."""
+    """Cells of one process take turns: the limit of linear algebra is one for all its threads."""
     from threadpoolctl import threadpool_limits
 
     threadpool_limits(1)
@@ -250,7 +297,7 @@ def _sees(place: Place) -> bool:
 
 def _same_source(experiments: Sequence[Experiment]) -> None:
     """Raise `InputError` if results would be those of other source or another compiler."""
-    for e in experiments:
+    for e in {(e.model, e.method): e for e in experiments}.values():
         what = ""
         if code_digest(e.model, e.method) != e.code:
             what = "another version of vehiclemor, or of the package of"

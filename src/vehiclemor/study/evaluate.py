@@ -308,8 +308,8 @@ def _tested(
             trajectory = _sound(car, reduced, scenario, start)
             trajectory = warned(model, experiment, scenario, trajectory)
             return Outcome(trajectory, reference, estimate=_estimate(car, trajectory))
-        # The first run loads machine code and warms caches, another is timed.
-        if not fitted.warm:
+        # The first run loads machine code and warms caches, another is timed where it is compared.
+        if not fitted.warm and reference is not None:
             reduced.simulate(scenario.maneuver, start)
             fitted.warm = True
         trajectory = _sound(car, reduced, scenario, start)
@@ -331,7 +331,8 @@ def _tested(
 
 def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
     """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
-    if run.trust and run.trust.reason:
+    # What has learned from nothing is the full order of a protocol's second runs.
+    if (run.trust and run.trust.reason) or not experiment.training:
         return run
     method: Method = component("method", experiment.method)
     known = input_range(model, trained_for(experiment.training, test))

@@ -10,7 +10,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.provenance import code_digest
-from vehiclemor.study.scenario import Scenario, parameters_of
+from vehiclemor.study.scenario import Scenario, Values, parameters_of, scenario_text
 
 Keep = Literal["trajectories", "metrics", "errors"]
 
@@ -42,20 +42,24 @@ class Experiment(ShortRepr):
     test: tuple[Scenario, ...]
     keep: Keep = "trajectories"
 
-    @property
+    @cached_property
     def configuration(self) -> str:
         """Canonical JSON text of the experiment."""
-        names = self.__dataclass_fields__
-        content = {name: getattr(self, name) for name in names} | {
-            "training": [scenario.content for scenario in self.training],
-            "test": [scenario.content for scenario in self.test],
-        }
-        return json.dumps(content, sort_keys=True)
+        texts = {name: _text(getattr(self, name)) for name in sorted(self.__dataclass_fields__)}
+        return "{" + ", ".join(f'"{name}": {text}' for name, text in texts.items()) + "}"
 
     @cached_property
     def key(self) -> str:
         """Hash of the configuration: the name of the result's file."""
         return hashlib.sha256(self.configuration.encode()).hexdigest()[:20]
+
+
+def _text(value: object) -> str:
+    if isinstance(value, Values):
+        return value.text
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(scenario_text, value))}]"
+    return json.dumps(value) if isinstance(value, str) else json.dumps(value, sort_keys=True)
 
 
 def make_experiment(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from contextlib import nullcontext
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,20 +13,24 @@ from vehiclemor.arguments import count, within
 from vehiclemor.errors import InputError
 from vehiclemor.progress import telling
 from vehiclemor.study.cluster import LOCAL, reached
+from vehiclemor.study.netcdf_file import Parts
 from vehiclemor.study.plans.grid import Grid, expand
-from vehiclemor.study.plans.grid_results import cells_digest, grid_dataset
+from vehiclemor.study.plans.grid_results import cells_digest, combined
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import StudyFile, file_as_stored, studies_and_files
-from vehiclemor.study.store import result_path, stored
+from vehiclemor.study.plans.study_file import StudyFile, owner, studies_and_files
+from vehiclemor.study.progress import tell
+from vehiclemor.study.store import cell_path, combined_path, stored
 from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_LOG = logging.getLogger("vehiclemor")
 MOST_JOBS = 1024
-# Points of a grid that take their time before the first is computed.
-LARGE = 10_000
+# A grid of so many points is told of before it is expanded; and so many experiments are made and
+# given to workers at a time.
+LARGE, AT_ONCE = 10_000, 5_000
 
 
 def run_studies(
@@ -46,8 +52,8 @@ def run_studies(
     Returns
     -------
     dict
-        Study name -> combined dataset, stored as `studies/<name>.nc` too; of a protocol the name
-        is `predictive-<protocol>`.
+        Study name -> combined dataset, stored too, see `combined_path`; of a protocol the name is
+        `predictive-<protocol>`.
     """
     within("jobs", count("jobs", jobs), (1, MOST_JOBS))
     if jobs > 1 and scheduler not in ("", LOCAL):
@@ -58,24 +64,32 @@ def run_studies(
     with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
         for path, grid in grids:
-            cells = grid.unique
-            workers = Workers(grid.name, folder, jobs, elsewhere)
-            workers([[cell] for cell in cells.values()])
+            of = owner(grid.name, path, grid.definition, folder)
+            workers = Workers(grid.name, folder, jobs, elsewhere, set(grid.unique))
             results[grid.name] = stored(
-                folder / "studies" / f"{grid.name}.nc",
+                combined_path(folder, of),
                 "cells",
                 cells_digest(grid),
-                partial(grid_dataset, grid, folder),
-                [result_path(folder, key) for key in cells],
-                file_as_stored(path, folder),
+                partial(_combined, grid, workers),
+                lambda grid=grid: (cell_path(folder, key) for key in grid.unique),
+                of,
             )
+            tell(grid.name, len(grid.unique), len(grid.unique))
     return results
 
 
+def _combined(grid: Grid, workers: Workers) -> xr.Dataset | Parts:
+    experiments = iter(grid.unique.values())
+    while part := [[cell] for cell in islice(experiments, AT_ONCE)]:
+        workers(part)
+    return combined(grid, workers.folder)
+
+
 def _expanded(name: str, definition: StudyFile) -> Grid:
-    large = definition.points >= LARGE
-    with telling(f"{name}: a grid of {definition.points} points") if large else nullcontext():
+    if definition.points < LARGE:
+        return expand(name, definition)
+    _LOG.info("%s: %d grid points", name, definition.points)
+    with telling(f"{name}: checking all of them"):
         grid = expand(name, definition)
-        # Made here: the keys take most of the time.
-        assert grid.unique
-        return grid
+    _LOG.info("%s: %d cells; an interrupted run is resumed", name, len(grid.unique))
+    return grid

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,14 @@ Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
     """Parameters of a car from a table of them; of which the order does not matter."""
-    return tuple(
-        (name, float(value) if isinstance(value, int | float) else tuple(map(float, value)))
-        for name, value in sorted(table.items())
-    )
+    return tuple((name, _plain(value)) for name, value in sorted(table.items()))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as floats and lists as tuples; what is neither is refused where it is used."""
+    if isinstance(value, list | tuple):
+        return tuple(map(_plain, value))
+    return float(value) if isinstance(value, int) else value
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,13 @@ class Scenario:
         return input_hash(self.maneuver), self.start, self.speed, self.parameters
 
 
+# Of as many as are looked at by turns; settings vary over each of them.
+@lru_cache(maxsize=4096)
+def scenario_text(scenario: Scenario) -> str:
+    """Canonical JSON text of a scenario's content."""
+    return json.dumps(scenario.content, sort_keys=True)
+
+
 @lru_cache(maxsize=1024)
 def input_hash(maneuver: Maneuver) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
@@ -104,10 +115,19 @@ def own_speed(model: Model) -> float | None:
     return None if entry is None else float(np.asarray(entry.value))
 
 
+class Values(dict[str, Any]):
+    """Values by name that many experiments share: their canonical JSON text is made once."""
+
+    @cached_property
+    def text(self) -> str:
+        """Canonical JSON text."""
+        return json.dumps(self, sort_keys=True)
+
+
 @lru_cache(maxsize=16)
-def parameters_of(model: Model) -> dict[str, Any]:
+def parameters_of(model: Model) -> Values:
     """Name -> value of a model's parameters, SI units."""
-    return {name: entry.value for name, entry in model.parameters.entries.items()}
+    return Values((name, entry.value) for name, entry in model.parameters.entries.items())
 
 
 def car_of(model: Model, scenario: Scenario) -> Model:

@@ -1,27 +1,49 @@
-"""Result files: one netCDF-4 file for each experiment, moved into place when complete.
+"""The results folder: a file for each cell, a netCDF file for each study.
 
-Each holds a hash of its content, which is checked whenever it is read.
+Files are written whole and moved into place.  What is not as it was written is set aside, named,
+and made again.
 """
 
 from __future__ import annotations
 
-import hashlib
+import logging
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from vehiclemor.errors import FileError, MachineError, machine_reason
-from vehiclemor.files import make_folder, probe_folder, remove_leftovers, write_whole
+import numpy as np
+
+from vehiclemor.errors import FileError, MachineError, SpoiledError, machine_reason
+from vehiclemor.files import (
+    make_folder,
+    not_written,
+    probe_folder,
+    remove_leftovers,
+    write_whole,
+)
+from vehiclemor.study import cell_file
+from vehiclemor.study.netcdf_file import (
+    LARGE,
+    Parts,
+    global_attributes,
+    opened_lazily,
+    read_dataset,
+    write_dataset,
+    write_parts,
+)
 
 if TYPE_CHECKING:
-    import netCDF4
-    import numpy as np
     import xarray as xr
 
-# Group of a result file with the hash of all that stands outside of it, and the ending of results
-# that the next run tries again.
-INTEGRITY, BROKEN = "integrity", ".error.nc"
+# Ending of results of a bug, which the next run tries again.
+BROKEN = f".error{cell_file.ENDING}"
+ASIDE = "set-aside"
+# Cells that are set aside are named up to this number.
+NAMED = 5
+_LOG = logging.getLogger("vehiclemor")
 
 
 def prepare_folder(folder: Path) -> None:
@@ -36,6 +58,15 @@ def prepare_folder(folder: Path) -> None:
     for part in (folder / "cells", folder / "studies"):
         make_folder(part)
         probe_folder(part)
+    _tell_of_older(folder / "cells")
+
+
+@cache
+def _tell_of_older(cells: Path) -> None:
+    """Name, once, what an older version has left: a netCDF file for each cell."""
+    if older := sum(1 for _ in cells.glob("*.nc")):
+        text = "%s: %d cells of an older version (*.nc) are left alone; what is missing is computed"
+        _LOG.info(text, cells, older)
 
 
 def remove_partial(folder: Path) -> None:
@@ -47,12 +78,12 @@ def remove_partial(folder: Path) -> None:
 
 def cell_path(folder: Path, key: str) -> Path:
     """File of the experiment with this key."""
-    return folder / "cells" / f"{key}.nc"
+    return folder / "cells" / key[:2] / f"{key}{cell_file.ENDING}"
 
 
 def broken_path(folder: Path, key: str) -> Path:
     """File of the experiment with this key, where a bug has ended it: the next run tries again."""
-    return folder / "cells" / f"{key}{BROKEN}"
+    return folder / "cells" / key[:2] / f"{key}{BROKEN}"
 
 
 def result_path(folder: Path, key: str) -> Path:
@@ -61,159 +92,231 @@ def result_path(folder: Path, key: str) -> Path:
     return path if path.exists() else broken_path(folder, key)
 
 
-def write_cell(dataset: xr.Dataset, folder: Path, key: str) -> None:
-    """Store the result of an experiment; one of a bug apart from those that are finished."""
-    broken = "error" in dataset["status"].values
-    write_dataset(dataset, (broken_path if broken else cell_path)(folder, key))
+def write_cell(dataset: xr.Dataset, folder: Path, key: str, seconds: float = np.nan) -> None:
+    """Store the result of an experiment, and the seconds that it took."""
+    broken = "error" in dataset.variables["status"].values
+    write_encoded(cell_file.encoded(dataset, key, seconds), folder, key, broken=broken)
+
+
+def write_encoded(content: bytes, folder: Path, key: str, *, broken: bool) -> None:
+    """Store the content of a cell's file; that of a bug apart from those that are finished."""
+    path = (broken_path if broken else cell_path)(folder, key)
+
+    def write(temporary: Path) -> None:
+        if not path.parent.is_dir():
+            path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_bytes(content)
+
+    # Where parts of files are looked for there are no other files.
+    write_whole(path, write, folder / "cells")
     if not broken:
         broken_path(folder, key).unlink(missing_ok=True)
 
 
-def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a dataset as a whole file."""
-    import netCDF4
-    from xarray.backends import NetCDF4DataStore
-
-    def write(temporary: Path) -> None:
-        try:
-            with netCDF4.Dataset(temporary, "w") as file:
-                dataset.dump_to_store(NetCDF4DataStore(file))
-                file.createGroup(INTEGRITY).sha256 = _digest(file)
-        except (OSError, RuntimeError):
-            # The library hides the reason; plain writing of as much as there is tells it.
-            temporary.write_bytes(bytes(dataset.nbytes + (1 << 16)))
-            raise
-
-    try:
-        write_whole(path, write)
-    except RuntimeError as error:
-        raise FileError(f"{path}: can't be written ({error})") from None
-
-
-def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
-    """Read a result file of this package into memory.
-
-    Parameters
-    ----------
-    attribute, expected
-        Global attribute that tells whose file it is, and its value.
+def read_cell(folder: Path, key: str) -> xr.Dataset:
+    """Result of an experiment.
 
     Raises
     ------
     FileError
-        If the file is missing, corrupt, or not the expected one; it is left as it is.
+        If it is missing; `SpoiledError` if it is not what was written.
     """
-    import xarray as xr
-    from xarray.backends import NetCDF4DataStore
-
-    with _opened(path, attribute, expected) as file:
-        file.set_auto_maskandscale(True)
-        return xr.open_dataset(NetCDF4DataStore(file)).load()
+    with _found(folder, key) as content:
+        return cell_file.dataset_of(content, key)
 
 
-def read_arrays(path: Path, attribute: str, expected: str) -> dict[str, np.ndarray]:
-    """Arrays of a result file by name; as `read_dataset`, but three times faster."""
-    with _opened(path, attribute, expected) as file:
-        return {name: variable[...] for name, variable in file.variables.items()}
+def read_arrays(folder: Path, key: str) -> dict[str, np.ndarray]:
+    """Arrays of a result by name; as `read_cell`, but several times faster."""
+    with _found(folder, key) as content:
+        return cell_file.arrays_of(content, key)
 
 
-@contextmanager
-def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Dataset]:
-    """A result file that is whole and the expected one."""
-    with opened(path, "result file", "; move it away and run again") as file:
-        if getattr(file, attribute, None) != expected:
-            raise FileError(
-                f"{path}: not the result that belongs here ({attribute} is not {expected}); "
-                f"move it away and run again"
-            )
-        yield file
+def cell_end(folder: Path, key: str) -> tuple[cell_file.End, bool]:
+    """How an experiment has ended, and whether it is finished; errors as of `read_cell`."""
+    path = result_path(folder, key)
+    try:
+        return cell_file.end_of(path, key), not path.name.endswith(BROKEN)
+    except OSError as error:
+        raise _unreadable(path, error) from None
 
 
 @contextmanager
-def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
-    """A netCDF file that is whole.
+def _found(folder: Path, key: str) -> Iterator[bytes]:
+    path = result_path(folder, key)
+    try:
+        yield _content(path)
+    except SpoiledError as error:
+        raise SpoiledError(error.reason, path, "; run again") from None
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: OSError) -> FileError | MachineError:
+    if isinstance(error, IsADirectoryError):
+        return SpoiledError("is a folder, not a result file")
+    if isinstance(error, FileNotFoundError):
+        return FileError(f"{path}: no such result file; run again")
+    machine = machine_reason(error)
+    kind = MachineError if machine else FileError
+    return kind(f"{path}: can't be read ({machine or error.strerror})")
+
+
+def finished_cells(folder: Path, keys: Iterable[str]) -> set[str]:
+    """Those of some experiments that are stored; cells that are not as written are set aside."""
+    finished, spoiled = set(), 0
+    for key in keys:
+        path = cell_path(folder, key)
+        if not path.exists():
+            continue
+        try:
+            cell_file.check(_content(path), key)
+            finished.add(key)
+        except SpoiledError as error:
+            spoiled += 1
+            set_aside(path, folder / "cells", error.reason, quiet=spoiled > NAMED)
+    if spoiled > NAMED:
+        _LOG.warning("%s: %d such cells in all", folder / "cells" / ASIDE, spoiled)
+    return finished
+
+
+def set_aside(path: Path, part: Path, reason: str, *, quiet: bool = False) -> None:
+    """Move what is not as it was written out of the way, and name it.
 
     Parameters
     ----------
-    kind, mend
-        What an error calls it, and what it tells to do.
+    part
+        The folder `cells` or `studies`.
+
+    Raises
+    ------
+    VehiclemorError
+        If it can't be moved.
     """
-    import netCDF4
-
-    if not path.is_file():
-        what = f"is a folder, not a {kind}" if path.exists() else f"no such {kind}"
-        raise FileError(f"{path}: {what}")
+    target, number = part / ASIDE / path.name, 1
+    while target.exists():
+        target = part / ASIDE / f"{path.stem}-{(number := number + 1)}{path.suffix}"
+    make_folder(target.parent)
     try:
-        with netCDF4.Dataset(path) as file:
-            file.set_auto_maskandscale(False)
-            if INTEGRITY in file.groups and file[INTEGRITY].sha256 != _digest(file):
-                raise ValueError("what it holds is not what was written")
-            yield file
-    except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
-        if machine := machine_reason(error):
-            raise MachineError(f"{path}: can't be read ({machine})") from None
-        reason = error.strerror if isinstance(error, OSError) else None
-        detail = reason or str(error).splitlines()[0][:80]
-        detail = "damaged, or no netCDF-4 file" if "NetCDF:" in detail else detail
-        raise FileError(f"{path}: not a readable {kind} ({detail}){mend}") from None
+        os.replace(path, target)
+    except FileNotFoundError:
+        # Another process was quicker.
+        return
+    except OSError as error:
+        raise not_written(target, error) from None
+    if not quiet:
+        _LOG.warning("%s: %s; moved to %s, and computed again", path, reason, target)
 
 
-def _digest(file: netCDF4.Dataset) -> str:
-    """Hash of the variables and attributes of a file."""
-    import numpy as np
+class Owner(NamedTuple):
+    """The study that a combined dataset is of.
 
-    digest = hashlib.sha256()
-    for owner in (file, *file.variables.values()):
-        described = {name: str(owner.getncattr(name)) for name in sorted(owner.ncattrs())}
-        digest.update(repr(described).encode())
-    file.set_auto_maskandscale(False)
-    for name, variable in file.variables.items():
-        values = np.asarray(variable[...])
-        digest.update(f"{name} {variable.dimensions} {values.dtype} {values.shape}".encode())
-        text = values.dtype.kind in "OUS"
-        digest.update("\n".join(map(str, values.ravel())).encode() if text else values.tobytes())
-    return digest.hexdigest()
+    Attributes
+    ----------
+    study
+        Name of its results.
+    study_file
+        Where it comes from.
+    content
+        Hash of what that file says: two files of one name are two studies, and a file that was
+        renamed is still the same.
+    """
+
+    study: str
+    study_file: str
+    content: str
+
+
+def combined_path(folder: Path, owner: Owner) -> Path:
+    """File of a study's combined dataset: `studies/<name>.nc`.
+
+    If that holds another study's, a part of the content's hash is put to the name.
+    """
+    path = folder / "studies" / f"{owner.study}.nc"
+    held = global_attributes(path)
+    # A file that was edited in its place is the same study.
+    if not held or owner.study_file == held.get("study_file", owner.study_file):
+        return path
+    if owner.content == held.get("content"):
+        return path
+    return path.with_stem(f"{owner.study}-{owner.content}")
 
 
 def stored(
     path: Path,
     attribute: str,
     key: str,
-    make: Callable[[], xr.Dataset],
-    sources: Iterable[Path] = (),
-    study_file: str = "",
+    make: Callable[[], xr.Dataset | Parts],
+    sources: Callable[[], Iterable[Path]] = list,
+    owner: Owner | None = None,
 ) -> xr.Dataset:
-    """What a file holds if it was made for this key, else what `make` gives, stored there.
+    """What is stored for this key, here or under another name, else what `make` gives.
+
+    The results of a study are then stored at `path`.  Where the file is tells the encoding `source`
+    of what is returned.
 
     Parameters
     ----------
     attribute
         Global attribute that holds the key.
     sources
-        Files that it was made from; if one of them is as new, it is made again.
-    study_file
-        That it comes from, if it is the result of a study.
-
-    Raises
-    ------
-    FileError
-        If the result of another study is stored there.
+        Gives the files that it was made from; if one of them is missing or as new, it is made
+        again.
+    owner
+        Of the result of a study.
     """
-    if path.exists():
-        dataset = read_dataset(path, "source", "vehiclemor")
-        written = path.stat().st_mtime_ns
-        current = all(source.stat().st_mtime_ns < written for source in sources)
-        if current and dataset.attrs.get(attribute) == key:
-            return dataset
-        other = dataset.attrs.get("study_file", study_file)
-        if other != study_file:
-            raise FileError(
-                f"{path}: holds the results of {other}, a study file of the same name; "
-                f"rename one of them, or move the results away"
-            )
+    dataset = _current(path, attribute, key, sources)
+    if dataset is not None:
+        return dataset
+    same = _under_another_name(path, attribute, key, sources)
+    if same is not None and owner is None:
+        return same
     make_folder(path.parent)
-    dataset = make().assign_attrs({attribute: key})
-    if study_file:
-        dataset.attrs["study_file"] = study_file
-    write_dataset(dataset, path)
+    made = make() if same is None else same
+    further = {attribute: key} | (owner._asdict() if owner else {})
+    if isinstance(made, Parts):
+        write_parts(made, path, further)
+        dataset = opened_lazily(path)
+    else:
+        dataset = made.assign_attrs(further)
+        write_dataset(dataset, path)
+    dataset.encoding["source"] = str(path)
     return dataset
+
+
+def _under_another_name(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
+    """As `_current`, of any file beside that can be held: its study was renamed since."""
+    for other in sorted(path.parent.glob("[!.]*.nc")):
+        if other == path or other.stat().st_size >= LARGE:
+            continue
+        if global_attributes(other).get(attribute) == key:
+            return _current(other, attribute, key, sources)
+    return None
+
+
+def _current(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> xr.Dataset | None:
+    """What a file holds, if that was made for this key from these sources as they are."""
+    if not path.exists():
+        return None
+    try:
+        dataset = read_dataset(path, "source", "vehiclemor")
+    except SpoiledError as error:
+        set_aside(path, path.parent, error.reason)
+        return None
+    if dataset.attrs.get(attribute) != key:
+        return None
+    written = path.stat().st_mtime_ns
+    try:
+        newest = max((source.stat().st_mtime_ns for source in sources()), default=-1)
+    except FileNotFoundError:
+        return None
+    dataset.encoding["source"] = str(path)
+    return dataset if newest < written else None

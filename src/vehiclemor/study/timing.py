@@ -85,16 +85,15 @@ def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: s
         parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    return stored_timing(folder, name, [content, CASE_ROUNDS], every_start)
+    path = folder / "studies" / f"{name}.nc"
+    return stored_timing(path, [content, CASE_ROUNDS], every_start)
 
 
-def stored_timing(
-    folder: Path, name: str, content: object, make: Callable[[], xr.Dataset]
-) -> xr.Dataset:
-    """What the file `studies/<name>.nc` holds for this content and machine, or else is made."""
+def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+    """What is stored for this content and machine, or else is made and stored at `path`."""
     text = json.dumps([content, machine(), REPEATS, REPEATS_OF_LONG, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return stored(folder / "studies" / f"{name}.nc", "timing", key, make)
+    return stored(path, "timing", key, make)
 
 
 def case_experiments(

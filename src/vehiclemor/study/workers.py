@@ -22,10 +22,10 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
     cell_path,
+    finished_cells,
     prepare_folder,
-    read_dataset,
+    read_cell,
     remove_partial,
-    result_path,
     write_cell,
 )
 
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 Groups = Sequence[Sequence[Experiment]]
 # Keys of what is finished of a group, and how the machine has failed in the rest, if it has.
 Done = tuple[list[str], str]
-# What evaluates groups elsewhere and stores their results: in processes, or on a cluster.
-Engine = Callable[[Groups, Path], Generator[Done, None, None]]
+# What evaluates groups elsewhere and stores their results, if so each by itself.
+Engine = Callable[[Groups, Path, bool], Generator[Done, None, None]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
 # Batches sent for each worker, so that none is idle; more would not fit into its queue.
@@ -71,7 +71,7 @@ class Workers:
         remove_partial(self.folder)
         keys = {e.key for group in groups for e in group}
         self.asked |= keys
-        self.finished |= {key for key in keys if cell_path(self.folder, key).exists()}
+        self.finished |= finished_cells(self.folder, keys - self.finished)
         if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
@@ -94,8 +94,7 @@ class Workers:
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        path = result_path(self.folder, experiment.key)
-        return read_dataset(path, "cell", experiment.key)
+        return read_cell(self.folder, experiment.key)
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -120,7 +119,7 @@ class Workers:
         first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
         work.sort(key=lambda group: id(group) not in first)
         if self.elsewhere:
-            engine = self.elsewhere(work, self.folder)
+            engine = self.elsewhere(work, self.folder, again)
         else:
             engine = evaluated_by_workers(work, self.folder, self.jobs)
         with closing(engine):
@@ -144,14 +143,21 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     # Another driver may have stored it, or a worker that was killed before it could say so.
     there = {e.key for e in experiments if cell_path(folder, e.key).exists()}
     left = [e for e in experiments if e.key not in there]
-    finished, fault = evaluated(left, lambda key, dataset: write_cell(dataset, folder, key))
+
+    def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
+        write_cell(dataset, folder, key, seconds)
+
+    finished, fault = evaluated(left, keep)
     return [*there, *finished], fault
 
 
-def evaluated(experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset], object]) -> Done:
-    """Evaluate some experiments, and keep what each gives under its key."""
+def evaluated(
+    experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset, float], object]
+) -> Done:
+    """Evaluate some experiments, and keep what each gives, under its key, and its seconds."""
     finished, fault = [], ""
     for experiment in experiments:
+        began = time.perf_counter()
         try:
             dataset = evaluate(experiment)
         except Exception as error:
@@ -159,7 +165,7 @@ def evaluated(experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset
             if not fault:
                 raise
             continue
-        keep(experiment.key, dataset)
+        keep(experiment.key, dataset, time.perf_counter() - began)
         finished.append(experiment.key)
     return finished, fault
 
@@ -182,6 +188,7 @@ def in_batches(
     submit: Callable[[list[Experiment]], Future[Timed]],
     places: Callable[[], int],
     taken: Callable[[Future[Timed]], Timed],
+    most: int = LARGEST,
 ) -> Generator[Any, None, None]:
     """Send groups to workers, several at once where they are quick; gives what comes back.
 
@@ -193,6 +200,8 @@ def in_batches(
         Tells how many batches can be worked at a time.
     taken
         Gives what a batch that is done has given.
+    most
+        Experiments of a batch, unless one group has more.
     """
     from concurrent.futures import FIRST_COMPLETED, wait
 
@@ -203,13 +212,13 @@ def in_batches(
         while left and len(waiting) < at_once:
             batch = list(left.popleft())
             # The last batches are small, so that workers end together.
-            while left and len(batch) < min(size, len(left) // at_once):
+            while left and len(batch) + len(left[0]) <= min(size, len(left) // at_once):
                 batch += left.popleft()
             waiting[submit(batch)] = len(batch)
         for future in wait(waiting, return_when=FIRST_COMPLETED).done:
             number, (result, seconds) = waiting.pop(future), taken(future)
             if seconds > 0.0:
-                size = int(min(max(BATCH * number / seconds, 1), LARGEST))
+                size = int(min(max(BATCH * number / seconds, 1), most))
             yield result
 
 

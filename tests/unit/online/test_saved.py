@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest import mock
 
 import netCDF4
 import numpy as np
@@ -18,13 +19,14 @@ import xarray as xr
 import vehiclemor as vm
 from vehiclemor.codegen.kernels import Kernels, KernelSource
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.online import parts
+from vehiclemor.online import model_file, parts
 from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.scenario import start_of
-from vehiclemor.study.store import write_dataset
 
 CAR = "independent_suspension_vehicle"
 
@@ -196,12 +198,17 @@ def test_what_is_no_saved_model_is_refused(saved, tmp_path):
 
 
 def test_another_version_is_refused(saved):
-    def attribute(name: str, value: Any) -> str:
-        rewritten(saved, lambda dataset, _: dataset.attrs.update({name: value}))
-        return refusal(saved)
+    rewritten(saved, lambda dataset, _: dataset.attrs.update(saved_model=99))
+    assert "saved by another version, format 99 where" in refusal(saved)
 
-    assert "saved by another version, vehiclemor 9.0 where" in attribute("vehiclemor", "9.0")
-    assert "saved_model 99" in attribute("saved_model", 99)
+
+def test_another_version_that_makes_the_same_of_it_is_not(car, saved, monkeypatch):
+    rewritten(saved, lambda dataset, _: dataset.attrs.update(vehiclemor="9.0"))
+    np.testing.assert_array_equal(vm.load(saved).simulate().outputs, car.simulate().outputs)
+    # What the same numbers are taken for has changed.
+    encoded = ReducedVehicle.encoded
+    monkeypatch.setattr(ReducedVehicle, "encoded", lambda *given: encoded(*given) + 0.01)
+    assert "linear_single_track makes something else of these numbers" in refusal(saved)
 
 
 @pytest.mark.parametrize(
@@ -318,8 +325,7 @@ def test_kernels_that_reach_beyond_their_arrays_are_refused(text, tmp_path):
 
 def test_a_kernel_is_arithmetic_or_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ValueError, match="import"):
-        vm.load(with_kernel(f"_result[0] = {HARM}", tmp_path)).simulate()
+    assert "import" in refusal(with_kernel(f"_result[0] = {HARM}", tmp_path))
     assert not Path("harm").exists()
 
 
@@ -331,7 +337,9 @@ def with_kernel(text: str, folder: Path) -> Path:
     made = vm.reduce(CAR, "softened_slip")
     system = dataclasses.replace(made.reduced.system, kernels=kernels)
     reduced = dataclasses.replace(made.reduced, system=system)
-    return dataclasses.replace(made, reduced=reduced).save(folder / "model.nc")
+    # Nothing here runs it.
+    with mock.patch.object(model_file, "response", return_value=np.empty(0)):
+        return dataclasses.replace(made, reduced=reduced).save(folder / "model.nc")
 
 
 SHIPPED = data_names("protocols")

@@ -1,5 +1,6 @@
 """Published beside reproduced: every number, every claim with a criterion, verdict and reason."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -7,6 +8,7 @@ import pandas as pd
 from vehiclemor.registry import component, names
 from vehiclemor.report.comparison.rows import (
     COLUMNS,
+    Results,
     Row,
     claim_rows,
     error_rows,
@@ -14,7 +16,7 @@ from vehiclemor.report.comparison.rows import (
 )
 from vehiclemor.report.comparison.times import agreement_rows, slower_row, time_rows
 from vehiclemor.report.costs import cost_table
-from vehiclemor.report.published import load_published
+from vehiclemor.report.published import Number, load_published
 from vehiclemor.study.run import run_studies
 
 # Claims about times.
@@ -27,18 +29,36 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
+        As of `paper_rows`.
+    """
+    results = run_studies("paper", folder, jobs)
+    return paper_rows(results, {model: cost_table(model, folder) for model in printed_models()})
+
+
+def _compared() -> list[Number]:
+    numbers = load_published().numbers.values()
+    return [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
+
+
+def printed_models() -> list[str]:
+    """Models of which the paper prints an error or a time, and that the suite has."""
+    models = dict.fromkeys(number.model for number in _compared())
+    return [model for model in models if model in names("model")]
+
+
+def paper_rows(results: Results, costs: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The comparison from the paper's studies and the cost tables of its models.
+
+    Returns
+    -------
+    pandas.DataFrame
         One row for each published number or claim, start and variant of the method, with the
         columns `COLUMNS`, described at `rows.Row`.
     """
-    results = run_studies("paper", folder, jobs)
-    published = load_published()
-    numbers = [n for n in published.numbers.values() if n.kind in ("rms_error", "time_reduction")]
-    known = [m for m in dict.fromkeys(number.model for number in numbers) if m in names("model")]
-    costs = {model: cost_table(model, folder) for model in known}
     errors: list[Row] = []
     times: list[Row] = []
     unknown: list[Row] = []
-    for number in numbers:
+    for number in _compared():
         if number.model not in costs:
             unknown.append(not_comparable(number, "this model is not in the suite yet"))
         elif number.kind == "rms_error":
@@ -46,7 +66,7 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
         else:
             times += time_rows(number, costs[number.model])
     claims: list[Row] = []
-    for name, claim in published.claims.items():
+    for name, claim in load_published().claims.items():
         if name == SIX_SLOWER:
             claims.append(slower_row(claim, costs["double_wishbone"], few=3, many=6))
         elif name == AGREE_AND_SAVE:
@@ -54,5 +74,5 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
         elif claim.model is None or claim.model in costs:
             claims += claim_rows(claim, results)
     rows = pd.DataFrame([*errors, *times, *unknown, *claims], columns=list(COLUMNS))
-    place = {model: number for number, model in enumerate(known)}
+    place = {model: number for number, model in enumerate(costs)}
     return rows.sort_values("model", key=lambda c: c.map(place), kind="stable", ignore_index=True)

@@ -10,11 +10,13 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import (
     equation_order,
+    error_map,
     high_fidelity_schematic,
     histories,
     pareto,
     paths,
     perturbations,
+    result_plot,
     sobol,
     spectrum,
     spread,
@@ -22,8 +24,10 @@ from vehiclemor.report.figures import (
     unseen,
     vehicle_schematic,
 )
+from vehiclemor.report.figures.curves import PATH
 from vehiclemor.report.figures.lines import Results
 from vehiclemor.resources import data_folder, data_names
+from vehiclemor.study.plans.study_file import StudyFile, studies_and_files
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
@@ -35,12 +39,13 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "replayed paths": paths.figure_replayed_paths,
     "histories": histories.figure_histories,
     "error curves": perturbations.figure_error_curves,
-    "error map": perturbations.figure_error_map,
+    "error map": error_map.figure_error_map,
     "spread": spread.figure_spread,
     "spectrum": spectrum.figure_spectrum,
     "unseen inputs": unseen.figure_unseen,
     "equation order": equation_order.figure_equation_order,
     "pareto": pareto.figure_pareto,
+    "result": result_plot.figure_result,
     "sobol": sobol.figure_sobol,
 }
 
@@ -58,6 +63,8 @@ class Entry(FileSchema):
         Studies whose combined datasets it shows: names, or paths of study files.
     caption
         What it shows.
+    datasets
+        Names of the studies' datasets where those are not the studies' own.
     default
         Whether it is drawn where no figure is asked for: the paper's are, and what belongs to them.
     """
@@ -65,6 +72,7 @@ class Entry(FileSchema):
     name: str
     drawing: str = Field(alias="draw")
     studies: list[str] = Field(default_factory=list)
+    datasets: list[str] = Field(default_factory=list)
     caption: str
     default: bool = True
     options: dict[str, object] = Field(default_factory=dict)
@@ -72,7 +80,7 @@ class Entry(FileSchema):
     @property
     def names(self) -> list[str]:
         """Names of the studies' datasets."""
-        return [Path(study).stem for study in self.studies]
+        return self.datasets or [Path(study).stem for study in self.studies]
 
     def draw(self, results: Results) -> Figure:
         """Draw it from the combined datasets by study; what it does not show is left out."""
@@ -102,8 +110,8 @@ OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
 }
 
 
-def find(name: str, results: Path) -> Entry:
-    """The figure of a name such as `6`, or `histories-<model>`, which every model has.
+def find(name: str, results: Path) -> list[Entry]:
+    """The figure of a name such as `6`, or `histories-<model>`, or all figures of a study.
 
     `sobol-<model>` has each model of which `data/sobol` declares a box of parameters.
 
@@ -115,18 +123,57 @@ def find(name: str, results: Path) -> Entry:
         If there is no such figure.
     """
     if name in FIGURES:
-        return FIGURES[name]
+        return [FIGURES[name]]
+    if name.endswith(".toml") or name in data_names("studies"):
+        return [
+            e
+            for study, found in studies_and_files(name).items()
+            for e in _of_a_study(study, *found)
+        ]
     kind, _, model = name.partition("-")
     boxes = data_names("sobol")
     if kind == "sobol" and model in boxes:
         options = {"model": model, "results": str(results)}
         caption = f"{model}: first and total Sobol indices of objectives over a box of parameters"
-        return Entry(name=name, draw="sobol", caption=caption, options=options)
+        return [Entry(name=name, draw="sobol", caption=caption, options=options)]
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
         known += [f"sobol-{box}" for box in boxes]
-        raise unknown("figure", name, [*FIGURES, *known])
-    return _of_a_model(kind, model, results)
+        raise unknown("figure", name, [*FIGURES, *known, *data_names("studies"), "FILE.toml"])
+    return [_of_a_model(kind, model, results)]
+
+
+def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
+    """What a study lets be drawn: of a protocol the errors over the times."""
+    file = path.stem if data_folder() in path.parents else str(path)
+    if study.protocols:
+        return [
+            Entry(
+                name=f"{member}-pareto",
+                draw="pareto",
+                studies=[protocol],
+                datasets=[f"predictive-{member}"],
+                caption=f"{study.title}: worst error on unseen inputs over the time of a call.",
+                options={"titled": True},
+            )
+            for protocol in study.protocols
+            if (member := Path(protocol).stem)
+        ]
+    kinds = {"errors": "errors over what is varied"}
+    if study.keep == "trajectories":
+        kinds["histories"] = "outputs and errors over the time"
+        if {output.name for output in component("model", study.model).outputs} >= set(PATH):
+            kinds["paths"] = "paths in the plane"
+    return [
+        Entry(
+            name=f"{name}-{kind}",
+            draw="result",
+            studies=[file],
+            caption=f"{study.title}: {words}.",
+            options={"kind": kind},
+        )
+        for kind, words in kinds.items()
+    ]
 
 
 def _of_a_model(kind: str, model: str, results: Path) -> Entry:

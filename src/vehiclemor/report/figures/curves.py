@@ -14,6 +14,8 @@ LARGEST = "largest error in each {period:.2g} s"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # Longer labels need two lines beside a low panel.
 LONG = 22
+# Outputs that make a path in the plane.
+PATH = ("longitudinal_position", "lateral_position")
 BREAK: Style = {"color": "#777777", "linewidth": 0.8}
 
 
@@ -134,7 +136,7 @@ def draw_largest_errors(
         if str(curve.run["status"].item()) == "ok":
             rms = curve.run["rms_error"].sel(output=panel.output).item()
             edge = axis.get_yaxis_transform()
-            place = 1.0 + 0.03 * number
+            place = 1.0 + min(0.03, 0.12 / len(panel.curves)) * number
             axis.plot(place, rms or np.nan, color=color, transform=edge, clip_on=False, **RMS_MARK)
         else:
             last = int(np.flatnonzero(np.isfinite(largest))[-1])
@@ -180,4 +182,4 @@ def hide_rounding(axis: Axes) -> None:
 
 def positions(outputs: xr.DataArray) -> list[np.ndarray]:
     """X and Y (time,) in m."""
-    return [outputs.sel(output=f"{way}_position").values for way in ("longitudinal", "lateral")]
+    return [outputs.sel(output=output).values for output in PATH]

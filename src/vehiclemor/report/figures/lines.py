@@ -9,6 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vehiclemor.report.printing import alphabetic
+
 Results = Mapping[str, "xr.Dataset"]
 Style = dict[str, Any]
 # Colour-blind safe (M. Okabe, K. Ito).
@@ -22,6 +24,8 @@ OTHER: Style = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
 # Lines differ where they are printed in grey too.
 DASHES = ("--", (0, (8, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2, 2, 2)))
 CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
+# Of a legend in inches: what stands beside a text, and a letter of it.
+HANDLE, LETTER = 0.55, 0.068
 # Label of a method in a study -> its style.
 STYLES = {
     "full_order": FULL,
@@ -58,7 +62,7 @@ def panels(
 
 def letter(number: int) -> str:
     """Letter of a panel, counted from 0."""
-    return f"({'abcdefghijklmnopqrstuvwxyz'[number]})"
+    return f"({alphabetic(number)})"
 
 
 def legend_outside(
@@ -67,8 +71,13 @@ def legend_outside(
     columns: int = 4,
     place: Literal["upper", "lower"] = "upper",
 ) -> None:
-    """One legend above (or `lower`: below) all panels, of the lines in some of them."""
+    """One legend above (or `lower`: below) all panels, of the lines in some of them.
+
+    With 0 `columns` it has as many as there is room for.
+    """
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
-    columns = min(columns, len(shown))
+    longest = max(map(len, shown), default=0)
+    room = int(figure.get_figwidth() / (HANDLE + LETTER * longest))
+    columns = min(columns or max(1, room), len(shown))
     where = "outside upper center" if place == "upper" else "outside lower center"
     figure.legend(shown.values(), shown, loc=where, ncols=columns)

@@ -1,5 +1,7 @@
 """Worst error on unseen inputs against online time: full order, baselines, reduced models."""
 
+import json
+import textwrap
 from collections.abc import Sequence
 from itertools import cycle
 
@@ -8,15 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.lines import COLORS, Results, Style, panels
+from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
-MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "H", "8")
-GREYS = (("#000000", "-"), ("#777777", "-"), ("#AAAAAA", "-"), ("#444444", "--"))
+# With six colours: of 66 no two look alike.
+MARKERS = ("s", "^", "D", "v", "P", "<", ">", "h", "p", "d", "H")
+# Letters of a title in a line.
+TITLE = 60
+# Colour, line and marker of a full-order integrator: of twelve no two look alike.
+GREYS = [
+    (color, line, marker)
+    for line, marker in (("-", "o"), ("--", "*"), (":", "X"))
+    for color in ("#000000", "#777777", "#AAAAAA", "#444444")
+]
 
 
-def figure_pareto(results: Results) -> Figure:
+def figure_pareto(results: Results, *, titled: bool = False) -> Figure:
     """Score (worst error over its bound) over the mean time of a whole call, one model."""
     (dataset,) = results.values()
     rows = method_rows(dataset, protocol_of(dataset))
@@ -38,20 +49,25 @@ def figure_pareto(results: Results) -> Figure:
     axis.set_ylim(top=top)
     axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
     axis.set_ylabel("worst error / bound, judged runs")
-    figure.legend(loc="outside right upper", fontsize=7)
+    tick_decades(axis.xaxis, *axis.get_xlim())
+    # Of what is chosen the mark is larger than a line of the legend.
+    figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
+    if titled:
+        # The legend stands beside the axes, whose title can't be wrapped by itself.
+        axis.set_title(textwrap.fill(str(dataset.attrs["title"]), TITLE))
     return figure
 
 
 def _draw_full_order(axis: Axes, rows: Sequence[Row]) -> None:
     """A line for each integrator, through its tolerances."""
     families: dict[str, list[tuple[float, float, float]]] = {}
-    for row in rows:
+    for row in sorted(rows, key=lambda row: json.loads(row["settings"]).get("tolerance", 0.0)):
         points = families.setdefault(str(row["contestant"]), [])
         if np.isfinite(row["score"]) and row["score"] > 0.0:
             points.append((row["seconds"] * 1e6, row["score"], row["spread"]))
-    for (family, points), (color, line) in zip(families.items(), cycle(GREYS), strict=False):
-        style: Style = {"marker": "o", "markersize": 4, "linewidth": 0.8, "linestyle": line}
-        times, scores, spreads = np.array(sorted(points)).reshape(-1, 3).T
+    for (family, points), (color, line, mark) in zip(families.items(), cycle(GREYS), strict=False):
+        style: Style = {"marker": mark, "markersize": 4, "linewidth": 0.8, "linestyle": line}
+        times, scores, spreads = np.array(points).reshape(-1, 3).T
         bars = {"xerr": 0.5 * spreads * times, "elinewidth": 0.8, "capsize": 1.5}
         axis.errorbar(times, scores, color=color, label=f"full order, {family}", **style, **bars)
 

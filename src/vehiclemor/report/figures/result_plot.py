@@ -13,6 +13,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.registry import component, unknown
 from vehiclemor.report.criteria.finding import at_point, without_single
 from vehiclemor.report.figures.curves import (
+    PATH,
     Curve,
     Panel,
     draw_distances,
@@ -21,23 +22,28 @@ from vehiclemor.report.figures.curves import (
     draw_largest_errors,
     positions,
 )
-from vehiclemor.report.figures.lines import CROSS, FULL, legend_outside, panels, styles
-from vehiclemor.report.figures.perturbations import (
-    figure_error_curves,
-    figure_error_map,
-    tick_decades,
+from vehiclemor.report.figures.grid_errors import figure_grid_errors
+from vehiclemor.report.figures.lines import (
+    CROSS,
+    FULL,
+    Results,
+    legend_outside,
+    panels,
+    styles,
 )
+from vehiclemor.report.figures.places import tick_decades
+from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import method_text, unit_of
-from vehiclemor.study.plans.study_file import FACTORS
+from vehiclemor.report.result_selection import drawn
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# At most so many outputs have panels, and so many cells of a map their number.
-PANELS, WRITTEN = 4, 100
+# At most so many outputs have panels.
+PANELS = 4
 
 
 def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "histories") -> Figure:
@@ -62,15 +68,29 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
     """
     if kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
-    errors = {"rms_error", "signal_range"} <= set(dataset)
-    if not dataset.sizes.get("output") or not errors or "row" in dataset.dims:
-        raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     with styled():
-        figure = DRAWINGS[kind](dataset)
-        figure.suptitle(figure.get_suptitle() or _title(dataset), fontsize="medium", wrap=True)
+        figure = _drawn(dataset, kind)
         if path is not None:
             save_figure(figure, path)
     return figure
+
+
+def _drawn(dataset: xr.Dataset, kind: str) -> Figure:
+    errors = {"rms_error", "signal_range"} <= set(dataset)
+    if not dataset.sizes.get("output") or not errors or "row" in dataset.dims:
+        raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
+    figure = DRAWINGS[kind](dataset)
+    figure.suptitle(figure.get_suptitle() or _title(dataset), fontsize="medium", wrap=True)
+    return figure
+
+
+def figure_result(results: Results, *, kind: str) -> Figure:
+    """The picture of a study: at its nominal or first point, errors over the whole grid."""
+    (dataset,) = results.values()
+    shown, point = drawn(dataset, kind, {})
+    if point:
+        shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
+    return _drawn(shown, kind)
 
 
 def _model(dataset: xr.Dataset) -> str:
@@ -149,7 +169,7 @@ def figure_histories(dataset: xr.Dataset) -> Figure:
         axis.set_xlim(float(full["time"][0]), float(full["time"][-1]))
     for text, color in ended.items():
         axes[0, 0].plot([], [], color=color, label=text, **CROSS)
-    legend_outside(figure, axes[:each, 0], place="lower")
+    legend_outside(figure, axes[:each, 0], 0, place="lower")
     return figure
 
 
@@ -160,13 +180,15 @@ def _draw_differences(axis: Axes, panel: Panel) -> None:
         rms = panel.curves[0].run["rms_error"].sel(output=panel.output).item()
         axis.set_title(f"RMS error {rms:.2g} {unit_of(panel.full, panel.output)}")
     else:
-        draw_largest_errors(axis, panel, float(panel.full["time"][-1]) / 50.0)
+        period = float(panel.full["time"][-1]) / 50.0
+        draw_largest_errors(axis, panel, period)
+        axis.set_ylabel(f"largest error\nper {period:.2g} s ({unit_of(panel.full, panel.output)})")
 
 
 def figure_paths(dataset: xr.Dataset) -> Figure:
     """Paths in the plane, and the distances from full order at the same time below."""
     full, curves = _runs(dataset)
-    missing = {"longitudinal_position", "lateral_position"} - set(dataset["output"].values)
+    missing = set(PATH) - set(dataset["output"].values)
     if missing:
         raise InputError(f"{_model(dataset)} has no path: no output {', '.join(sorted(missing))}")
     figure, axes = panels(2 if curves else 1, 1, (7.6, 5.4 if curves else 3.6), sharex=True)
@@ -178,37 +200,18 @@ def figure_paths(dataset: xr.Dataset) -> Figure:
     if curves:
         draw_distances(axes[1, 0], curves)
     axes[-1, 0].set_xlabel("X (m), not to the scale of Y")
-    legend_outside(figure, [upper], place="lower")
+    legend_outside(figure, [upper], 0, place="lower")
     return figure
 
 
 def figure_errors(dataset: xr.Dataset) -> Figure:
     """RMS errors: over the grid where there is one, else of all outputs of one point."""
-    grid = {str(d): dataset[d].values for d in dataset["status"].dims if d != "method"}
-    grid = {d: values for d, values in grid.items() if len(values) > 1}
-    axes = [d for d, values in grid.items() if np.issubdtype(values.dtype, np.number)]
-    both = set(FACTORS) <= set(axes)
-    drawn = list(FACTORS) if both else sorted(axes, key=lambda d: len(grid[d]))[-1:]
-    for dimension in set(grid) - set(drawn):
-        values = grid[dimension].tolist()
-        value = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
-        title = f"{dataset.attrs.get('title', '')}; {dimension} {value}"
-        dataset = dataset.sel({dimension: value}).assign_attrs(title=title)
-    if not drawn:
-        return _errors_of_a_point(dataset)
     if "method" not in dataset.dims:
         (label,) = _points(dataset)
         dataset = dataset.expand_dims(method=[label])
-    methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
-    texts = {m: method_text(m) for m in methods}
-    shown = {"outputs": shown_outputs(dataset), "methods": texts}
-    if both:
-        cells = len(grid[FACTORS[0]]) * len(grid[FACTORS[1]])
-        figure = figure_error_map({"": dataset}, values=cells <= WRITTEN, **shown)
-    else:
-        figure = figure_error_curves({"": dataset}, axis=drawn[0], legend="lower", **shown)
-    figure.suptitle(str(dataset.attrs.get("title", "")))
-    return figure
+    if sample_axis(dataset):
+        return figure_samples(dataset, shown_outputs(dataset))
+    return figure_grid_errors(dataset, shown_outputs(dataset)) or _errors_of_a_point(dataset)
 
 
 def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
@@ -228,7 +231,7 @@ def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
     axis.set_yticks(places, [name.replace("_", " ") for name in names], fontsize=7)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlabel("RMS error (% of the output's range)")
-    legend_outside(figure, [axis], place="lower")
+    legend_outside(figure, [axis], 0, place="lower")
     return figure
 
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures.curves import Curve, positions
+from vehiclemor.report.figures.error_map import two_digits
 from vehiclemor.report.figures.lines import FULL, Results, legend_outside, panels, styles
-from vehiclemor.report.figures.perturbations import two_digits
 from vehiclemor.report.labels import readable_unit
 
 # Of the largest errors, in m; shorter bars could not be seen.

@@ -1,24 +1,37 @@
-"""The report: sections of studies in one HTML file that loads nothing else."""
+"""Which results a report is of: sections of studies and protocols, and of the paper's verdicts."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import xarray as xr
+from pydantic import ValidationError
 
-from vehiclemor.errors import InputError
+from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import names
+from vehiclemor.report.comparison.paper import printed_models
+from vehiclemor.report.costs import timing_of
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.html import interactive
-from vehiclemor.report.html.cells import shared_anchor, shared_values
+from vehiclemor.report.html.page import page
 from vehiclemor.report.html.parts import Section
 from vehiclemor.report.html.protocol_section import protocol_section
+from vehiclemor.report.html.provenance import name_of
 from vehiclemor.report.html.study_section import study_section
+from vehiclemor.report.html.verdict_section import verdict_section
+from vehiclemor.study.netcdf_file import read_dataset
+from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset
 
-TEMPLATES = Path(__file__).parent
+PAPER = "paper"
+
+
+class Found(NamedTuple):
+    """Datasets by study, of the paper's models by model, and files that can't be read -> why."""
+
+    studies: dict[str, xr.Dataset]
+    timings: dict[str, xr.Dataset]
+    left_out: dict[str, str]
 
 
 def write_report(studies: Sequence[str], out: Path, folder: Path, jobs: int = 1) -> Path:
@@ -35,12 +48,28 @@ def write_report(studies: Sequence[str], out: Path, folder: Path, jobs: int = 1)
     VehiclemorError
         If a name is wrong, nothing is stored, or the file can't be written.
     """
-    if studies:
-        chosen = [name for study in studies for name in _studies_of(study, folder)]
-        found = {k: v for name in chosen for k, v in run_studies(name, folder, jobs).items()}
-    else:
-        found = _all_stored(folder)
-    return write_text(out, page([_section(dataset, folder) for dataset in found.values()]))
+    found = _run(studies, folder, jobs) if studies else _stored(folder)
+    left_out = dict(found.left_out)
+    sections: list[Section] = []
+    if found.timings and set(load_studies(PAPER)) <= set(found.studies):
+        sections.append(verdict_section(found.studies, found.timings))
+    for name, dataset in found.studies.items():
+        try:
+            section = protocol_section if "row" in dataset.dims else study_section
+            sections.append(section(dataset, folder))
+        except (KeyError, ValidationError):
+            if studies:
+                raise
+            left_out[name] = "stored by other source: vehiclemor run makes it again"
+    return write_text(out, page(sections, left_out))
+
+
+def _run(studies: Sequence[str], folder: Path, jobs: int) -> Found:
+    chosen = [name for study in studies for name in _studies_of(study, folder)]
+    datasets = [d for name in chosen for d in run_studies(name, folder, jobs).values()]
+    found = {name_of(dataset): dataset for dataset in datasets}
+    timed = printed_models() if PAPER in studies else []
+    return Found(found, {model: timing_of(model, folder) for model in timed}, {})
 
 
 def _studies_of(name: str, folder: Path) -> list[str]:
@@ -49,46 +78,22 @@ def _studies_of(name: str, folder: Path) -> list[str]:
     return [kind(name, folder) for kind in (nominal, perturbed, unseen)]
 
 
-def _all_stored(folder: Path) -> dict[str, xr.Dataset]:
-    """Combined datasets of studies; timings and the like stand beside them."""
-    found: dict[str, xr.Dataset] = {}
-    for path in sorted((folder / "studies").glob("*.nc")):
-        dataset = read_dataset(path, "source", "vehiclemor")
-        if "study" in dataset.attrs and "status" in dataset:
-            found[path.stem] = dataset
-    if not found:
+def _stored(folder: Path) -> Found:
+    """All combined datasets that are stored, and the timings of the paper's models if all are."""
+    found = Found({}, {}, {})
+    paths = {path.stem: path for path in sorted((folder / "studies").glob("*.nc"))}
+    for name, path in paths.items():
+        try:
+            dataset = read_dataset(path, "source", "vehiclemor")
+        except FileError as error:
+            found.left_out[str(path)] = str(error).removeprefix(f"{path}: ")
+            continue
+        if "status" in dataset and "study" in dataset.attrs:
+            found.studies[name] = dataset
+    if not found.studies:
         raise InputError(f"{folder}: no results of a study; vehiclemor run STUDY makes them")
+    models = printed_models()
+    if {f"timing-{model}" for model in models} <= set(paths):
+        timed = {m: read_dataset(paths[f"timing-{m}"], "source", "vehiclemor") for m in models}
+        found.timings.update(timed)
     return found
-
-
-def _section(dataset: xr.Dataset, folder: Path) -> Section:
-    return (protocol_section if "row" in dataset.dims else study_section)(dataset, folder)
-
-
-def page(sections: Sequence[Section], title: str = "vehiclemor") -> str:
-    """The file's text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "separators": (",", ":")}
-    cells = {anchor: cell for section in sections for anchor, cell in section.cells.items()}
-    plots = [plot for section in sections for plot in section.plots]
-    given: dict[str, Any] = {
-        "title": title,
-        "sections": sections,
-        "cells": cells,
-        "shared": shared_values(cells.values()),
-        "shared_anchor": shared_anchor,
-        "plots": plots,
-        "library": interactive.library() if plots else "",
-        "interactive": interactive.available(),
-        "style": (TEMPLATES / "report.css").read_text(encoding="utf-8"),
-        "script": (TEMPLATES / "report.js").read_text(encoding="utf-8"),
-    }
-    return environment.get_template("report.html.jinja").render(given)

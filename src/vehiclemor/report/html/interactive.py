@@ -1,32 +1,26 @@
-"""Interactive plots: paths, errors over a grid, errors of every run; drawn by Bokeh in the page."""
+"""Interactive plots of the page, drawn by Bokeh: what they share."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.util import find_spec
-from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-
-from vehiclemor.report.criteria.finding import at_point
-from vehiclemor.report.figures.lines import COLORS, FULL, styles
-from vehiclemor.report.html.parts import Plot
-from vehiclemor.report.labels import method_text
-from vehiclemor.study.plans.choice import outcomes
-from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.plans.protocol_file import ProtocolFile
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from bokeh.plotting import figure as Figure  # noqa: N812
-
-# Points of a curve, and of all curves or maps of a plot.
-CURVE, POINTS = 400, 20_000
-PATH = ["longitudinal_position", "lateral_position"]
+# Bokeh's types are not complete.
+Figure = Any
 DASHES = {"--": [8, 4], "-.": [8, 4, 2, 4], ":": [2, 3]}
-HINT = "Drag to move, wheel or pinch to zoom, tap a name in the legend to hide its curve."
 TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
+# Said below every plot.
+HINT = "Drag to move, zoom with the tools beside it, tap a name in the legend to hide or show it."
+# Names of a legend in two columns, and the longest name of all.
+SHORT, LONGEST = 20, 44
+# What a tap on a point does: the page goes to its cell, if that is listed.
+GO_TO_CELL = """
+const row = source.selected.indices[0];
+const anchor = source.data.cell[row];
+if (document.getElementById(anchor)) { location.hash = anchor; }
+source.selected.indices = [];
+"""
 
 
 def available() -> bool:
@@ -41,34 +35,58 @@ def library() -> str:
     return "\n".join(Resources(mode="inline", components=["bokeh"]).js_raw)
 
 
-def plotted(name: str, figure: Figure, caption: str) -> Plot:
-    """A figure of Bokeh as a plot of the page."""
-    from bokeh.embed import json_item
-
-    return Plot(name, caption, json_item(figure, name))
-
-
-def _figure(x: str, y: str, **options: Any) -> Figure:
+def new_figure(x: str, y: str, told: Mapping[str, str], **options: Any) -> Figure:
+    """A figure as wide as its place; `told` is what the pointer is shown of a point."""
+    from bokeh.models import DataRange1d, HoverTool
     from bokeh.plotting import figure
 
-    given = {"height": 420, "sizing_mode": "stretch_width", "tools": TOOLS} | options
-    made = figure(x_axis_label=x, y_axis_label=y, active_scroll=None, **given)
+    given: dict[str, Any] = {"height": 420, "sizing_mode": "stretch_width", "tools": TOOLS}
+    given |= {f"{axis}_range": DataRange1d(only_visible=True) for axis in "xy"}
+    made = figure(x_axis_label=x, y_axis_label=y, active_scroll=None, **(given | options))
+    made.add_tools(HoverTool(tooltips=list(told.items())))
     made.toolbar.logo = None
     made.background_fill_alpha = made.border_fill_alpha = 0.0
+    for axis in (made.xaxis, made.yaxis):
+        axis.axis_label_text_font_style = "normal"
     return made
 
 
-def _legend_below(figure: Figure) -> None:
+def with_legend(figure: Figure) -> Figure:
+    """The same with its legend below, whose names hide and show."""
     for legend in figure.legend:
+        names = [item.label.value for item in legend.items]
         figure.add_layout(legend, "below")
-        legend.click_policy = "hide"
-        legend.ncols = 2
-        legend.border_line_alpha = legend.background_fill_alpha = 0.0
-        legend.label_text_font_size = "11px"
-        legend.spacing = 1
+        legend.update(
+            click_policy="hide",
+            ncols=2 if max(map(len, names)) <= SHORT else 1,
+            location="bottom_left",
+            spacing=8,
+        )
+        legend.update(
+            label_text_font_size="11px",
+            glyph_width=30,
+            padding=4,
+            background_fill_alpha=0,
+            border_line_alpha=0,
+        )
+    return figure
 
 
-def _look(style: Mapping[str, Any]) -> dict[str, Any]:
+def legend_name(text: str) -> str:
+    """A name as a legend has room for it on a telephone."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+def tapped(figure: Figure, source: Any) -> None:
+    """Let a tap on a point lead to its cell, which the column `cell` of the source names."""
+    from bokeh.models import CustomJS, TapTool
+
+    if not figure.select(type=TapTool):
+        figure.add_tools(TapTool())
+    source.selected.js_on_change("indices", CustomJS(args={"source": source}, code=GO_TO_CELL))
+
+
+def look(style: Mapping[str, Any]) -> dict[str, Any]:
     """A line of Matplotlib as Bokeh names it."""
     dash = style.get("linestyle", "solid")
     pattern = [2 * length for length in dash[1]] if isinstance(dash, tuple) else DASHES.get(dash)
@@ -80,82 +98,8 @@ def _look(style: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _thinned(run: xr.Dataset) -> xr.Dataset:
-    return run.isel(time=slice(None, None, -(-run.sizes["time"] // CURVE)))
+def as_items(*figures: Figure) -> list[Mapping[str, Any]]:
+    """Figures as the script of the page takes them."""
+    from bokeh.embed import json_item
 
-
-def path_plot(name: str, point: xr.Dataset) -> Plot:
-    """Paths in the plane of all methods at one point of a grid, with the time at each place."""
-    made = _figure("X (m)", "Y (m), not to the scale of X")
-    made.add_tools(
-        _hover(
-            [("", "@name"), ("time", "@time{0.00} s"), ("X", "@x{0.000} m"), ("Y", "@y{0.0000} m")]
-        )
-    )
-    methods = [str(m) for m in point["method"].values]
-    reduced = [m for m in methods if not m.startswith("full_order")]
-    looks = styles(reduced)
-    curves = {"full order": (at_point(point, methods[0])["reference_outputs"], FULL)}
-    curves |= {method_text(m): (at_point(point, m)["outputs"], looks[m]) for m in reduced}
-    for words, (outputs, style) in curves.items():
-        x, y = (
-            _thinned(outputs.to_dataset(name="o"))["o"]
-            .sel(output=PATH)
-            .transpose("output", "time")
-            .values
-        )
-        times = _thinned(outputs.to_dataset(name="o"))["time"].values
-        data = {
-            "x": x.astype("f4"),
-            "y": y.astype("f4"),
-            "time": times.astype("f4"),
-            "name": [words] * len(x),
-        }
-        made.line("x", "y", source=data, legend_label=words, **_look(style))
-    _legend_below(made)
-    return plotted(name, made, f"Interactive: paths of all methods. {HINT}")
-
-
-def _hover(told: list[tuple[str, str]]) -> Any:
-    from bokeh.models import HoverTool
-
-    return HoverTool(tooltips=told)
-
-
-def runs_plot(name: str, judged: xr.Dataset, protocol: ProtocolFile) -> Plot:
-    """Error over bound of every judged run; of the chosen model in order of size."""
-    from bokeh.models import Span
-
-    made = _figure(
-        "judged run, by the error of the chosen model", "error / bound", y_axis_type="log"
-    )
-    made.add_tools(_hover([("", "@name"), ("run", "@run"), ("error / bound", "@y{0.000}")]))
-    labels = [
-        str(r) for r in judged["row"].values if str(judged["role"].sel(row=r).item()) != FULL_ORDER
-    ]
-    winners = [label for label in labels if bool(judged["winner"].sel(row=label))]
-    found = {label: outcomes(judged.sel(row=label), protocol.bounds).scores for label in labels}
-    order = np.argsort(found[(winners or labels)[0]], kind="stable")
-    runs = [str(run) for run in judged["scenario"].values[order]]
-    for label, color in zip(
-        sorted(labels, key=lambda n: n not in winners), cycle(COLORS), strict=False
-    ):
-        scores = found[label][order]
-        shown = np.isfinite(scores) & (scores > 0.0)
-        data = {"x": np.flatnonzero(shown).astype("i4"), "y": scores[shown].astype("f4")}
-        data |= {
-            "run": [r for r, s in zip(runs, shown, strict=True) if s],
-            "name": [label] * int(shown.sum()),
-        }
-        drawn = made.scatter(
-            "x", "y", source=data, size=5, color=color, alpha=0.8, legend_label=label
-        )
-        # The rest at a tap on its name.
-        drawn.visible = label in winners or len(labels) < 4
-    made.add_layout(Span(location=1.0, dimension="width", line_width=1))
-    _legend_below(made)
-    return plotted(
-        name,
-        made,
-        f"Interactive: every judged run; hidden models appear at a tap on their names. {HINT}",
-    )
+    return [json_item(figure) for figure in figures]

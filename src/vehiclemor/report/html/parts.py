@@ -24,12 +24,13 @@ class Entry(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A table; `columns` are its headings, and `note` stands below."""
+    """A table; `columns` are its headings, `note` stands below, and `id` is what links to it."""
 
     caption: str
     columns: tuple[str, ...]
     rows: list[list[Entry]]
     note: str = ""
+    id: str = ""
 
 
 class Picture(NamedTuple):
@@ -40,11 +41,11 @@ class Picture(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """An interactive plot, as the script of the page draws it; `id` is its element's."""
+    """Interactive figures beside one another, as the script of the page draws them."""
 
     id: str
     caption: str
-    item: Mapping[str, Any]
+    figures: list[Mapping[str, Any]]
 
 
 class Cell(NamedTuple):
@@ -79,11 +80,16 @@ class Section(NamedTuple):
     source: str = ""
 
 
+MISSING = Entry("–", kind="none")
+
+
 def quantity(value: float, anchor: str = "") -> Entry:
     """A number with three digits, linked; a dash for one that is missing."""
     if value != value:
-        return Entry("–")
-    return Entry(f"{value:.3g}", value, anchor)
+        return MISSING
+    large = value != 0.0 and not 0.01 <= abs(value) < 1e4
+    text = f"{value:.2e}".replace("e-0", "e-").replace("e+0", "e") if large else f"{value:.3g}"
+    return Entry(text, value, anchor)
 
 
 def count(value: int, anchor: str = "") -> Entry:

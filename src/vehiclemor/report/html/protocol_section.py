@@ -10,9 +10,10 @@ import xarray as xr
 
 from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.saving import styled
-from vehiclemor.report.html import interactive
-from vehiclemor.report.html.cells import stored_cell
+from vehiclemor.report.html.cells import UNNAMED, stored_cell
+from vehiclemor.report.html.interactive import available
 from vehiclemor.report.html.parts import (
+    MISSING,
     Cell,
     Entry,
     Picture,
@@ -22,13 +23,15 @@ from vehiclemor.report.html.parts import (
     judged_entry,
     quantity,
 )
-from vehiclemor.report.html.provenance import facts, source_text
+from vehiclemor.report.html.protocol_plots import runs_plot
+from vehiclemor.report.html.provenance import facts, name_of, source_text
 from vehiclemor.report.html.vector import svg_element
 from vehiclemor.report.labels import label_of, unit_of
-from vehiclemor.report.predictive.rows import STUDY, method_rows, protocol_of
+from vehiclemor.report.leaderboard import RULE, rank
+from vehiclemor.report.predictive.rows import draws_of, method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row, chosen, error_columns, target_rows
 from vehiclemor.study.plans.choice import outcomes
-from vehiclemor.study.plans.ledger import Drawn, Ledger
+from vehiclemor.study.plans.ledger import Drawn
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part, judged_set
 
@@ -39,10 +42,9 @@ COUNTS = ("misses", "silent", "flagged")
 
 def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
     """Everything that a combined dataset of a protocol holds, within a bounded size."""
-    name, protocol = str(dataset.attrs["study"]), protocol_of(dataset)
-    stem = name.removeprefix(f"{STUDY}-")
-    draws = Ledger(stem, folder, bool(dataset.attrs["own"])).entries()
-    rows = method_rows(dataset, protocol, draws)
+    name, protocol = name_of(dataset), protocol_of(dataset)
+    draws = draws_of(dataset, folder)
+    rows = sorted(method_rows(dataset, protocol, draws), key=rank)
     anchors = _anchors(dataset)
     winner = chosen(rows)
     tables = [_targets(target_rows(dataset, protocol, rows), anchors)]
@@ -54,16 +56,13 @@ def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
     caption = "Worst error over its bound on the judged runs, over the time of a whole call."
     with styled():
         svg = svg_element(figure_pareto({name: dataset}), f"{name}-pareto", caption)
-    plots = []
-    if interactive.available():
-        plots.append(interactive.runs_plot(f"plot-{name}-runs", judged_part(dataset), protocol))
     return Section(
         f"study-{name}",
         str(dataset.attrs["title"]),
         _intro(dataset, rows, winner),
         [table for table in tables if table.rows],
         [Picture(caption, svg)],
-        plots,
+        runs_plot(name, judged_part(dataset), protocol) if available() else [],
         facts(dataset, cells),
         cells,
         source_text(dataset, folder),
@@ -86,7 +85,7 @@ def _anchors(dataset: xr.Dataset) -> dict[str, str]:
     judged = judged_set(set(dataset["scenario_set"].values))
     found = {}
     for number, label in enumerate(map(str, dataset["row"].values)):
-        own = f"row-{dataset.attrs['study']}-{number}"
+        own = f"row-{name_of(dataset)}-{number}"
         if "cell_keys" in dataset:
             own = f"cell-{json.loads(dataset['cell_keys'].values[number])[judged]}"
         found[label] = own
@@ -103,8 +102,7 @@ def _cell(row: Row, anchor: str, dataset: xr.Dataset, folder: Path) -> Cell:
     }
     if anchor.startswith("cell-"):
         return stored_cell(folder, anchor.removeprefix("cell-"), known)
-    note = "Stored by an older version, which named no cells."
-    return Cell(f"{row['method']} on {row['model']}", known, note)
+    return Cell(f"{row['method']} on {row['model']}", known, UNNAMED)
 
 
 def _targets(rows: list[Row], anchors: dict[str, str]) -> Table:
@@ -146,7 +144,7 @@ def _contestants(
         entries.append(line)
     note = (
         "misses: runs outside of a bound; silent: of these with the status ok; flagged: runs of "
-        "which the model says that it has left what it knows. Each number leads to its cell."
+        f"which the model says that it has left what it knows. In order: {RULE}."
     )
     return Table("Contestants on the judged runs", tuple(heads), entries, note)
 
@@ -187,7 +185,7 @@ def _draws(draws: Sequence[Drawn]) -> Table:
     for draw in draws:
         label, row = next(((n, r) for n, r in draw.rows.items() if r.winner), ("", None))
         found = [getattr(row, name) if row else None for name in COUNTS]
-        told = [Entry("–") if value is None else count(value) for value in found]
+        told = [MISSING if value is None else count(value) for value in found]
         head = [Entry(draw.date[:10]), Entry(draw.digest[:10]), count(draw.runs), Entry(label)]
         entries.append([*head, *told])
     return Table("Draws of the ledger under the same rules", heads, entries)

@@ -1,52 +1,194 @@
-"""Grids: every combination of a study file's values, each an experiment with one test scenario."""
+"""Grids: every combination of a study file's values, each an experiment with one test scenario.
+
+An experiment is made when it is asked for, and dropped after that: of a grid only the keys are
+kept.
+"""
+
+from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
-from vehiclemor.errors import FileError, InputError
-from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import component, unknown
+import numpy as np
+
+from vehiclemor.errors import FileError, GeometryError, InputError
+from vehiclemor.registry import unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.evaluate import refusal
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.method_settings import Settings, complete_settings, default_settings
-from vehiclemor.study.plans.study_file import FACTORS, StudyFile, values
-from vehiclemor.study.scenario import (
-    Overrides,
-    Scenario,
-    check,
-    overrides,
-    training_scenarios,
+from vehiclemor.study.plans.grid_runs import (
+    Cars,
+    Run,
+    check_car,
+    check_run,
+    run_at,
+    scenarios,
+    trained_cars,
 )
+from vehiclemor.study.plans.sampling import sampled
+from vehiclemor.study.plans.study_file import FACTORS, PARAMETER, TEXTS, StudyFile, values
+from vehiclemor.study.scenario import Values
+
+# Place in the grid: one index per dimension.
+Place = tuple[int, ...]
+# A key is 20 characters of ASCII.
+KEY = "S20"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
     """Experiments of a study on its dimensions.
 
     Attributes
     ----------
+    model
+        With the study's own parameters.
     dimensions
         Name -> values of every grid dimension, the labels of `method` last.
-    cells
-        Place in the grid (one index per dimension) -> experiment.  A dimension that does not
-        concern a method has the same experiment at all of its places.
+    samples
+        Name of what is sampled -> values on the dimension `sample`.
+    trained
+        Name -> cars that are trained on.
     """
 
     name: str
     definition: StudyFile
+    model: Model
     dimensions: dict[str, list[Any]]
-    cells: dict[tuple[int, ...], Experiment]
+    samples: dict[str, list[float]]
+    trained: dict[str, Cars]
+
+    @property
+    def sizes(self) -> Place:
+        """Number of values of every dimension."""
+        return tuple(len(entry) for entry in self.dimensions.values())
+
+    @property
+    def cells(self) -> Cells:
+        """Place -> experiment, made when it is asked for."""
+        return Cells(self)
 
     @cached_property
-    def unique(self) -> dict[str, Experiment]:
-        """Key -> experiment, each once, in grid order."""
-        return {cell.key: cell for cell in self.cells.values()}
+    def unique(self) -> UniqueCells:
+        """Key -> experiment, each once, in grid order, made when it is asked for."""
+        return UniqueCells(self)
+
+    @cached_property
+    def keys(self) -> np.ndarray:
+        """Keys of the experiments at all places."""
+        found = np.empty(self.sizes, KEY)
+        for method in range(self.sizes[-1]):
+            own = self._own_places(method)
+            keys = [self.cell(place).key for place in itertools.product(*own)]
+            found[..., method] = np.array(keys, KEY).reshape([len(part) for part in own[:-1]])
+        return found
+
+    def cell(self, place: Place) -> Experiment:
+        """The experiment at a place."""
+        point = self.point(place)
+        study, label = self.definition, point["method"]
+        entry, names = study.labelled[label], self._settings[label]
+        given = entry.settings | {d: point[d] for d in study.grid if d in names}
+        settings = _complete(self.model, entry.method, tuple(given.items()), entry.preset)
+        training, test = scenarios(self._run(place))
+        return make_experiment(self.model, entry.method, settings, training, (test,), study.keep)
+
+    def point(self, place: Place) -> dict[str, Any]:
+        """Name of a dimension, or of what is sampled -> value at a place."""
+        point = {d: found[i] for (d, found), i in zip(self.dimensions.items(), place, strict=True)}
+        return point | {name: found[point["sample"]] for name, found in self.samples.items()}
+
+    def check(self) -> None:
+        """Raise `VehiclemorError` if a run can't be made, or no settings of a method fit."""
+        for name, cars in self.trained.items():
+            for car in cars or ():
+                check_car(self.model, car, f"car_sets.{name}: " if name else "cars: ")
+        names = {name for found in self._settings.values() for name in found}
+        runs = [
+            range(1 if name in names or name == "method" else size)
+            for name, size in zip(self.dimensions, self.sizes, strict=True)
+        ]
+        for place in itertools.product(*runs):
+            check_run(self.model, self._run(place))
+        for method in range(self.sizes[-1]):
+            self._some_fits(method)
+
+    def _run(self, place: Place) -> Run:
+        fixed = {"maneuver": self.definition.maneuver or self.model.definition.maneuver}
+        return run_at(self.definition, fixed | self.point(place), self.trained)
+
+    @cached_property
+    def _settings(self) -> dict[str, set[str]]:
+        """Label of a method -> names of its settings."""
+        methods = self.definition.labelled.items()
+        return {label: set(default_settings(self.model, entry.method)) for label, entry in methods}
+
+    def _own_places(self, method: int) -> list[range]:
+        """Indices of every dimension at which the experiments of a method differ."""
+        own = self._settings[self.dimensions["method"][method]]
+        others = set().union(*self._settings.values()) - own
+        sizes = [1 if d in others else len(found) for d, found in self.dimensions.items()]
+        return [*map(range, sizes[:-1]), range(method, method + 1)]
+
+    def _some_fits(self, method: int) -> None:
+        """Raise the first error if no cell of a method has settings that fit the model.
+
+        Corners of a grid may not fit, such as a rank above the number of snapshots; if nothing
+        does, the study is wrong.
+        """
+        first: Failure | None = None
+        for place in itertools.product(*self._own_places(method)):
+            cell = self.cell(place)
+            found = refusal(self.model, cell)
+            # Of a method that refuses the model nothing is set; a bug is a result.
+            if found is None or found.status != "rejected" or not cell.settings:
+                return
+            first = first or found
+        if first is not None:
+            raise InputError(first.message)
+
+
+class Cells(Mapping[Place, Experiment]):
+    """Experiments of a grid by their places."""
+
+    def __init__(self, grid: Grid) -> None:
+        self._grid = grid
+
+    def __getitem__(self, place: Place) -> Experiment:
+        return self._grid.cell(place)
+
+    def __iter__(self) -> Iterator[Place]:
+        return itertools.product(*map(range, self._grid.sizes))
+
+    def __len__(self) -> int:
+        return self._grid.keys.size
+
+
+class UniqueCells(Mapping[str, Experiment]):
+    """Experiments of a grid by their keys, each once."""
+
+    def __init__(self, grid: Grid) -> None:
+        self._grid = grid
+        self._keys, self._first = np.unique(grid.keys.ravel(), return_index=True)
+
+    def __getitem__(self, key: str) -> Experiment:
+        at = int(np.searchsorted(self._keys, np.bytes_(key)))
+        if at == len(self._keys) or self._keys[at].decode() != key:
+            raise KeyError(key)
+        return self._grid.cell(np.unravel_index(self._first[at], self._grid.sizes))
+
+    def __iter__(self) -> Iterator[str]:
+        for key in self._keys[np.argsort(self._first)]:
+            yield key.decode()
+
+    def __len__(self) -> int:
+        return len(self._keys)
 
 
 def expand(name: str, study: StudyFile) -> Grid:
@@ -58,27 +200,34 @@ def expand(name: str, study: StudyFile) -> Grid:
         If the study names something unknown or a setting does not fit.
     """
     try:
-        model = build(study.model)
-        declared = _declared_settings(model, study)
-        dimensions = _dimensions(model, study, set().union(*declared.values()))
-        return Grid(name, study, dimensions, _cells(model, study, dimensions, declared))
-    except InputError as error:
+        model = build(study.model, overrides=study.parameters)
+        samples = sampled(study.sampling) if study.sampling else {}
+        dimensions = _dimensions(model, study, samples)
+        grid = Grid(name, study, model, dimensions, samples, trained_cars(study))
+        grid.check()
+        assert grid.keys.size
+        return grid
+    except (InputError, GeometryError) as error:
         raise FileError(f"study {name}: {error}") from None
 
 
-def _declared_settings(model: Model, study: StudyFile) -> dict[str, set[str]]:
-    """Label of a method -> names of its settings."""
-    methods = study.labelled.items()
-    return {label: set(default_settings(model, entry.method)) for label, entry in methods}
-
-
-def _dimensions(model: Model, study: StudyFile, settings: set[str]) -> dict[str, list[Any]]:
+def _dimensions(
+    model: Model, study: StudyFile, samples: Mapping[str, list[float]]
+) -> dict[str, list[Any]]:
     """Name -> values of every dimension, checked."""
+    settings = {s for entry in study.methods for s in default_settings(model, entry.method)}
+    known = (
+        settings | {*FACTORS, *TEXTS} | {f"{PARAMETER}{name}" for name in model.parameters.entries}
+    )
     for dimension in study.grid:
-        if dimension not in settings and dimension not in FACTORS:
-            raise unknown("grid dimension", dimension, settings | set(FACTORS))
-    dimensions: dict[str, list[Any]] = {factor: [1.0] for factor in FACTORS}
+        if dimension not in known and not dimension.startswith(PARAMETER):
+            raise unknown("grid dimension", dimension, known)
+    dimensions: dict[str, list[Any]] = {
+        factor: [1.0] for factor in FACTORS if factor not in samples
+    }
     dimensions |= {key: values(entry) for key, entry in study.grid.items()}
+    if study.sampling:
+        dimensions["sample"] = list(range(study.sampling.count))
     dimensions["start"] = list(study.start or [model.starts[0]])
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
@@ -86,73 +235,8 @@ def _dimensions(model: Model, study: StudyFile, settings: set[str]) -> dict[str,
     return dimensions
 
 
-def _cells(
-    model: Model,
-    study: StudyFile,
-    dimensions: Mapping[str, list[Any]],
-    declared: Mapping[str, set[str]],
-) -> dict[tuple[int, ...], Experiment]:
-    """Place -> experiment; each is made once."""
-    name = study.maneuver or component("model", study.model).maneuver
-    maneuver: Maneuver = component("maneuver", name)
-    tests = _tests(model, study, maneuver, dimensions)
-    cells: dict[tuple[int, ...], Experiment] = {}
-    made: dict[tuple[Any, ...], Experiment] = {}
-    complete: dict[tuple[Any, ...], Settings] = {}
-    for place in itertools.product(*(range(len(v)) for v in dimensions.values())):
-        point = {d: dimensions[d][i] for d, i in zip(dimensions, place, strict=True)}
-        label = point["method"]
-        entry = study.labelled[label]
-        given = dict(entry.settings)
-        given |= {d: point[d] for d in study.grid if d in declared[label]}
-        run = tuple(point[d] for d in (*FACTORS, "start"))
-        chosen = (label, *given.values())
-        identity = (run, *chosen)
-        if chosen not in complete:
-            complete[chosen] = complete_settings(model, entry.method, given, entry.preset)
-        if identity not in made:
-            training, test = tests[run]
-            made[identity] = make_experiment(
-                model, entry.method, complete[chosen], training, (test,), study.keep
-            )
-        cells[place] = made[identity]
-    for label in study.labelled:
-        _some_fits(model, [cell for key, cell in made.items() if key[1] == label])
-    return cells
-
-
-def _tests(
-    model: Model, study: StudyFile, maneuver: Maneuver, dimensions: Mapping[str, list[Any]]
-) -> dict[tuple[Any, ...], tuple[tuple[Scenario, ...], Scenario]]:
-    """Factors and start -> training and test scenarios."""
-    pairs = [(pair[0], pair[1]) for pair in study.training_set]
-    found: dict[tuple[Any, ...], tuple[tuple[Scenario, ...], Scenario]] = {}
-    for run in itertools.product(*(dimensions[d] for d in (*FACTORS, "start"))):
-        test = Scenario(maneuver.perturbed(*run[:-1]), run[-1])
-        check(model, test)
-        found[run] = training_scenarios(test, study.training, pairs, _trained(study)), test
-    return found
-
-
-def _trained(study: StudyFile) -> list[Overrides] | None:
-    """Cars that are trained on; None for the tested one."""
-    if isinstance(study.cars, str):
-        return None if study.cars == "own" else [()]
-    return [overrides(table) for table in study.cars]
-
-
-def _some_fits(model: Model, cells: list[Experiment]) -> None:
-    """Raise the first error if no cell of a method has settings that fit the model.
-
-    Corners of a grid may not fit, such as a rank above the number of snapshots; if nothing does,
-    the study is wrong.
-    """
-    first: Failure | None = None
-    for cell in cells:
-        found = refusal(model, cell)
-        # Of a method that refuses the model nothing is set; a bug is a result.
-        if found is None or found.status != "rejected" or not cell.settings:
-            return
-        first = first or found
-    if first is not None:
-        raise InputError(first.message)
+@lru_cache(maxsize=4096)
+def _complete(
+    model: Model, method: str, given: tuple[tuple[str, Any], ...], preset: str
+) -> Settings:
+    return Values(complete_settings(model, method, dict(given), preset))

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.parameters import AXES, parameter_and_axis
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.netcdf_file import PART, Parts, Region, regions
 from vehiclemor.study.plans.grid import Grid
+from vehiclemor.study.plans.study_file import PARAMETER
 from vehiclemor.study.provenance import attributes, layout_digest, versions
-from vehiclemor.study.store import read_arrays, read_dataset, result_path
+from vehiclemor.study.store import read_arrays, read_cell
 from vehiclemor.study.variables import meaning_of, variables
 
 if TYPE_CHECKING:
@@ -25,63 +30,85 @@ def cells_digest(grid: Grid) -> str:
     """Hash of a study and its cells at their places, for a combined dataset to be current."""
     digest = hashlib.sha256(grid.definition.model_dump_json().encode())
     digest.update(layout_digest().encode())
-    for place, cell in grid.cells.items():
-        digest.update(f"{place} {cell.key}".encode())
+    digest.update(grid.keys.tobytes())
     return digest.hexdigest()[:20]
 
 
-def grid_dataset(grid: Grid, folder: Path) -> xr.Dataset:
-    """Read all cells of a grid and put them together.
+def combined(grid: Grid, folder: Path) -> xr.Dataset | Parts:
+    """All cells of a grid put together; in parts if they are too large to be held.
 
     Raises
     ------
     FileError
         If a cell is missing, corrupt or foreign.
     """
+    size = read_cell(folder, next(iter(grid.unique))).nbytes
+    parts = regions(grid.sizes, max(PART // size, 1))
+    whole = tuple(slice(0, length) for length in grid.sizes)
+    first = next(parts)
+    if first == whole:
+        return _part(grid, folder, whole)
+    made = ((region, _part(grid, folder, region)) for region in itertools.chain([first], parts))
+    return Parts(tuple(grid.dimensions), made)
+
+
+def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:
+    """The cells in a region of a grid, with the attributes of the whole."""
     import xarray as xr
 
-    first_places: dict[str, list[tuple[int, ...]]] = {}
-    for place, cell in grid.cells.items():
-        first_places.setdefault(cell.key, []).append(place)
-    sizes = tuple(len(values) for values in grid.dimensions.values())
+    names, keys = tuple(grid.dimensions), grid.keys[region]
     arrays: dict[str, np.ndarray] = {}
+    found, numbers = np.unique(keys, return_inverse=True)
+    order = np.argsort(numbers, axis=None, kind="stable")
+    ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(found)))
     template: xr.Dataset | None = None
-    for key, places in first_places.items():
-        path = result_path(folder, key)
+    for key, flat in zip(found.astype(str), np.split(order, ends[:-1]), strict=True):
         if template is None:
-            template = read_dataset(path, "cell", key)
+            template = read_cell(folder, key)
             for name, variable in template.data_vars.items():
-                arrays[str(name)] = _empty(sizes + variable.shape, variable.dtype)
-        found = read_arrays(path, "cell", key)
+                arrays[str(name)] = _empty(keys.shape + variable.shape, variable.dtype)
+        places = np.unravel_index(flat, keys.shape)
+        cell = read_arrays(folder, key)
         for name, array in arrays.items():
-            for place in places:
-                array[place] = found[name]
+            array[places] = cell[name]
     assert template is not None
-    names = tuple(grid.dimensions)
-    keys = np.full(sizes, "", dtype=object)
-    for place, cell in grid.cells.items():
-        keys[place] = cell.key
-    coordinates: dict[str, Any] = {
-        name: (name, values, {"long_name": meaning_of(name)})
-        for name, values in grid.dimensions.items()
-    }
-    coordinates |= {str(name): variable for name, variable in template.coords.items()}
     combined = {
         str(name): (names + variable.dims, arrays[str(name)], variable.attrs)
         for name, variable in template.data_vars.items()
     }
-    dataset = xr.Dataset(combined | variables({"cell_key": keys}, *names), coordinates)
-    cell = next(iter(grid.cells.values()))
-    return dataset.assign_attrs(
-        attributes(
-            grid.definition.title,
-            cell.kernel,
-            study=grid.name,
-            model=cell.model,
-            training=grid.definition.training,
-            configuration=json.dumps(grid.definition.model_dump(), sort_keys=True),
-        )
-    )
+    combined |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
+    coordinates = {str(name): variable for name, variable in template.coords.items()}
+    dataset = xr.Dataset(combined, _coordinates(grid, region) | coordinates)
+    definition, model = grid.definition, grid.model
+    own = {
+        "study": grid.name,
+        "model": model.name,
+        "training": definition.training,
+        "configuration": json.dumps(definition.model_dump(), sort_keys=True),
+    }
+    return dataset.assign_attrs(attributes(definition.title, model.kernel_hash, **own))
+
+
+def _coordinates(grid: Grid, region: Region) -> dict[str, Any]:
+    """Values of the dimensions in a region, and of what is sampled; with meanings."""
+    parts = dict(zip(grid.dimensions, region, strict=True))
+    found = {name: (name, values) for name, values in grid.dimensions.items()}
+    found |= {name: ("sample", values) for name, values in grid.samples.items()}
+    return {
+        name: (dimension, values[parts[dimension]], described(grid.model, name))
+        for name, (dimension, values) in found.items()
+    }
+
+
+def described(model: Model, dimension: str) -> dict[str, str]:
+    """Meaning of a dimension, and unit of a parameter: as its parameter file has them."""
+    if not dimension.startswith(PARAMETER):
+        return {"long_name": meaning_of(dimension)}
+    given = dimension.removeprefix(PARAMETER)
+    name, axis = parameter_and_axis(model.name, model.definition.parameters, given)
+    entry = model.parameters.entries[name]
+    component = "" if axis is None else f", component {AXES[axis]}"
+    return {"long_name": f"{entry.description}{component}", "units": entry.unit}
 
 
 def _empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:

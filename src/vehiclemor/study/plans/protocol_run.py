@@ -26,10 +26,10 @@ from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import entry_of, opened, protocol_dataset
 from vehiclemor.study.plans.seal import seal, sealed_sets
 from vehiclemor.study.plans.sensitive import reasons, second_run
-from vehiclemor.study.plans.study_file import file_as_stored
+from vehiclemor.study.plans.study_file import owner
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import result_path, stored
+from vehiclemor.study.store import combined_path, result_path, stored
 from vehiclemor.study.workers import Engine, Workers
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ def run_protocol(
         `studies/predictive-<protocol>.nc` too.
     """
     workers = Workers(protocol.study, folder, jobs, elsewhere)
+    of = owner(protocol.study, protocol.path, protocol.definition, folder)
+    path = combined_path(folder, of)
     rows = validate(
         protocol.model,
         protocol.definition,
@@ -58,7 +60,7 @@ def run_protocol(
         protocol.sets["validation"],
         workers,
     )
-    rows = with_winner(protocol, rows, folder)
+    rows = with_winner(protocol, rows, path)
     digest = seal(protocol, rows)
     sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
     sets |= sealed_sets(protocol, digest)
@@ -72,16 +74,16 @@ def run_protocol(
         raise FileError(
             f"{protocol.path}: no drawn run can be judged, the first because {apart['drawn'][0]}"
         )
-    timed = timed_rows(protocol, rows, found, sets, folder)
-    studies, keys = folder / "studies", sorted(workers.asked)
+    timed = timed_rows(protocol, rows, found, sets, path)
+    keys = sorted(workers.asked)
     parts = [layout_digest(), protocol.definition.model_dump_json(), digest, *keys]
     dataset = stored(
-        studies / f"{protocol.study}.nc",
+        path,
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
         lambda: protocol_dataset(protocol, rows, found, (timed, apart), digest),
-        [studies / f"timing-{protocol.study}.nc", *(result_path(folder, key) for key in keys)],
-        file_as_stored(protocol.path, folder),
+        lambda: [Path(timed.encoding["source"]), *(result_path(folder, key) for key in keys)],
+        of,
     )
     if "drawn" in sets:
         ledger.record(entry_of(dataset, protocol))
@@ -99,9 +101,7 @@ def validate(
 
     Of a full-order contestant every candidate becomes a row.
     """
-    experiments = [
-        [c.experiment(model, i, validation) for i in range(len(c.candidates))] for c in contestants
-    ]
+    experiments = [_candidates(model, contestant, validation) for contestant in contestants]
     # Most candidates of a contestant share a fit.
     workers(experiments)
     rows: list[Row] = []
@@ -114,6 +114,20 @@ def validate(
         chosen = range(len(candidates)) if every else [choose(results)]
         rows += [Row(contestant, candidate, results) for candidate in chosen]
     return rows
+
+
+def validation_experiments(protocol: Protocol) -> list[Experiment]:
+    """What is computed before anything is chosen."""
+    validation = protocol.sets["validation"]
+    found = (_candidates(protocol.model, c, validation) for c in protocol.contestants)
+    return [experiment for candidates in found for experiment in candidates]
+
+
+def _candidates(
+    model: Model, contestant: Contestant, validation: tuple[Scenario, ...]
+) -> list[Experiment]:
+    candidates = range(len(contestant.candidates))
+    return [contestant.experiment(model, candidate, validation) for candidate in candidates]
 
 
 def test(
@@ -131,13 +145,18 @@ def test(
     }
 
 
-def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[Row]:
+def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row]:
     """The rows, one of them marked as chosen among the contenders, by validation alone.
 
     Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls
     take the least time, by our clock, on the first scenarios of the validation set, of times that
     are nearly the same (`choice.TIE_OF_TIMES`) the more accurate; if there is none, the one of the
     smallest score.
+
+    Parameters
+    ----------
+    path
+        Of the combined dataset.
     """
     racing = [i for i, row in enumerate(rows) if row.contestant.role == CONTENDER]
     results = {i: rows[i].validation[rows[i].candidate] for i in racing}
@@ -150,7 +169,7 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], folder: Path) -> list[R
         sample = protocol.sets["validation"][:TIMED]
         experiments = {rows[i].label: _experiment(protocol, rows[i], sample) for i in fitting}
         every = np.ones((len(experiments), len(sample)), dtype=bool)
-        timed = _timed(folder, f"timing-validation-{protocol.study}", experiments, every)
+        timed = _timed(_beside("timing-validation", path), experiments, every)
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda i: results[i].score)
@@ -164,34 +183,34 @@ def timed_rows(
     rows: Sequence[Row],
     tested: dict[str, list[xr.Dataset]],
     sets: dict[str, tuple[Scenario, ...]],
-    folder: Path,
+    path: Path,
 ) -> xr.Dataset:
     """Stored timing of the rows on the first test runs, measured first if missing or out of date.
 
-    A run whose result in the test set is a failure is not timed.
+    A run whose result in the test set is a failure is not timed.  `path` is of the combined
+    dataset.
     """
     name = "drawn" if "drawn" in sets else "test"
     sample = sets[name][:TIMED]
     experiments = {row.label: _experiment(protocol, row, sample) for row in rows}
     ends = [found["status"].values[: len(sample)] for found in tested[name]]
     finished = np.isin(np.array(ends), FINISHED)
-    return _timed(folder, f"timing-{protocol.study}", experiments, finished)
+    return _timed(_beside("timing", path), experiments, finished)
+
+
+def _beside(what: str, path: Path) -> Path:
+    """File with the times of a protocol."""
+    return path.with_name(f"{what}-{path.name}")
 
 
 def _experiment(protocol: Protocol, row: Row, scenarios: tuple[Scenario, ...]) -> Experiment:
     return row.contestant.experiment(protocol.model, row.candidate, scenarios)
 
 
-def _timed(
-    folder: Path,
-    name: str,
-    experiments: dict[str, Experiment],
-    finished: np.ndarray,
-) -> xr.Dataset:
+def _timed(path: Path, experiments: dict[str, Experiment], finished: np.ndarray) -> xr.Dataset:
     content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(
-        folder,
-        name,
+        path,
         [content, timing.PROTOCOL_ROUNDS],
         lambda: timing.timed_tests(experiments, finished),
     )

@@ -1,5 +1,6 @@
 """Study files: the grid of a study declared in TOML, validated on loading."""
 
+import hashlib
 import math
 import os
 from pathlib import Path
@@ -12,9 +13,13 @@ from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.study.store import Owner
 from vehiclemor.toml_files import FileSchema, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
+# Axes that say what is run and what is trained on; and how the name of a parameter's begins.
+TEXTS = ("maneuver", "training", "cars")
+PARAMETER = "parameters."
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
 
@@ -34,6 +39,33 @@ Axis = Annotated[
 ]
 
 
+class Sampling(FileSchema):
+    """Points spread over ranges, in place of every combination of some values."""
+
+    plan: Literal["latin_hypercube", "sobol"] = Field(description="how points are spread")
+    count: int = Field(ge=1, le=MOST_POINTS, description="how many; of sobol a power of two")
+    seed: int = Field(ge=0, description="the same seed gives the same points")
+    ranges: dict[str, list[float]] = Field(
+        description="[from, to] of parameters.NAME, frequency_factor or amplitude_factor"
+    )
+
+    @model_validator(mode="after")
+    def _sound(self) -> "Sampling":
+        if not self.ranges:
+            raise ValueError("ranges is empty")
+        for name, limits in self.ranges.items():
+            if len(limits) != 2 or not -math.inf < limits[0] < limits[1] < math.inf:
+                raise ValueError(f"ranges: {name} is not [from, to]")
+            if name not in FACTORS and not name.startswith(PARAMETER):
+                raise ValueError(f"ranges: {name} is neither parameters.NAME nor a factor")
+        if self.plan == "sobol" and self.count & (self.count - 1):
+            raise ValueError(f"count: {self.count} is no power of two, as a sobol plan needs it")
+        return self
+
+
+Car = dict[str, float | list[float]]
+
+
 class MethodEntry(FileSchema):
     """One method of a study: settings that differ from a preset, under a label of its own."""
 
@@ -43,6 +75,8 @@ class MethodEntry(FileSchema):
     settings: dict[str, int | float | str] = Field(
         default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
     )
+    training: str = Field("", description="as of the study, whose it is by default")
+    cars: str = Field("", description="as of the study, whose it is by default")
 
 
 class StudyFile(FileSchema):
@@ -60,6 +94,10 @@ class StudyFile(FileSchema):
         default_factory=list, description="names of protocols, or TOML files: see protocol-schema"
     )
     model: str = Field("", description="registered name; needed for a grid")
+    parameters: Car = Field(
+        default_factory=dict,
+        description="parameter -> value in SI units where the study's car is not the model's",
+    )
     maneuver: str = Field("", description="registered name; the model's own by default")
     start: list[str] = Field(
         default_factory=list, description="initial conditions; the model's first by default"
@@ -72,17 +110,25 @@ class StudyFile(FileSchema):
         default_factory=list,
         description="of training = set: pairs [frequency factor, amplitude factor]",
     )
-    cars: Literal["own", "nominal"] | list[dict[str, float | list[float]]] = Field(
+    cars: str | list[Car] = Field(
         "own",
         description="cars that are trained on: own (the tested one, a fit each), nominal (the "
-        "study's), or a list of tables parameter -> value",
+        "study's), one of car_sets, or a list of tables parameter -> value",
+    )
+    car_sets: dict[str, list[Car] | Sampling] = Field(
+        default_factory=dict,
+        description="name -> cars: tables parameter -> value, or a sampling of parameters",
     )
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
     grid: dict[str, Axis] = Field(
         default_factory=dict,
-        description="dimension -> values; frequency_factor, amplitude_factor, or any setting",
+        description="dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
+        "maneuver, training, cars, or any setting",
+    )
+    sampling: Sampling | None = Field(
+        None, description="points of a dimension `sample` beside those of the grid"
     )
     methods: list[MethodEntry] = Field(
         default_factory=list, description="each is run at every point of the grid"
@@ -96,8 +142,9 @@ class StudyFile(FileSchema):
     @property
     def points(self) -> int:
         """Number of points of the grid; one cell may stand at several of them."""
-        sizes = (len(values(entry)) for entry in self.grid.values())
-        return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
+        sizes = [len(values(entry)) for entry in self.grid.values()]
+        sizes += [len(self.start) or 1, self.sampling.count if self.sampling else 1]
+        return math.prod(sizes) * len(self.methods)
 
     @field_validator("training_set")
     @classmethod
@@ -132,15 +179,26 @@ class StudyFile(FileSchema):
         doubles = {label for label in labels if labels.count(label) > 1}
         if doubles:
             raise ValueError(f"label {sorted(doubles)[0]!r} is used twice")
+        self._set_once()
+        if self.points > MOST_POINTS:
+            raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
+        return self
+
+    def _set_once(self) -> None:
+        own = {f"{PARAMETER}{name}" for name in self.parameters}
+        own |= {"maneuver"} if self.maneuver else set()
+        for where, names in (("sampling", self.sampling and self.sampling.ranges), ("study", own)):
+            for name in self.grid.keys() & set(names or ()):
+                raise ValueError(f"{name} is set twice: in the grid and in the {where}")
+        for name in own & set(self.sampling.ranges if self.sampling else ()):
+            raise ValueError(f"{name} is set twice: in the sampling and in the study")
         for entry in self.methods:
-            for name in self.grid.keys() & entry.settings.keys():
+            given = {*entry.settings, *(n for n in ("training", "cars") if getattr(entry, n))}
+            for name in self.grid.keys() & given:
                 method = entry.label or entry.method
                 raise ValueError(
                     f"{name} is set twice: in the grid and in the settings of {method}"
                 )
-        if self.points > MOST_POINTS:
-            raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
-        return self
 
 
 def values(entry: Axis) -> list[int | float | str]:
@@ -175,7 +233,8 @@ def read_study(path: Path) -> StudyFile:
     """A study file; of a protocol's file the study of it alone."""
     if not has_table(path, "contestants"):
         return read_toml(path, StudyFile)
-    return StudyFile(title=read_toml(path, ProtocolFile).title, protocols=[str(path)])
+    title = read_toml(path, ProtocolFile).title
+    return StudyFile.model_validate({"title": title, "protocols": [str(path)]})
 
 
 def load_studies(study: str) -> dict[str, StudyFile]:
@@ -195,13 +254,32 @@ def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
         content = read_study(file)
         if content.studies:
             raise FileError(f"{path}: studies.{member} is a collection itself")
-        if file.stem in members:
-            raise FileError(f"{path}: studies.{member}: another study is named {file.stem} too")
-        members[file.stem] = file, content
+        if content in (other for _, other in members.values()):
+            raise FileError(f"{path}: studies.{member}: the same study is in it already")
+        # As its combined dataset is named, see `combined_path`.
+        double = file.stem in members
+        members[f"{file.stem}-{content_hash(content)}" if double else file.stem] = file, content
     return members
 
 
-def file_as_stored(path: Path, folder: Path) -> str:
+def owner(study: str, path: Path, definition: FileSchema, folder: Path) -> Owner:
+    """Whose a combined dataset in a results folder is.
+
+    Parameters
+    ----------
+    study
+        Name of its results.
+    """
+    return Owner(study, _as_stored(path, folder), content_hash(definition))
+
+
+def content_hash(definition: FileSchema) -> str:
+    """Short hash of what a file says."""
+    text = definition.model_dump_json(exclude_defaults=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def _as_stored(path: Path, folder: Path) -> str:
     """How results in a folder name the file that they come from: the package's own by its name."""
     if data_folder() in path.parents:
         return path.stem

@@ -1,0 +1,85 @@
+"""Where the values of a grid's dimension stand on an axis, and how that axis is labelled."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
+
+UNITS = {"control_period": "s"}
+# Ratio of the largest to the smallest number from which on an axis is logarithmic; names that there
+# is room for, or half of them where they are long; decades up to which an axis has 1, 2 and 5.
+WIDE, MOST_NAMES, LONG, FEW_DECADES = 30.0, 12, 6, 2.5
+
+
+class Places(NamedTuple):
+    """Places of the values of a dimension.
+
+    Attributes
+    ----------
+    at
+        Perturbations in %, numbers, or 0, 1, 2 ... of what has `names` (values,).
+    label
+        Of the axis, with its unit.
+    names
+        Texts at the places, none where the axis is one of numbers.
+    """
+
+    at: np.ndarray
+    label: str
+    names: Sequence[str] = ()
+
+    @property
+    def wide(self) -> bool:
+        """Whether the numbers ask for a logarithmic axis."""
+        return bool(not self.names and 0.0 < WIDE * self.at.min() <= self.at.max())
+
+    def tick(self, axis: Axis) -> None:
+        """Label an axis."""
+        axis.set_label_text(self.label)
+        if self.names:
+            room = MOST_NAMES if max(map(len, self.names)) <= LONG else MOST_NAMES // 2
+            step = -(-len(self.names) // room)
+            axis.set_ticks(self.at[::step], list(self.names)[::step])
+        elif self.at.dtype.kind == "i":
+            axis.set_major_locator(MaxNLocator(nbins=8, integer=True))
+
+    def scale(self, panel: Axes) -> None:
+        """Label the lower axis of a panel, logarithmic where the numbers ask for it."""
+        if self.wide:
+            panel.set_xscale("log")
+        elif self.names:
+            panel.set_xlim(-0.5, len(self.names) - 0.5)
+        self.tick(panel.xaxis)
+
+    def even(self) -> "Places":
+        """Cells of one size: numbers at unequal distances become names."""
+        steps = np.diff(self.at)
+        if self.names or np.allclose(steps, steps.mean(), rtol=1e-6):
+            return self
+        names = [f"{value:.4g}" for value in self.at]
+        return Places(np.arange(len(names)), self.label, names)
+
+
+def places_of(dataset: xr.Dataset, name: str) -> Places:
+    """Places of a dimension of a grid, or of a coordinate on one."""
+    values, words = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
+    if name in FACTORS:
+        return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
+    if not np.issubdtype(values.dtype, np.number):
+        return Places(np.arange(len(values)), words, [str(value) for value in values])
+    unit = str(dataset[name].attrs.get("units", UNITS.get(name, "")))
+    return Places(values, f"{words} ({unit})" if unit not in ("", "1") else words)
+
+
+def tick_decades(axis: Axis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis: 1, 2, 5 of each decade where there are few decades."""
+    if np.log10(high / low) < FEW_DECADES:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())

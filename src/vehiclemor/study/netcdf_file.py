@@ -1,0 +1,217 @@
+"""Datasets as whole netCDF-4 files: combined results, single runs, saved models.
+
+Each holds a hash of its content, which is checked whenever it is read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vehiclemor.errors import FileError, MachineError, SpoiledError, machine_reason
+from vehiclemor.files import write_whole
+
+if TYPE_CHECKING:
+    import netCDF4
+    import xarray as xr
+
+# Group of a file with the hash of all that stands outside of it.
+INTEGRITY = "integrity"
+# Bytes of the largest part of a dataset that is made, written or checked at a time, and of the
+# smallest file that is read only where it is asked for.
+PART, LARGE = 1 << 26, 1 << 28
+# One slice of each dimension.
+Region = tuple[slice, ...]
+
+
+class Parts(NamedTuple):
+    """A dataset that is too large to be held.
+
+    Attributes
+    ----------
+    dimensions
+        Those along which it is in parts.
+    parts
+        Region of these dimensions, and what the dataset has there; the first begins at zero.
+    """
+
+    dimensions: tuple[str, ...]
+    parts: Iterator[tuple[Region, xr.Dataset]]
+
+
+def write_dataset(dataset: xr.Dataset, path: Path) -> None:
+    """Write a dataset as a whole file."""
+    from xarray.backends import NetCDF4DataStore
+
+    _write(path, lambda file: dataset.dump_to_store(NetCDF4DataStore(file)), dataset.nbytes)
+
+
+def write_parts(parts: Parts, path: Path, further: Mapping[str, object]) -> None:
+    """Write a dataset as a whole file, part by part, with further attributes."""
+    from xarray.backends import NetCDF4DataStore
+
+    def fill(file: netCDF4.Dataset) -> None:
+        _, first = next(parts.parts)
+        found = first.variables.items()
+        grown = [str(n) for n, v in found if set(v.dims) & set(parts.dimensions)]
+        first.assign_attrs(further).dump_to_store(
+            NetCDF4DataStore(file),
+            encoding={name: {"chunksizes": first[name].shape} for name in grown},
+            unlimited_dims=list(parts.dimensions),
+        )
+        file.set_auto_maskandscale(False)
+        for region, part in parts.parts:
+            at = dict(zip(parts.dimensions, region, strict=True))
+            for name in grown:
+                place = tuple(at.get(str(d), slice(None)) for d in part[name].dims)
+                file[name][place] = part[name].values
+
+    _write(path, fill, PART)
+
+
+def _write(path: Path, fill: Callable[[netCDF4.Dataset], object], size: int) -> None:
+    """Write a file that `fill` fills with about so many bytes."""
+    import netCDF4
+
+    def write(temporary: Path) -> None:
+        try:
+            with netCDF4.Dataset(temporary, "w") as file:
+                fill(file)
+                file.createGroup(INTEGRITY).sha256 = _digest(file)
+        except (OSError, RuntimeError):
+            # The library hides the reason; plain writing of as much as there is tells it.
+            temporary.write_bytes(bytes(size + (1 << 16)))
+            raise
+
+    try:
+        write_whole(path, write)
+    except RuntimeError as error:
+        raise FileError(f"{path}: can't be written ({error})") from None
+
+
+def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
+    """Read a result file of this package into memory; a large one where it is asked for.
+
+    Parameters
+    ----------
+    attribute, expected
+        Global attribute that tells whose file it is, and its value.
+
+    Raises
+    ------
+    FileError
+        If the file is missing; `SpoiledError` if it is corrupt, or not the expected one. It is left
+        as it is.
+    """
+    import xarray as xr
+    from xarray.backends import NetCDF4DataStore
+
+    with _opened(path, attribute, expected) as file:
+        if path.stat().st_size < LARGE:
+            file.set_auto_maskandscale(True)
+            return xr.open_dataset(NetCDF4DataStore(file)).load()
+    return opened_lazily(path)
+
+
+def opened_lazily(path: Path) -> xr.Dataset:
+    """A dataset that is read where it is asked for; with dask in the parts that were written."""
+    import xarray as xr
+
+    chunks: Any = {} if find_spec("dask") else None
+    return xr.open_dataset(path, engine="netcdf4", cache=False, chunks=chunks)
+
+
+def regions(sizes: Sequence[int], at_once: int) -> Iterator[Region]:
+    """Parts of an array of at most so many elements that cover it, in the order of its elements."""
+    split, inside = len(sizes), 1
+    while split and inside * sizes[split - 1] <= at_once:
+        split -= 1
+        inside *= sizes[split]
+    if not split:
+        yield tuple(slice(0, size) for size in sizes)
+        return
+    step = max(at_once // inside, 1)
+    rest = tuple(slice(0, size) for size in sizes[split:])
+    for lead in itertools.product(*map(range, sizes[: split - 1])):
+        before = tuple(slice(i, i + 1) for i in lead)
+        for begin in range(0, sizes[split - 1], step):
+            yield (*before, slice(begin, min(begin + step, sizes[split - 1])), *rest)
+
+
+def global_attributes(path: Path) -> dict[str, Any]:
+    """Attributes of a file, unchecked; none if it is missing or can't be read."""
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(path) as file:
+            return {name: file.getncattr(name) for name in file.ncattrs()}
+    except (OSError, RuntimeError):
+        return {}
+
+
+@contextmanager
+def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Dataset]:
+    """A result file that is whole and the expected one."""
+    with opened(path, "result file", "; move it away and run again") as file:
+        if getattr(file, attribute, None) != expected:
+            reason = f"not the result that belongs here ({attribute} is not {expected})"
+            raise SpoiledError(reason, path, "; move it away and run again")
+        yield file
+
+
+@contextmanager
+def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
+    """A netCDF file that is whole.
+
+    Parameters
+    ----------
+    kind, mend
+        What an error calls it, and what it tells to do.
+    """
+    import netCDF4
+
+    if not path.is_file():
+        if path.exists():
+            raise SpoiledError(f"is a folder, not a {kind}", path)
+        raise FileError(f"{path}: no such {kind}")
+    try:
+        with netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            if INTEGRITY in file.groups and file[INTEGRITY].sha256 != _digest(file):
+                raise ValueError("what it holds is not what was written")
+            yield file
+    except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
+        if machine := machine_reason(error):
+            raise MachineError(f"{path}: can't be read ({machine})") from None
+        reason = error.strerror if isinstance(error, OSError) else None
+        detail = reason or str(error).splitlines()[0][:80]
+        detail = "damaged, or no netCDF-4 file" if "NetCDF:" in detail else detail
+        if isinstance(error, PermissionError):
+            raise FileError(f"{path}: can't be read ({detail})") from None
+        raise SpoiledError(f"not a readable {kind} ({detail})", path, mend) from None
+
+
+def _digest(file: netCDF4.Dataset) -> str:
+    """Hash of the variables and attributes of a file."""
+    import numpy as np
+
+    digest = hashlib.sha256()
+    for owner in (file, *file.variables.values()):
+        described = {name: str(owner.getncattr(name)) for name in sorted(owner.ncattrs())}
+        digest.update(repr(described).encode())
+    file.set_auto_maskandscale(False)
+    for name, variable in file.variables.items():
+        kind = np.dtype(object if variable.dtype is str else variable.dtype)
+        digest.update(f"{name} {variable.dimensions} {kind} {variable.shape}".encode())
+        for number, region in enumerate(regions(variable.shape, PART // kind.itemsize)):
+            values = np.asarray(variable[region] if region else variable[...])
+            if kind.kind in "OUS":
+                digest.update(b"\n" * (number > 0) + "\n".join(map(str, values.ravel())).encode())
+            else:
+                digest.update(values.tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,342 @@
+"""A study, a protocol or a collection of somebody else's: tables, figures and the leaderboard."""
+
+import json
+import re
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import vehiclemor as vm
+from tests.report.figure_texts import check_texts
+from vehiclemor import registry
+from vehiclemor.cli import main
+from vehiclemor.errors import InputError
+from vehiclemor.report.comparison.study import grid_rows
+from vehiclemor.report.figures.catalogue import find
+from vehiclemor.report.figures.result_plot import plot_result
+from vehiclemor.report.figures.saving import styled
+from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
+from vehiclemor.study.run import run_studies
+
+MODAL = Path(__file__).parents[1] / "plugin" / "vehiclemor_modal_method"
+STUDY = """
+title = "My car, my method"
+model = "quarter_car"
+training = "nominal"
+start = ["equilibrium", "dropped"]
+keep = "{keep}"
+[grid]
+frequency_factor = [0.8, 1.0, 1.3]
+fastest = [20.0, 1000.0]
+[[methods]]
+method = "full_order"
+[[methods]]
+method = "replay"
+[[methods]]
+method = "modal_basis"
+label = "mine"
+"""
+PROTOCOL = """
+title = "My car, my method, roads that it has not seen"
+model = "quarter_car"
+bounds.tire_force = { measure = "rms", bound = 20.0 }
+training = [{ maneuver = "sine_road" }]
+validation = [{ maneuver = "sine_road", frequency = [1.2] }]
+test = [{ maneuver = "sine_road", frequency = [0.9, 1.1], start = ["equilibrium", "dropped"] }]
+targets = [{ against = "equal accuracy", ratio = 2.0 }]
+failure_rate = 0.01
+[[contestants]]
+label = "full order"
+method = "full_order"
+role = "full order"
+candidates = [{ tolerance = 1e-3 }, { tolerance = 1e-6 }]
+[[contestants]]
+label = "replay"
+method = "replay"
+role = "baseline"
+[[contestants]]
+label = "mine"
+method = "modal_basis"
+candidates = [{ fastest = 20.0 }, { fastest = 1000.0 }]
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _modal_method(plug_in_package):
+    """The method of the second plug-in, as if it were installed beside the first."""
+    real = registry._entries
+    entry = EntryPoint("modal_basis", "vehiclemor_modal_method:METHOD", registry.GROUPS["method"])
+    methods = {**real("method"), "modal_basis": entry}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(MODAL)
+        patch.setattr(registry, "_entries", lambda k: methods if k == "method" else real(k))
+        yield
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with a study, a protocol and a collection of both, and their results."""
+    folder = tmp_path_factory.mktemp("mine")
+    (folder / "mine.toml").write_text(STUDY.format(keep="trajectories"))
+    (folder / "road.toml").write_text(PROTOCOL)
+    (folder / "judged.toml").write_text(f'title = "j"\nprotocols = ["{folder / "road.toml"}"]\n')
+    members = ", ".join(f'"{folder / name}.toml"' for name in ("mine", "judged"))
+    (folder / "both.toml").write_text(f'title = "both"\nstudies = [{members}]\n')
+    return folder
+
+
+@pytest.fixture
+def said(place, capsys, monkeypatch):
+    """Run a command on the results folder: exit status and what it prints."""
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def run(*arguments):
+        status = main([*map(str, arguments), "--out", str(place / "results")])
+        out = capsys.readouterr().out
+        assert "--json" in arguments or all(len(line) <= 80 for line in out.splitlines())
+        return status, out
+
+    return run
+
+
+def test_a_study_is_compared_by_method_start_and_output(place, said):
+    status, text = said("compare", place / "mine.toml")
+    assert status == 0
+    for words in ("My car, my method", "mine", "replay", "start dropped: tire force, N"):
+        assert words in text
+    status, text = said("compare", place / "mine.toml", "--json")
+    rows = {(r["method"], r["start"], r["output"]): r for r in json.loads(text)}
+    data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
+    assert len(rows) == 3 * 2 * data.sizes["output"]
+    for (method, start, output), row in rows.items():
+        errors = data["rms_error"].sel({"method": method, "start": start, "output": output})
+        # What a method doesn't have makes no further runs.
+        assert row["runs"] == (6 if method == "mine" else 3)
+        assert row["failed"] == 0
+        assert row["largest"] == float(errors.max())
+        assert row["median"] == pytest.approx(float(errors.median()), rel=1e-12)
+        at = dict(part.rsplit(" ", 1) for part in row["largest_at"].split(", ") if part)
+        if at:
+            chosen = errors.sel({k: float(v) for k, v in at.items()})
+            np.testing.assert_array_equal(chosen, row["largest"])
+
+
+def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
+    said("compare", place / "mine.toml")
+    data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
+    data["status"] = data["status"].astype(object)
+    there = {"method": "mine", "start": "dropped", "frequency_factor": 1.3, "fastest": 20.0}
+    before = {(r["method"], r["start"], r["output"]): r for r in grid_rows(data)}
+    data["status"].loc[there] = "diverged"
+    data["rms_error"].loc[there] = np.inf
+    row = next(
+        r
+        for r in grid_rows(data)
+        if (r["method"], r["start"], r["output"]) == ("mine", "dropped", "tire_force")
+    )
+    assert (row["failed"], row["failures"], row["runs"]) == (1, "1 diverged", 6)
+    assert np.isfinite(row["largest"])
+    assert row["largest"] <= before["mine", "dropped", "tire_force"]["largest"]
+    figure = plot_result(data, None, "errors")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "a run has failed" in labels
+    check_texts_of(figure)
+    data["status"][:] = "diverged"
+    assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
+    assert plot_result(data, None, "errors").axes
+
+
+def test_a_protocol_is_judged_by_its_own_targets(place, said):
+    # Four runs can't exclude a rate of 1 %, however fast they are.
+    status, text = said("compare", place / "both.toml")
+    assert status == 1
+    for words in ("My car, my method", "road (quarter_car): 4 runs", "* mine"):
+        assert words in text
+    assert re.search(r"failure rate below +0.01\*? +0.53 +missed", text)
+    assert "speed-up, equal accuracy" in text
+    rows = vm.compare(str(place / "road.toml"), place / "results")
+    assert set(rows["study"]) == {"predictive-road"}
+    assert set(rows["method"][rows["kind"] == "target"]) == {"mine"}
+
+
+def test_figures_of_a_study_and_a_protocol(place, capsys):
+    results = place / "results"
+    entries = find(str(place / "both.toml"), results)
+    assert [entry.name for entry in entries] == ["mine-errors", "mine-histories", "road-pareto"]
+    data = run_studies(str(place / "both.toml"), results)
+    with styled():
+        figure = entries[0].draw(data)
+        check_texts_of(figure)
+    assert "mine" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    folders = ["--results", results, "--out", place / "figures"]
+    assert main(["figures", "--only", str(place / "road.toml"), *map(str, folders)]) == 0
+    written = [Path(line) for line in capsys.readouterr().out.splitlines()]
+    assert [path.name for path in written] == [
+        f"figure-road-pareto.{suffix}" for suffix in ("pdf", "svg", "png")
+    ]
+    assert all(path.stat().st_size > 10_000 for path in written)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [("nothing.toml", "no such file"), ("figurs-2-4", "did you mean figures-2-4")],
+)
+@pytest.mark.parametrize("command", [["compare"], ["figures", "--only"]])
+def test_what_is_no_study_is_named(command, wrong, words, tmp_path, capsys):
+    assert main([*command, wrong, "--out", str(tmp_path / "out")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def check_texts_of(figure):
+    FigureCanvasAgg(figure).draw()
+    check_texts(figure)
+
+
+def varied(**dimensions):
+    """Errors that a study could have over any dimensions, of two methods."""
+    outputs = ["second_euler_angle", "spindle_y"]
+    names = [*dimensions, "method"]
+    sizes = [len(values) for values in dimensions.values()]
+    rng = np.random.default_rng(3)
+    errors = 10.0 ** rng.uniform(-6.0, -2.0, (*sizes, 2, 2))
+    variables = {
+        "rms_error": ((*names, "output"), errors),
+        "signal_range": ((*names, "output"), np.ones_like(errors)),
+        "status": (names, np.full(errors.shape[:-1], "ok", dtype=object)),
+    }
+    units = {"output_unit": ("output", ["rad", "m"])}
+    coordinates = {**dimensions, "method": ["pod", "my_own_method"], "output": outputs, **units}
+    attributes = {"title": "what varies", "model": "double_wishbone", "configuration": "{}"}
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "label", "panels", "meshes"),
+    [
+        (FACTOR, "frequency perturbation (%)", 2, 0),
+        (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
+        (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
+        ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
+        ({"rank": [*range(1, 9)], "snapshots": [*range(5, 11)]}, "rank", 4, 4),
+        ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 4, 0),
+        ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
+        (
+            FACTOR | {"rank": [*range(1, 9)], "snapshots": [5, 6]},
+            "frequency perturbation (%)",
+            2,
+            0,
+        ),
+        ({"equation_seed": [*range(30)]}, "", 2, 0),
+    ],
+)
+def test_figures_follow_from_what_varies(dimensions, label, panels, meshes):
+    dataset = varied(**dimensions)
+    figure = plot_result(dataset, None, "errors")
+    shown = [axis for axis in figure.axes if axis.get_label() != "<colorbar>"]
+    assert len(shown) == panels
+    assert shown[-1].get_xlabel() == label
+    found = [axis for axis in shown if any(hasattr(c, "get_coordinates") for c in axis.collections)]
+    assert len(found) == meshes
+    assert (shown[-1].get_xscale() == "log") == (label == "tolerance")
+    check_texts_of(figure)
+
+
+def test_curves_show_every_error_once(place):
+    dataset = varied(**FACTOR, rank=[2, 3])
+    # One method does not depend on the rank.
+    dataset["rms_error"][:, 1, 1] = dataset["rms_error"][:, 0, 1]
+    figure = plot_result(dataset, None, "errors")
+    axis = figure.axes[0]
+    lines = {line.get_label(): line for line in axis.lines if line.get_xdata().size}
+    assert set(lines) == {"POD, rank 2", "POD, rank 3", "my own method"}
+    for rank_ in (2, 3):
+        place = {"method": "pod", "rank": rank_, "output": "second_euler_angle"}
+        line = lines[f"POD, rank {rank_}"]
+        np.testing.assert_array_equal(line.get_ydata(), dataset["rms_error"].sel(place))
+        np.testing.assert_allclose(line.get_xdata(), [-20.0, 0.0, 20.0, 40.0], atol=1e-12)
+
+
+def test_samples_are_drawn_over_what_was_sampled():
+    dataset = varied(sample=[*range(40)])
+    values = np.linspace(0.0, 1.0, 40)
+    names = ("first", "second", "third", "fourth")
+    for number, name in enumerate(names):
+        places = np.roll(values, 7 * number)
+        dataset = dataset.assign_coords({name: ("sample", places, {"units": "kg"})})
+    dataset["rms_error"] = dataset["rms_error"] * 0.0 + np.exp(dataset["third"])
+    figure = plot_result(dataset, None, "errors")
+    assert len(figure.axes) == 6
+    # Of four quantities the errors follow the third.
+    assert figure.axes[3].get_xlabel() == "third (kg)"
+    check_texts_of(figure)
+
+
+def row_of(**changes):
+    row = {"silent": 0, "misses": 0, "ratio_equal": 1.0}
+    return row | changes
+
+
+def test_the_rule_of_the_leaderboard():
+    better_to_worse = [
+        row_of(ratio_equal=4.0),
+        row_of(),
+        row_of(ratio_equal=float("nan")),
+        row_of(misses=3, ratio_equal=9.0),
+        row_of(misses=1, silent=1, ratio_equal=9.0),
+        row_of(misses=9, silent=1),
+    ]
+    shuffled = [better_to_worse[i] for i in (3, 1, 5, 0, 4, 2)]
+    assert sorted(shuffled, key=rank) == better_to_worse
+
+
+def test_the_leaderboard_holds_all_stored_protocols_and_names_what_is_none(place, said, capsys):
+    said("compare", place / "road.toml")
+    studies = place / "results" / "studies"
+    board = leaderboard(place / "results")
+    assert list(board["place"]) == [1, 2, 3, 4]
+    assert set(board["method"]) == {"full order 1e-3", "full order 1e-6", "replay", "mine"}
+    assert not board.attrs["left_out"]
+    whole = (studies / "predictive-road.nc").read_bytes()
+    (studies / "predictive-torn.nc").write_bytes(whole[: len(whole) // 2])
+    (studies / "predictive-text.nc").write_text("no dataset")
+    old = read_dataset(studies / "predictive-road.nc", "source", "vehiclemor")
+    write_dataset(old.drop_vars("loop_seconds"), studies / "predictive-loopless.nc")
+    write_dataset(old.drop_vars("trusted_until"), studies / "predictive-old.nc")
+    foreign = old.assign_attrs(configuration='{"title": "no protocol"}')
+    write_dataset(foreign, studies / "predictive-foreign.nc")
+    try:
+        status, text = said("leaderboard")
+        assert status == 0
+        assert text.count(" 1 ") >= 1
+        for words in ("fewest silent misses", "mine *", "replay (b)", "(f)", "road (quarter_car"):
+            assert words in text
+        # Two that can be read have the same rows: their methods are counted over both.
+        assert re.search(r"modal_basis +2 +8 ", text)
+        left_out = leaderboard(place / "results").attrs["left_out"]
+        reasons = {Path(path).stem.removeprefix("predictive-"): r for path, r in left_out.items()}
+        assert set(reasons) == {"torn", "text", "old", "foreign"}
+        assert "trusted_until" in reasons["old"]
+        assert main(["leaderboard", "--json", "--out", str(place / "results")]) == 0
+        printed = capsys.readouterr()
+        assert len(json.loads(printed.out)) == 8
+        assert all(name in printed.err for name in ("torn", "text", "old", "foreign"))
+    finally:
+        for name in ("torn", "text", "loopless", "old", "foreign"):
+            (studies / f"predictive-{name}.nc").unlink()
+
+
+def test_a_folder_without_protocols_has_no_leaderboard(tmp_path, capsys):
+    with pytest.raises(InputError, match="no results of protocols"):
+        vm.leaderboard(tmp_path)
+    assert main(["leaderboard", "--out", str(tmp_path)]) == 2
+    assert "vehiclemor run predictive" in capsys.readouterr().err
+    assert "Leaderboard" in leaderboard_text([])

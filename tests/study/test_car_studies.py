@@ -1,0 +1,224 @@
+"""Studies over cars: axes and samples of parameters, and what is trained on."""
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.errors import FileError
+from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.study.plans.grid import expand
+from vehiclemor.study.plans.sampling import sampled
+from vehiclemor.study.plans.study_file import Sampling, StudyFile
+
+HEAD = """
+title = "for the tests"
+model = "{}"
+keep = "metrics"
+"""
+SUSPENSION = HEAD.format("double_wishbone")
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes a study file and runs it."""
+
+    def run(text: str):
+        path = tmp_path / "mine.toml"
+        path.write_text(text)
+        return vm.run_study(path, out=tmp_path / "results")
+
+    return run
+
+
+def test_a_grid_over_parameters_is_single_simulations_of_these_cars(study):
+    found = study(
+        HEAD.format("independent_suspension_vehicle")
+        + """
+parameters = { roll_inertia = 250.0 }
+start = ["dropped"]
+methods = [{ method = "full_order" }, { method = "pod", settings = { rank = 4 } }]
+grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" = [25.0] }
+"""
+    )
+    axis = found["parameters.sprung_mass"]
+    assert (axis.attrs["units"], axis.values.tolist()) == ("kg", [900.0, 1100.0])
+    assert "mass" in axis.attrs["long_name"]
+    for mass in (900.0, 1100.0):
+        own = {"roll_inertia": 250.0, "sprung_mass": mass, "initial_speed": 25.0}
+        car = vm.model("independent_suspension_vehicle", own)
+        alone = vm.simulate(car, "pod", rank=4, start="dropped")
+        here = found.sel({"parameters.sprung_mass": mass, "method": "pod"}).squeeze()
+        for name in ("rms_error", "signal_range"):
+            np.testing.assert_array_equal(here[name], alone[name])
+
+
+CARS = """
+methods = [
+  {{ method = "pod", label = "nominal", cars = "nominal" }},
+  {{ method = "pod", label = "refitted" }},
+  {{ method = "pod", label = "trained", cars = "ends" }},
+]
+[car_sets]
+ends = [{{ "tie_rod_inner.z" = -0.1 }}, {{ "tie_rod_inner.z" = -0.09 }}]
+[grid]
+"parameters.tie_rod_inner.z" = {}
+"""
+
+
+def test_bases_come_from_the_cars_that_are_named(study):
+    found = study(SUSPENSION + CARS.format("[-0.1, -0.095, -0.09]"))
+    errors = found["rms_error"].sel(output="toe")
+    car = vm.model("double_wishbone", {"tie_rod_inner.z": -0.095})
+    middle = errors.isel({"parameters.tie_rod_inner.z": 1}).squeeze()
+    alone = float(vm.simulate(car, "pod")["rms_error"].sel(output="toe"))
+    assert float(middle.sel({"method": "refitted"})) == alone
+    settings = vm.model("double_wishbone").definition
+    method = vm.registry.component("method", "pod")
+    complete = method.settings["ae"]()
+    maneuver = vm.registry.component("maneuver", settings.maneuver)
+    for label, heights in (("nominal", [None]), ("trained", [-0.1, -0.09])):
+        cars = [vm.model("double_wishbone", {"tie_rod_inner.z": z} if z else {}) for z in heights]
+        runs = [TrainingRun(trained, maneuver, "equilibrium") for trained in cars]
+        error = (
+            method.fit(car, runs, complete).simulate(maneuver, "equilibrium").outputs
+            - car.simulate(maneuver, "equilibrium").outputs
+        )
+        expected = np.sqrt((error**2).mean(axis=0))[car.outputs.index("toe")]
+        assert float(middle.sel({"method": label})) == pytest.approx(expected, rel=1e-9)
+
+
+def test_samples_are_a_dimension_with_the_sampled_values(study):
+    found = study(
+        SUSPENSION
+        + """
+methods = [{ method = "full_order" }]
+[sampling]
+plan = "latin_hypercube"
+count = 5
+seed = 3
+ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], amplitude_factor = [0.5, 1.0] }
+"""
+    )
+    assert found.sizes["sample"] == 5
+    assert found["status"].values.ravel().tolist() == ["ok"] * 5
+    ranges = found["signal_range"].sel(output="toe").squeeze()
+    for index in (0, 4):
+        at = found.isel(sample=index)
+        car = {"tie_rod_inner.z": float(at["parameters.tie_rod_inner.z"])}
+        alone = vm.simulate(
+            vm.model("double_wishbone", car), amplitude=float(at["amplitude_factor"])
+        )
+        expected = float(alone["signal_range"].sel(output="toe"))
+        assert float(ranges[index]) == expected
+
+
+@pytest.mark.parametrize("plan", ["latin_hypercube", "sobol"])
+def test_a_plan_has_one_point_in_every_slice_of_every_range(plan):
+    ranges = {
+        "parameters.a": [2.0, 4.0],
+        "parameters.b": [-1.0, 0.0],
+        "amplitude_factor": [0.0, 9.0],
+    }
+    given = Sampling(plan=plan, count=64, seed=1, ranges=ranges)
+    for name, values in sampled(given).items():
+        low, high = ranges[name]
+        slices = np.floor(64 * (np.array(values) - low) / (high - low))
+        assert sorted(slices) == list(range(64))
+    assert sampled(given) == sampled(given)
+    assert sampled(given) != sampled(given.model_copy(update={"seed": 2}))
+
+
+def test_training_policies_and_maneuvers_are_axes():
+    given = {
+        "title": "t",
+        "model": "double_wishbone",
+        "keep": "metrics",
+        "grid": {
+            "training": ["matched", "nominal"],
+            "maneuver": ["sine_travel", "chirp_travel"],
+            "amplitude_factor": [0.9],
+        },
+        "methods": [{"method": "pod"}],
+    }
+    grid = expand("mine", StudyFile.model_validate(given))
+    seen = {
+        (cell.test[0].maneuver.name, cell.training[0].maneuver.amplitude_factor)
+        for cell in grid.unique.values()
+    }
+    names = {"sine_travel", "chirp_travel"}
+    assert seen == {(name, factor) for name in names for factor in (0.9, 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('grid = { "parameters.tie_rod_iner.z" = [0.1] }', "did you mean tie_rod_inner"),
+        ('grid = { "parameters.tie_rod_inner" = [0.1] }', "a point has 3 components"),
+        ('grid = { "parameters.tie_rod_inner.z" = ["low"] }', "'low' is not a number"),
+        ('grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "is it in millimetres"),
+        ("parameters = { tie_rod = 1.0 }", "'tie_rod' is not a parameter"),
+        ('cars = "all"', "unknown cars 'all'; known: nominal, own"),
+        ("cars = []", "cars is empty"),
+        ('car_sets = { ends = [{ "tie_rod_inner.z" = 90.0 }] }', "car_sets.ends: .*millimetres"),
+        ('grid = { cars = ["owned"] }', "did you mean own"),
+        ('grid = { training = ["mached"] }', "did you mean matched"),
+        ('grid = { maneuver = ["sine_travl"] }', "did you mean sine_travel"),
+        ('grid = { "parameters.toe.z" = [1.0] }\nparameters = { "toe.z" = 1.0 }', "set twice"),
+    ],
+)
+def test_wrong_cars_are_told_before_the_first_cell(tmp_path, text, words):
+    refused(tmp_path, SUSPENSION + text, words)
+
+
+SAMPLED = """
+[sampling]
+plan = "sobol"
+count = 2
+seed = 1
+ranges = { "parameters.sprung_mass" = [5e4, 1e5] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('grid = { "parameters.sprung_mass" = [1e3, 1e5] }', "sprung_mass = 100000.*can't stand"),
+        ("parameters = { sprung_mass = 1e5 }", "can't stand"),
+        ("cars = [{ sprung_mass = 1e5 }]", "cars: sprung_mass = 100000.*can't stand"),
+        (SAMPLED, "sprung_mass = .*can't stand"),
+    ],
+)
+def test_cars_that_cant_stand_are_told_before_the_first_cell(tmp_path, text, words):
+    refused(tmp_path, HEAD.format("independent_suspension_vehicle") + text, words)
+
+
+def refused(tmp_path, text, words):
+    path, results = tmp_path / "mine.toml", tmp_path / "results"
+    path.write_text(text + '\n[[methods]]\nmethod = "full_order"\n')
+    with pytest.raises(FileError, match=words) as error:
+        vm.run_study(path, out=results)
+    assert "\n" not in str(error.value)
+    assert not results.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"count": 6, "plan": "sobol"}, "power of two"),
+        ({"count": 0}, "greater than or equal to 1"),
+        ({"seed": -1}, "greater than or equal to 0"),
+        ({"ranges": {}}, "ranges is empty"),
+        ({"ranges": {"parameters.a": [2.0, 1.0]}}, "not \\[from, to\\]"),
+        ({"ranges": {"a": [1.0, 2.0]}}, "neither parameters.NAME"),
+        ({"plan": "random"}, "latin_hypercube"),
+    ],
+)
+def test_wrong_samplings_are_told(change, words):
+    given = {
+        "plan": "latin_hypercube",
+        "count": 2,
+        "seed": 0,
+        "ranges": {"parameters.a": [0.0, 1.0]},
+    }
+    with pytest.raises(ValueError, match=words):
+        Sampling.model_validate(given | change)

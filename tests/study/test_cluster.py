@@ -1,0 +1,328 @@
+"""Workers of a cluster give what one process gives, whatever is killed or can't be seen."""
+
+import logging
+import os
+import runpy
+import signal
+import sys
+import time
+from concurrent.futures import CancelledError, Future
+from contextlib import nullcontext
+from contextvars import ContextVar
+from dataclasses import replace
+from functools import partial
+from itertools import chain
+from multiprocessing import active_children
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.texts.markdown import blocks
+from vehiclemor.codegen import object_cache
+from vehiclemor.errors import InputError, MachineError
+from vehiclemor.study import cluster as engine
+from vehiclemor.study.cell_file import ENDING
+from vehiclemor.study.plans.grid import expand
+from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.progress import listening
+from vehiclemor.study.run import run_studies
+from vehiclemor.study.workers import WAITING, Timed, evaluate_and_store, in_batches
+
+distributed = pytest.importorskip("distributed")
+
+STUDY = """
+title = "for the tests"
+model = "double_wishbone"
+training = "nominal"
+keep = "metrics"
+
+[grid]
+frequency_factor = [0.9, 1.0, 1.1]
+amplitude_factor = [1.0, 3.0]
+rank = [2, 3]
+
+[[methods]]
+method = "full_order"
+
+[[methods]]
+method = "pod"
+"""
+CELLS = 6 + 12
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("study") / "small.toml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.fixture(scope="module")
+def alone(study, tmp_path_factory) -> xr.Dataset:
+    """What one process gives."""
+    return run_studies(str(study), tmp_path_factory.mktemp("one"))["small"]
+
+
+@pytest.fixture(scope="module")
+def client():
+    """Two workers, in threads of this process: new ones take seconds to start."""
+    with (
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            processes=False,
+            protocol="tcp://",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        ) as two,
+        distributed.Client(two, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def run(study: Path, folder: Path, client) -> xr.Dataset:
+    return run_studies(str(study), folder, scheduler=client.scheduler.address)["small"]
+
+
+def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
+    seconds = ["seconds", "offline_seconds"]
+    xr.testing.assert_identical(one.drop_vars(seconds), other.drop_vars(seconds))
+
+
+def cells_in(folder: Path) -> dict[Path, int]:
+    files = (folder / "cells").rglob(f"[!.]*{ENDING}")
+    return {path: path.stat().st_mtime_ns for path in files}
+
+
+def test_a_killed_worker_loses_no_cell_and_doubles_none(study, alone, tmp_path, caplog):
+    stored, killed = {}, []
+
+    def kill(_, done, __):
+        if done >= 4 and not killed:
+            workers = [process for process in active_children() if "Dask" in process.name]
+            assert len(workers) == 2
+            killed.append(workers[0])
+            os.kill(workers[0].pid, signal.SIGKILL)
+            stored.update(cells_in(tmp_path))
+
+    caplog.set_level(logging.INFO, "vehiclemor")
+    with listening(kill):
+        found = run_studies(str(study), tmp_path, jobs=2, scheduler="local")["small"]
+    assert_same(alone, found)
+    assert 4 <= len(stored) < CELLS
+    after = cells_in(tmp_path)
+    assert {path: after[path] for path in stored} == stored, "a finished cell was computed again"
+    assert len(after) == CELLS
+    assert not killed[0].is_alive()
+    assert "dashboard http://127.0.0.1:" in caplog.text
+
+
+def test_what_a_killed_worker_had_stored_is_not_computed_again(study, tmp_path):
+    (definition,) = load_studies(str(study)).values()
+    batch = list(expand("small", definition).unique.values())[:2]
+    (tmp_path / "cells").mkdir()
+    evaluate_and_store(batch[:1], tmp_path)
+    before = cells_in(tmp_path)
+    assert evaluate_and_store(batch, tmp_path) == ([e.key for e in batch], "")
+    after = cells_in(tmp_path)
+    assert len(after) == 2
+    assert before.items() <= after.items()
+
+
+def test_workers_that_see_another_folder_send_their_results(
+    study, alone, client, tmp_path, monkeypatch
+):
+    written = []
+
+    def write_encoded(content, folder, key, **broken):
+        written.append(key)
+        store(content, folder, key, **broken)
+
+    store = engine.write_encoded
+    monkeypatch.setattr(engine, "write_encoded", write_encoded)
+    # As if a folder of that name were another one on the worker's machine.
+    write = engine.write_text
+    monkeypatch.setattr(engine, "write_text", lambda path, _: write(path, "another driver's"))
+    assert_same(alone, run(study, tmp_path, client))
+    assert len(written) == len(set(written)) == CELLS
+    assert len(cells_in(tmp_path)) == CELLS
+
+
+# Kernels
+
+
+OWN_CACHE: ContextVar[str] = ContextVar("own cache")
+
+
+def file_of(name: str, topic: str, folder: str) -> bytes:
+    """What a worker gets that has a cache of its own, or else makes."""
+    OWN_CACHE.set(folder)
+
+    def make() -> bytes:
+        time.sleep(0.5)
+        return f"made for {folder}".encode()
+
+    with object_cache.asking(partial(engine._from_others, topic)):
+        return object_cache.fetched(name, make)
+
+
+def test_what_the_cache_lacks_is_the_drivers_or_is_made_once(client, tmp_path, monkeypatch):
+    driver = str(tmp_path / "driver")
+    monkeypatch.setattr(object_cache, "_chosen", lambda: OWN_CACHE.get(driver))
+    object_cache.fetched("kernels/known.o", lambda: b"the driver's")
+    with engine.reached(client.scheduler.address, 1) as elsewhere:
+        topic = elsewhere.keywords["topic"]
+
+        def on_both(name: str) -> list[bytes]:
+            folders = [str(tmp_path / number) for number in "01"]
+            futures = [
+                client.submit(file_of, name, topic, folder, workers=[worker])
+                for worker, folder in zip(client.nthreads(), folders, strict=True)
+            ]
+            found = client.gather(futures)
+            # Each has it in its own cache now, as it was sent.
+            for folder in folders:
+                assert (Path(folder) / name).read_bytes().endswith(b"\n" + found[0])
+            return found
+
+        assert on_both("kernels/known.o") == [b"the driver's"] * 2
+        first, second = on_both("kernels/new.o")
+        assert first == second
+        assert first.startswith(b"made for ")
+
+
+def test_a_file_that_was_changed_on_its_way_is_not_used():
+    sent = object_cache.packed("kernels/a.o", b"machine code")
+    assert object_cache.unpacked("kernels/a.o", sent) == b"machine code"
+    for place in range(len(sent)):
+        changed = sent[:place] + bytes([sent[place] ^ 1]) + sent[place + 1 :]
+        assert object_cache.unpacked("kernels/a.o", changed) is None
+    assert object_cache.unpacked("kernels/b.o", sent) is None
+
+
+def test_the_driver_hands_out_nothing_but_its_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "secret").write_text("hash\nkeep this")
+    assert object_cache.held("../secret") is None
+    assert object_cache.held("kernels/none.o") is None
+
+
+# Batches
+
+
+@given(
+    sizes=st.lists(st.integers(1, 4), max_size=300),
+    places=st.integers(0, 5),
+    pace=st.floats(0.0, 1.0),
+    most=st.sampled_from([1, 10, 100]),
+)
+def test_batches_hold_each_group_once_and_whole(sizes, places, pace, most):
+    groups = [[(number, part) for part in range(size)] for number, size in enumerate(sizes)]
+    sent = []
+
+    def submit(batch):
+        sent.append(batch)
+        future: Future[Timed] = Future()
+        future.set_result(Timed(batch, pace * len(batch)))
+        return future
+
+    found = list(in_batches(groups, submit, lambda: places, Future.result, most))
+    assert sorted(chain(*found)) == sorted(chain(*groups))
+    assert list(chain(*sent)) == list(chain(*groups))
+    assert all(len(batch) <= max([most, *sizes]) for batch in sent)
+    # As many as there are places end together.
+    assert all(len(batch) <= 4 for batch in sent[-WAITING * places :] if places)
+
+
+def test_quick_cells_go_in_large_batches():
+    sent = []
+
+    def submit(batch):
+        sent.append(len(batch))
+        future: Future[Timed] = Future()
+        future.set_result(Timed(batch, 1e-3 * len(batch)))
+        return future
+
+    list(in_batches([[i] for i in range(10_000)], submit, lambda: 2, Future.result))
+    assert len(sent) < 150
+
+
+# What can't be
+
+
+def test_no_scheduler_is_one_line(study, tmp_path, monkeypatch):
+    for address, reason in (
+        ("nonsense", "missing port number"),
+        ("tls://127.0.0.1:9", "TLS expects"),
+        ("foo://here:1", "unknown address scheme"),
+    ):
+        with pytest.raises(InputError, match=rf"^scheduler {address}: can't be reached .*{reason}"):
+            run_studies(str(study), tmp_path, scheduler=address)
+    monkeypatch.setattr(engine, "REACH", 0.2)
+    with pytest.raises(InputError, match=r"can't be reached .*Timed out"):
+        run_studies(str(study), tmp_path, scheduler="127.0.0.1:1")
+    with pytest.raises(InputError, match="jobs: a scheduler at an address has its own workers"):
+        run_studies(str(study), tmp_path, jobs=2, scheduler="127.0.0.1:1")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'vehiclemor\[cluster\]'"):
+        run_studies(str(study), tmp_path, scheduler="local")
+    assert not list(tmp_path.iterdir())
+
+
+def test_other_versions_are_one_line(study, client, tmp_path, monkeypatch):
+    found = client.get_versions()
+    found["scheduler"]["packages"]["distributed"] = "1.0"
+    monkeypatch.setattr(distributed.Client, "get_versions", lambda _: found)
+    with pytest.raises(InputError, match=r"the scheduler runs distributed 1\.0, this process"):
+        run(study, tmp_path, client)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [({"code": "other"}, "another version"), ({"kernel": "other"}, "another processor")],
+)
+def test_a_worker_with_other_source_is_one_line(study, client, tmp_path, change, what):
+    (definition,) = load_studies(str(study)).values()
+    cell = next(iter(expand("small", definition).unique.values()))
+    with engine.reached(client.scheduler.address, 1) as elsewhere:
+        (tmp_path / "cells").mkdir()
+        with pytest.raises(InputError, match=f"worker tcp://.* has {what}"):
+            list(elsewhere([[replace(cell, **change)]], tmp_path, False))
+    assert not cells_in(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("error", "expected", "text"),
+    [
+        (CancelledError(), MachineError, "the scheduler is lost.*run again to resume"),
+        (ModuleNotFoundError("No module named 'mine'"), InputError, "a worker lacks.*'mine'"),
+    ],
+)
+def test_what_ends_a_cluster_is_one_line(error, expected, text):
+    future: Future[Timed] = Future()
+    future.set_exception(error)
+    with pytest.raises(expected, match=text):
+        engine._taken(future)
+
+
+def test_a_batch_that_kills_its_workers_is_the_machines_fault():
+    future: Future[Timed] = Future()
+    future.set_exception(distributed.KilledWorker("batch", None, 3))
+    assert engine._taken(future).result == (([], engine.KILLED), {})
+
+
+def test_the_code_of_the_handbook_runs(study, alone, client, tmp_path, monkeypatch, capsys):
+    page = Path(__file__).parents[2] / "paper" / "handbook" / "on-a-cluster.md"
+    code, slurm = [block.content for block in blocks(page) if block.language == "python"]
+    compile(slurm, page.name, "exec")
+    (tmp_path / "page.py").write_text(code)
+    (tmp_path / "my_study.toml").write_text(study.read_text())
+    monkeypatch.chdir(tmp_path)
+    two = partial(nullcontext, SimpleNamespace(scheduler_address=client.scheduler.address))
+    monkeypatch.setattr(distributed, "LocalCluster", lambda **_: two())
+    runpy.run_path("page.py", run_name="__main__")
+    assert "ok" in capsys.readouterr().out
