@@ -69,14 +69,14 @@ def reduced_sensitivities(
     state = own.encode(model.start(begun), first)
     chosen = TOLERANCE if tolerance is None else tolerance
     run = tangent_run(own.system, own.spaces, maneuver, state, tangents, chosen)
-    states, moved = apart(run.path, along)
+    states, moved = apart(run.path, len(along))
     if own.slopes is not None:
         paths = run.path, recorded_inputs(maneuver)[1]
         size, kernels = len(model.definition.states), own.system.kernels
         given = own.system.constants, constants
         moved = tangents_along(kernels, "full_state", given, paths, size)
         states = own.full_states(np.ascontiguousarray(states), paths[1])
-    found = recorded(model, maneuver, run, states)
+    found = recorded(own.model, maneuver, run, states)
     trusted = found.judged(reduced.simulate(maneuver, begun).trust)
     return observed(model, along, trusted, moved)
 

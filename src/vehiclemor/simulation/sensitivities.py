@@ -140,7 +140,7 @@ def sensitivities(
         maneuver = checked_maneuver(maneuver, model.definition)
         space, tangents = whole_space(len(model.definition.states)), Tangents(*begun)
         found = tangent_run(model.system, space, maneuver, model.start(start), tangents, chosen)
-        states, moved = apart(found.path, along)
+        states, moved = apart(found.path, len(along))
         run = recorded(model, maneuver, found, states)
     return observed(model, along, run, moved)
 
