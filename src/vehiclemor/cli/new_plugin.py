@@ -60,7 +60,8 @@ def _check_name(name: str) -> None:
             raise InputError(f"{name}: there is a {kind} {taken} already")
     if name in data_names("studies"):
         raise InputError(f"{name}: there is a study {name} already")
-    if find_spec(name) is not None:
+    # Without an origin it is any folder that happens to be here.
+    if getattr(find_spec(name), "origin", None) is not None:
         raise InputError(f"{name}: there is a Python package {name} already")
 
 
