@@ -89,9 +89,7 @@ def options(engine: str) -> Iterator[dict[str, Any]]:
     if engine == "dask":
         from distributed import LocalCluster
 
-        cluster: Any = LocalCluster(
-            n_workers=JOBS, threads_per_worker=1, silence_logs=logging.ERROR
-        )
+        cluster: Any = LocalCluster(n_workers=JOBS, threads_per_worker=1, silence_logs=40)
         with cluster:
             yield {"scheduler": cluster.scheduler_address}
     else:
