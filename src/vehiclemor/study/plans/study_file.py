@@ -12,8 +12,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder, data_names
+from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.store import Owner
 from vehiclemor.toml_files import FileSchema, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
