@@ -293,11 +293,22 @@ def test_verdicts_lead_to_cells_and_studies(results, results_folder):
         pytest.skip("no test before this one has timed the models")
     section = verdict_section(stored.studies, stored.timings)
     rows = [row for table in section.tables for row in table.rows if table.columns[0] == "item"]
-    anchors = {row[5].anchor for row in rows}
+    anchors = [row[6].anchor for row in rows]
     keys = {f"cell-{key}" for d in results.values() for key in d["cell_key"].values.ravel()}
     ids = {f"study-{name}" for name in results} | {table.id for table in section.tables}
-    assert anchors <= keys | ids | {""}
-    assert sum(anchor.startswith("cell-") for anchor in anchors) > 10
+    assert set(anchors) <= keys | ids | {""}
+    # Two errors of each model, by two variants; of the vehicles from two starts.
+    assert sum(anchor in keys for anchor in anchors) == 20
+    shown = {
+        row[6].anchor: row[6].value
+        for row in rows
+        if row[0].text.startswith("RMS error of the pitch")
+    }
+    vehicle = results["figures-2-4"].stack(place=results["figures-2-4"]["status"].dims)
+    for anchor, value in shown.items():
+        cell = vehicle.isel(place=np.flatnonzero(vehicle["cell_key"].values == anchor[5:])[0])
+        error = cell["rms_error"].sel(output="pitch").item()
+        assert value == error or (value is None and error != error)
 
 
 def test_a_damaged_file_is_named_and_left_out(made, tmp_path):
@@ -327,6 +338,13 @@ def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys
     assert told.count("\n") == 1
     assert words in told
     assert list(tmp_path.glob("*.html")) == []
+
+
+@pytest.mark.parametrize("studies", [3, [3], ["no-such-study"]])
+def test_wrong_names_in_python_are_one_line(studies, tmp_path):
+    with pytest.raises(vm.VehiclemorError, match="stud") as caught:
+        vm.write_report(studies, tmp_path / "d.html", tmp_path)
+    assert "\n" not in str(caught.value)
 
 
 # Both frames tell how far their pages are wider than they; a frame can be as narrow as a telephone.

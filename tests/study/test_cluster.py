@@ -26,6 +26,7 @@ from vehiclemor.codegen import object_cache
 from vehiclemor.errors import InputError, MachineError
 from vehiclemor.study import cluster as engine
 from vehiclemor.study.cell_file import ENDING
+from vehiclemor.study.cluster_worker import from_others
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.progress import listening
@@ -166,7 +167,7 @@ def file_of(name: str, topic: str, folder: str) -> bytes:
         time.sleep(0.5)
         return f"made for {folder}".encode()
 
-    with object_cache.asking(partial(engine._from_others, topic)):
+    with object_cache.asking(partial(from_others, topic)):
         return object_cache.fetched(name, make)
 
 

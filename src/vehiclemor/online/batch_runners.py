@@ -47,7 +47,9 @@ def _in_one_loop(fitted: Any) -> bool:
     """Whether one compiled loop does all runs; a reduced vehicle must judge itself."""
     if isinstance(fitted, FullOrderModel):
         return isinstance(fitted.model, DynamicModel)
-    return isinstance(fitted, ReducedVehicle) and bool(fitted.lift.features.watched)
+    if not isinstance(fitted, ReducedVehicle) or fitted.doubt:
+        return False
+    return bool(fitted.lift.features.watched)
 
 
 class GuardedRuns:

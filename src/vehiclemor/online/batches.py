@@ -199,8 +199,8 @@ class _Work:
         """The same with another choice, of some of the runs."""
         if runs is None:
             return _Work(self.reduced, chosen, self.signals, self.starts, self.sets)
-        given = self.signals, self.starts, self.sets
-        signals, starts, sets = (None if own is None else _taken(own, runs) for own in given)
+        signals, starts = _taken(self.signals, runs), _taken(self.starts, runs)
+        sets = None if self.sets is None else _taken(self.sets, runs)
         return _Work(self.reduced, chosen, signals, starts, sets)
 
     def __call__(self, part: slice) -> Found:

@@ -20,7 +20,7 @@ Box = Mapping[str, Sequence[float]]
 # each parameter, and the seed of their Latin hypercube.
 INSIDE, SEED = 12, 2008
 # Runs of each car beside the model's own, not the same of all.
-RUNS = 6
+RUNS = 10
 
 
 def of_cars(

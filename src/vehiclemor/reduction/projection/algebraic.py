@@ -1,7 +1,7 @@
 """Reduced algebraic equations on one affine subspace in each time window."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -73,6 +73,10 @@ class AlgebraicProjection(SolvedAnywhere):
         loop = model.loop("projected_path", "reduction.projection.algebraic_loops")
         buffer = np.empty(4 * n + len(model.inputs) + n * n + 2 * n * (n + 1))
         return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]
+
+    def for_car(self, model: AlgebraicModel) -> "AlgebraicProjection":
+        """The equations of another mechanism in the same subspaces."""
+        return replace(self, model=model, offline=Offline())
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""

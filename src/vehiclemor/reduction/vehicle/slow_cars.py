@@ -20,9 +20,11 @@ from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
+from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
+from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import (
     FeatureTable,
     Ranges,
@@ -30,14 +32,22 @@ from vehiclemor.reduction.vehicle.slow_features import (
     ranges_of,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, as_of
-from vehiclemor.reduction.vehicle.trajectory_fit import improved_together, spread, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import (
+    changed,
+    improved_together,
+    normal_matrix,
+    spread,
+    targets,
+)
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
-# Gauss-Newton steps of the common fit, first on a part of the runs.
-FEW, FIRST_SWEEPS, SWEEPS = 0.34, 7, 4
+# Gauss-Newton steps of the common fit.
+SWEEPS = 6
+# Share of the cars that tell how sure the coefficients are; tolerance of runs that correct them.
+PRIOR_CARS, FINE = 0.15, 1e-6
 # Time (s) before a car is steered, in which its starts are seen, and samples in it.
 STILL, SAMPLES = 1.0, 101
 RIDGE = 1e-10
@@ -52,17 +62,27 @@ class Member(NamedTuple):
     shape: VehicleShape
     modes: SlowModes
 
-    @property
-    def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Deviations of the shape and inputs, of all runs after landing."""
-        runs = [after_landing(self.modes.symmetric, self.shape, run) for run in self.runs]
-        shapes = np.concatenate([self.shape.of(run.states) for run in runs])
-        return shapes - self.shape.reference, np.concatenate([run.inputs for run in runs])
+    samples: ShapeSamples
 
     @property
     def ranges(self) -> Ranges:
         """Ranges of its runs."""
-        return ranges_of(self.shape, self.modes, *self.samples)
+        return ranges_of(self.shape, self.modes, self.samples.deviations, self.samples.inputs)
+
+    def columns(self, features: Features, parameters: np.ndarray) -> np.ndarray:
+        """Features (samples, terms) of its samples."""
+        u = self.samples.inputs
+        z = np.column_stack(self.modes.coordinates(self.samples.deviations, u))
+        return feature_columns(features, z, u, parameters)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Rates of the slow coordinates and the speed, then psi', U and V (samples, states + 3)."""
+        samples, modes = self.samples, self.modes
+        slow = samples.rates @ modes.left.T
+        further = samples.inputs.shape[1] - 1
+        slow -= samples.inputs[:, 1:] @ modes.feedthrough[:, :further].T
+        return np.column_stack([slow, samples.rates @ modes.speed_left, samples.motion])
 
 
 def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, list[Training]]:
@@ -90,7 +110,9 @@ def member(training: Training, like: SlowModes) -> Member:
     """A car by its runs, in coordinates like those of the first one."""
     model = training[0].model
     shape = VehicleShape(model)
-    return Member(model, training, [r.recorded() for r in training], shape, as_of(shape, like))
+    modes, runs = as_of(shape, like), [run.recorded() for run in training]
+    samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
+    return Member(model, training, runs, shape, modes, samples)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +132,9 @@ class Box(ShortRepr):
         Changes (monomials, terms, states + 3) of the coefficients.
     lifting
         Coefficients (monomials, terms, n) of the lifting.
+    inputs, prior
+        Inputs of runs of each car itself, and normal matrix of a run of the training; see
+        `own_runs`.
     """
 
     cars: Cars
@@ -120,6 +145,8 @@ class Box(ShortRepr):
     degree: int
     coefficients: np.ndarray
     lifting: np.ndarray
+    inputs: tuple[Input, ...]
+    prior: np.ndarray
 
     def monomials(self, model: DynamicModel) -> np.ndarray:
         """Monomials (m,) of the place of a car."""
@@ -149,8 +176,10 @@ class SlowVehicle(ReducedVehicle):
         for name in model.starts:
             state = model.start(name)
             left.append(found.remainder(state[None], no_input, found.excited(state))[0])
-        reach = self.reach.with_starts(np.array(left))
-        return replace(found, reach=reach, offline=offline_cost(began, model))
+        found = replace(found, reach=self.reach.with_starts(np.array(left)))
+        plain = replace(_plain(found, modes), solver="dopri5", tolerance=FINE)
+        found = corrected(found, plain, box.inputs, box.table.free, box.prior)
+        return replace(found, offline=offline_cost(began, model))
 
 
 def of_car(
@@ -177,6 +206,11 @@ def of_car(
         transient=modes.symmetric,
     )
     return landed(found, modes, _before_steering(shape.model))
+
+
+def _plain(vehicle: ReducedVehicle, modes: SlowModes) -> ReducedVehicle:
+    """The vehicle as it encodes states that are no starts."""
+    return replace(vehicle, encoding=np.vstack([modes.left, modes.speed_left]))
 
 
 def _before_steering(model: DynamicModel) -> list[Trajectory]:
@@ -206,11 +240,9 @@ def fitted_box(
     vehicles, goals = [], []
     for m in members:
         vehicle = of_car(first, table, hull, turning, m.shape, m.modes)
-        plain = replace(vehicle, encoding=np.vstack([m.modes.left, m.modes.speed_left]))
-        goals.append(targets(plain, m.training, m.runs))
+        goals.append(targets(_plain(vehicle, m.modes), m.training, m.runs))
         vehicles.append(vehicle)
-    few = [spread(own, FEW) for own in goals]
-    change = improved_together(vehicles, few, rows, table.free, FIRST_SWEEPS)
+    change = _by_rates(vehicles, members, rows, table)
     change = improved_together(vehicles, goals, rows, table.free, SWEEPS, change=change)
     coefficients = np.zeros((rows.shape[1], *first.coefficients.shape))
     coefficients[0] = first.coefficients
@@ -219,10 +251,40 @@ def fitted_box(
         coefficients[:, list(terms), column] += change[:, place : place + len(terms)]
         place += len(terms)
     lifting = _lifting(vehicles, members, rows)
-    box = Box(cars, table, members[0].modes, turning, hull, degree, coefficients, lifting)
+    some = spread(list(zip(vehicles, goals, rows @ change, strict=True)), PRIOR_CARS)
+    normals = [normal_matrix(changed(v, table.free, c), own, table.free) for v, own, c in some]
+    prior = np.sum(normals, axis=0) / sum(len(own) for _, own, _ in some)
+    inputs = chosen_inputs(members[0].training)
+    box = Box(
+        cars, table, members[0].modes, turning, hull, degree, coefficients, lifting, inputs, prior
+    )
     return SlowVehicle(
         **{name: getattr(first, name) for name in first.__dataclass_fields__}, box=box
     )
+
+
+def _by_rates(
+    vehicles: Sequence[ReducedVehicle],
+    members: Sequence[Member],
+    rows: np.ndarray,
+    table: FeatureTable,
+) -> np.ndarray:
+    """Change (monomials, free coefficients) with which the rates of all cars fit best."""
+    m, terms = rows.shape[1], len(table.features.terms)
+    squares, products = np.zeros((m, terms, m, terms)), 0.0
+    for vehicle, car, row in zip(vehicles, members, rows, strict=True):
+        columns = car.columns(table.features, vehicle.parameters)
+        rest = car.rates - columns @ vehicle.coefficients
+        part = columns.T @ columns / len(columns)
+        squares += np.einsum("i,j,kl->ikjl", row, row, part)
+        products = products + np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
+    found = []
+    for chosen, column in table.free:
+        kept = np.ix_(range(m), chosen)
+        square = squares[kept][:, :, :, chosen].reshape(m * len(chosen), -1)
+        square = square + RIDGE * len(members) * np.eye(len(square))
+        found.append(np.linalg.solve(square, products[kept][:, :, column].ravel()).reshape(m, -1))
+    return np.hstack(found)
 
 
 def _lifting(
@@ -233,9 +295,7 @@ def _lifting(
     terms, m, n = len(features.terms), rows.shape[1], len(vehicles[0].shape.kept)
     normal, values = np.zeros((m * terms, m * terms)), np.zeros((m * terms, n))
     for vehicle, car, row in zip(vehicles, members, rows, strict=True):
-        deviations, inputs = car.samples
-        z = np.column_stack(car.modes.coordinates(deviations, inputs))
-        columns = feature_columns(features, z, inputs, vehicle.parameters)
+        columns, deviations = car.columns(features, vehicle.parameters), car.samples.deviations
         normal += np.kron(np.outer(row, row), columns.T @ columns) / len(columns)
         values += np.kron(row[:, None], columns.T @ deviations) / len(columns)
     normal += RIDGE * len(members) * np.eye(len(normal))

@@ -95,7 +95,7 @@ def improved(
 ) -> ReducedVehicle:
     """The reduced vehicle after so many sweeps, see `improved_together`."""
     change = improved_together([reduced], [goals], np.ones((1, 1)), free, sweeps, power)
-    return _changed(reduced, free, change[0])
+    return changed(reduced, free, change[0])
 
 
 def improved_together(
@@ -131,7 +131,7 @@ def improved_together(
         if not np.isfinite(error):
             break
         parts = [
-            _normal_equations(vehicle, own, paths, free, power)
+            normal_equations(vehicle, own, paths, free, power)
             for vehicle, own, paths in zip(moved, goals, every, strict=True)
         ]
         gradient = rows.T @ np.array([slope for _, slope in parts])
@@ -156,7 +156,7 @@ def _all_changed(
     vehicles: Sequence[ReducedVehicle], rows: np.ndarray, free: Free, change: np.ndarray
 ) -> list[ReducedVehicle]:
     """Cars with their coefficients changed, see `improved_together`."""
-    return [_changed(v, free, row @ change) for v, row in zip(vehicles, rows, strict=True)]
+    return [changed(v, free, row @ change) for v, row in zip(vehicles, rows, strict=True)]
 
 
 def _all_together(rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
@@ -192,10 +192,11 @@ def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
 def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
     """Normal matrix of the free coefficients, column by column; all runs must finish."""
     paths, _ = _compared(reduced, goals)
-    return _normal_equations(reduced, goals, paths, free)[0]
+    return normal_equations(reduced, goals, paths, free)[0]
 
 
-def _changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
+def changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
+    """The reduced vehicle with its free coefficients changed."""
     coefficients, first = reduced.coefficients.copy(), 0
     for terms, column in free:
         coefficients[list(terms), column] += step[first : first + len(terms)]
@@ -218,6 +219,15 @@ def _compared(
     return paths, total
 
 
+def run_errors(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
+    """Error of each run (goals,); infinite if it has failed."""
+    scale, found = _scale(goals), []
+    for goal in goals:
+        path = reduced.path(goal.run.maneuver, goal.run.start)
+        found.append(np.inf if path is None else np.linalg.norm(_errors(goal, path, scale)))
+    return np.array(found)
+
+
 def _scale(goals: Sequence[Target]) -> np.ndarray:
     """Weights (states + 3,) of errors; the speed counts by the place."""
     slow = goals[0].states.shape[1] - PLANAR - 1
@@ -230,13 +240,14 @@ def _errors(goal: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return (path - goal.states)[goal.compared] * scale * goal.shares[:, None]
 
 
-def _normal_equations(
+def normal_equations(
     reduced: ReducedVehicle,
     goals: Sequence[Target],
     paths: Sequence[np.ndarray],
     free: Free,
     power: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and gradient of the sum of squares by the free coefficients."""
     scale = _scale(goals)
     size = sum(len(terms) for terms, _ in free)
     normal, gradient = np.zeros((size, size)), np.zeros(size)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -73,19 +74,18 @@ def figure_samples(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure:
 
 def _sampled(dataset: xr.Dataset, sample: str, errors: xr.DataArray) -> list[str]:
     """Sampled quantities; of many those that the errors follow most (rank correlation)."""
-    from scipy.stats import spearmanr
-
     names = [
         str(name)
         for name, values in dataset.coords.items()
         if values.dims == (sample,) and name != sample and values.dtype.kind == "f"
     ]
     names = [name for name in names if np.ptp(dataset[name].values) > 0.0]
-    ranks = errors.transpose(sample, ...).values.reshape(dataset.sizes[sample], -1).mean(axis=1)
+    values = errors.transpose(sample, ...).values.reshape(dataset.sizes[sample], -1)
+    ranks = pd.Series(values.mean(axis=1))
 
     def follows(name: str) -> float:
-        found, _ = spearmanr(dataset[name].values, ranks)
+        found = pd.Series(dataset[name].values).corr(ranks, method="spearman")
         # Errors that are all the same follow nothing.
-        return -abs(float(found)) if np.isfinite(found) else 0.0
+        return -abs(found) if np.isfinite(found) else 0.0
 
     return sorted(names, key=follows)[:3] if len(names) > 3 else names

@@ -4,7 +4,7 @@ import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import FileError, GeometryError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
@@ -98,7 +98,7 @@ def load_protocol(protocol: str) -> Protocol:
     definition = read_toml(path, ProtocolFile)
     try:
         return _resolved(path, definition)
-    except InputError as error:
+    except (GeometryError, InputError) as error:
         raise FileError(f"{path}: {error}") from None
 
 
