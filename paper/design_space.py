@@ -27,10 +27,10 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
 from vehiclemor.report.figures.lines import legend_outside, panels, styles
 from vehiclemor.report.figures.saving import save_figure, styled
+from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
 from vehiclemor.study.plans.protocol_file import Bound
 from vehiclemor.study.provenance import attributes
-from vehiclemor.study.store import write_dataset
 
 SEED = 1000
 # Frequency and amplitude factors of the runs; bases are trained on the first.

@@ -8,9 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vehiclemor.api import compare as compare
     from vehiclemor.api import describe as describe
-    from vehiclemor.api import figures as figures
     from vehiclemor.api import maneuvers as maneuvers
     from vehiclemor.api import methods as methods
     from vehiclemor.api import model as model
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
-    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -30,7 +27,11 @@ if TYPE_CHECKING:
     from vehiclemor.online.saved import rom as rom
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
     from vehiclemor.online.sobol import sobol_indices as sobol_indices
+    from vehiclemor.report.comparison.kinds import compare as compare
+    from vehiclemor.report.html.document import write_report as write_report
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
+    from vehiclemor.report.regenerate import figures as figures
+    from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -39,17 +40,19 @@ __version__ = "0.1.0"
 # Name -> module that defines it.
 _DEFINED_IN = {
     **dict.fromkeys(
-        ("compare", "describe", "figures", "maneuvers", "methods", "model", "models", "plot"),
+        ("describe", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(
-        ("run_study", "simulate", "status", "studies", "write_report"), "vehiclemor.api"
-    ),
+    **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
+    "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
+    "compare": "vehiclemor.report.comparison.kinds",
+    "figures": "vehiclemor.report.regenerate",
     "leaderboard": "vehiclemor.report.leaderboard",
+    "write_report": "vehiclemor.report.html.document",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
@@ -62,6 +65,7 @@ __all__ = [
     "Signals",
     "VehiclemorError",
     "compare",
+    "convert",
     "describe",
     "export",
     "figures",

@@ -1,4 +1,4 @@
-"""The Python interface: models, methods, simulations, studies, comparison, figures."""
+"""The Python interface: models, methods, simulations, studies, reports."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import count, file_path, number, quoted, real_array
+from vehiclemor.arguments import file_path, number, quoted, real_array
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
 
@@ -333,110 +332,3 @@ def plot(
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
     return ResultAccessor(result).plot(kind, path, **at)
-
-
-def compare(what: str = "paper", out: str | Path = RESULTS, jobs: int = 1) -> pd.DataFrame:
-    """A comparison as a table; studies and timings that are missing are run first.
-
-    Parameters
-    ----------
-    what
-        `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
-        not seen, beside full-order integrators.  The name of a model: every method that fits it,
-        nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
-        name or TOML file: errors of every method over the grid, or on the protocol's inputs.
-    out
-        Results folder.
-    jobs
-        Number of processes.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
-        floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
-        that the paper doesn't have), measure, reason, threshold_source; described at
-        `comparison.rows.Row`, those of the others at `predictive_comparison`,
-        `model_comparison` and `study_comparison` in `vehiclemor.report`.
-    """
-    from vehiclemor.report.comparison.kinds import comparison
-
-    return comparison(what, file_path("out", out), count("jobs", jobs))
-
-
-def figures(
-    only: Sequence[str] = (),
-    out: str | Path = RESULTS,
-    results: str | Path = RESULTS,
-    jobs: int = 1,
-    *,
-    style: str = "",
-    dpi: int | None = None,
-) -> list[Path]:
-    """Regenerate figures of the paper from stored results; studies that are missing are run first.
-
-    Parameters
-    ----------
-    only
-        Figure names such as `6`, or `histories-`, `errors-`, `map-` or `pareto-` and the name of a
-        model; the paper's by default.
-    out
-        Folder of the figures.
-    results
-        Results folder.
-    jobs
-        Number of processes for missing studies.
-    style, dpi
-        Name or file of a Matplotlib style on top of the package's, and dots an inch of PNG files.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-    """
-    from vehiclemor.report.regenerate import regenerate_figures
-
-    folders = file_path("results", results), file_path("out", out)
-    chosen = [only] if isinstance(only, str) else only
-    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
-        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
-    return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)
-
-
-def write_report(
-    studies: str | Sequence[str] = (),
-    out: str | Path = "report.html",
-    results: str | Path = RESULTS,
-    jobs: int = 1,
-) -> Path:
-    """Write results as one HTML file that needs no network and no other file.
-
-    Parameters
-    ----------
-    studies
-        Names of studies or collections, TOML files, run first where results are missing, or models,
-        of which their studies by default are meant; all that is stored by default.
-    out
-        The file.
-    results
-        Results folder.
-    jobs
-        Number of processes for missing studies.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    VehiclemorError
-        If a name is wrong, nothing is stored, or the file can't be written.
-    """
-    from vehiclemor.report.html import document
-
-    page, folder = file_path("out", out), file_path("results", results)
-    chosen = [studies] if isinstance(studies, str) else studies
-    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
-        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
-    return document.write_report(chosen, page, folder, count("jobs", jobs))

@@ -20,8 +20,8 @@ from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
 from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.store import read_dataset, write_dataset
 
 MODAL = Path(__file__).parents[1] / "plugin" / "vehiclemor_modal_method"
 STUDY = """
@@ -48,7 +48,8 @@ bounds.tire_force = { measure = "rms", bound = 20.0 }
 training = [{ maneuver = "sine_road" }]
 validation = [{ maneuver = "sine_road", frequency = [1.2] }]
 test = [{ maneuver = "sine_road", frequency = [0.9, 1.1], start = ["equilibrium", "dropped"] }]
-targets = [{ against = "equal accuracy", ratio = 1000.0 }]
+targets = [{ against = "equal accuracy", ratio = 2.0 }]
+failure_rate = 0.01
 [[contestants]]
 label = "full order"
 method = "full_order"
@@ -151,21 +152,16 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
 
 
 def test_a_protocol_is_judged_by_its_own_targets(place, said):
-    for file in ("road.toml", "judged.toml"):
-        # No reduced model is a thousand times faster.
-        status, text = said("compare", place / file)
-        assert status == 1
-        for words in ("road (quarter_car): 4 runs", "speed-up, equal accuracy", "* mine"):
-            assert words in text
-    status, text = said("compare", place / "both.toml", "--json")
-    rows = json.loads(text)
-    assert status == 1
-    assert {row["study"] for row in rows} == {"mine", "predictive-road"}
-    targets = [row for row in rows if row["kind"] == "target"]
-    assert {row["method"] for row in targets} == {"mine"}
+    # Four runs can't exclude a rate of 1 %, however fast they are.
     status, text = said("compare", place / "both.toml")
-    assert "My car, my method" in text
-    assert "target for what was chosen" in text
+    assert status == 1
+    for words in ("My car, my method", "road (quarter_car): 4 runs", "* mine"):
+        assert words in text
+    assert re.search(r"failure rate below +0.01\*? +0.53 +missed", text)
+    assert "speed-up, equal accuracy" in text
+    rows = vm.compare(str(place / "road.toml"), place / "results")
+    assert set(rows["study"]) == {"predictive-road"}
+    assert set(rows["method"][rows["kind"] == "target"]) == {"mine"}
 
 
 def test_figures_of_a_study_and_a_protocol(place, capsys):
@@ -173,11 +169,10 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
     entries = find(str(place / "both.toml"), results)
     assert [entry.name for entry in entries] == ["mine-errors", "mine-histories", "road-pareto"]
     data = run_studies(str(place / "both.toml"), results)
-    for entry in entries[:2]:
-        with styled():
-            figure = entry.draw(data)
-            check_texts_of(figure)
-        assert "mine" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    with styled():
+        figure = entries[0].draw(data)
+        check_texts_of(figure)
+    assert "mine" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
     folders = ["--results", results, "--out", place / "figures"]
     assert main(["figures", "--only", str(place / "road.toml"), *map(str, folders)]) == 0
     written = [Path(line) for line in capsys.readouterr().out.splitlines()]

@@ -2,29 +2,36 @@
 
 import logging
 import os
+import runpy
 import signal
 import sys
 import time
 from concurrent.futures import CancelledError, Future
+from contextlib import nullcontext
+from contextvars import ContextVar
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from multiprocessing import active_children
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.texts.markdown import blocks
 from vehiclemor.codegen import object_cache
 from vehiclemor.errors import InputError, MachineError
 from vehiclemor.study import cluster as engine
 from vehiclemor.study.cell_file import ENDING
+from vehiclemor.study.cluster_worker import from_others
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.workers import LARGEST, WAITING, Timed, evaluate_and_store, in_batches
+from vehiclemor.study.workers import WAITING, Timed, evaluate_and_store, in_batches
 
 distributed = pytest.importorskip("distributed")
 
@@ -62,17 +69,16 @@ def alone(study, tmp_path_factory) -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def client(tmp_path_factory):
-    """Two worker processes; their cache is not the driver's, and empty."""
-    cache = tmp_path_factory.mktemp("cache")
-    cache.chmod(0o700)
+def client():
+    """Two workers, in threads of this process: new ones take seconds to start."""
     with (
         distributed.LocalCluster(
             n_workers=2,
             threads_per_worker=1,
+            processes=False,
+            protocol="tcp://",
             dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL,
-            env={"VEHICLEMOR_CACHE": str(cache)},
         ) as two,
         distributed.Client(two, set_as_default=False) as client,
     ):
@@ -93,24 +99,26 @@ def cells_in(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in files}
 
 
-def test_a_killed_worker_loses_no_cell_and_doubles_none(study, alone, client, tmp_path, caplog):
-    victim = next(iter(client.run(os.getpid).values()))
-    stored = {}
+def test_a_killed_worker_loses_no_cell_and_doubles_none(study, alone, tmp_path, caplog):
+    stored, killed = {}, []
 
     def kill(_, done, __):
-        if done >= 4 and not stored:
-            os.kill(victim, signal.SIGKILL)
+        if done >= 4 and not killed:
+            workers = [process for process in active_children() if "Dask" in process.name]
+            assert len(workers) == 2
+            killed.append(workers[0])
+            os.kill(workers[0].pid, signal.SIGKILL)
             stored.update(cells_in(tmp_path))
 
     caplog.set_level(logging.INFO, "vehiclemor")
     with listening(kill):
-        found = run(study, tmp_path, client)
+        found = run_studies(str(study), tmp_path, jobs=2, scheduler="local")["small"]
     assert_same(alone, found)
     assert 4 <= len(stored) < CELLS
     after = cells_in(tmp_path)
     assert {path: after[path] for path in stored} == stored, "a finished cell was computed again"
     assert len(after) == CELLS
-    assert victim not in client.run(os.getpid).values()
+    assert not killed[0].is_alive()
     assert "dashboard http://127.0.0.1:" in caplog.text
 
 
@@ -148,32 +156,33 @@ def test_workers_that_see_another_folder_send_their_results(
 # Kernels
 
 
+OWN_CACHE: ContextVar[str] = ContextVar("own cache")
+
+
 def file_of(name: str, topic: str, folder: str) -> bytes:
-    """What a worker gets that has an empty cache, or else makes."""
-    os.environ["VEHICLEMOR_CACHE"] = folder
+    """What a worker gets that has a cache of its own, or else makes."""
+    OWN_CACHE.set(folder)
 
     def make() -> bytes:
         time.sleep(0.5)
-        return f"made by {os.getpid()}".encode()
+        return f"made for {folder}".encode()
 
-    with object_cache.asking(partial(engine._from_others, topic)):
+    with object_cache.asking(partial(from_others, topic)):
         return object_cache.fetched(name, make)
 
 
 def test_what_the_cache_lacks_is_the_drivers_or_is_made_once(client, tmp_path, monkeypatch):
-    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "driver"))
+    driver = str(tmp_path / "driver")
+    monkeypatch.setattr(object_cache, "_chosen", lambda: OWN_CACHE.get(driver))
     object_cache.fetched("kernels/known.o", lambda: b"the driver's")
-    # One that was killed above comes again.
-    client.wait_for_workers(2, timeout=60)
     with engine.reached(client.scheduler.address, 1) as elsewhere:
         topic = elsewhere.keywords["topic"]
 
         def on_both(name: str) -> list[bytes]:
-            workers = client.nthreads()
-            folders = [str(tmp_path / str(number)) for number in range(len(workers))]
+            folders = [str(tmp_path / number) for number in "01"]
             futures = [
-                client.submit(file_of, name, topic, folder, workers=[worker], pure=False)
-                for worker, folder in zip(workers, folders, strict=True)
+                client.submit(file_of, name, topic, folder, workers=[worker])
+                for worker, folder in zip(client.nthreads(), folders, strict=True)
             ]
             found = client.gather(futures)
             # Each has it in its own cache now, as it was sent.
@@ -184,7 +193,7 @@ def test_what_the_cache_lacks_is_the_drivers_or_is_made_once(client, tmp_path, m
         assert on_both("kernels/known.o") == [b"the driver's"] * 2
         first, second = on_both("kernels/new.o")
         assert first == second
-        assert first.startswith(b"made by ")
+        assert first.startswith(b"made for ")
 
 
 def test_a_file_that_was_changed_on_its_way_is_not_used():
@@ -210,8 +219,9 @@ def test_the_driver_hands_out_nothing_but_its_cache(tmp_path, monkeypatch):
     sizes=st.lists(st.integers(1, 4), max_size=300),
     places=st.integers(0, 5),
     pace=st.floats(0.0, 1.0),
+    most=st.sampled_from([1, 10, 100]),
 )
-def test_batches_hold_each_group_once_and_whole(sizes, places, pace):
+def test_batches_hold_each_group_once_and_whole(sizes, places, pace, most):
     groups = [[(number, part) for part in range(size)] for number, size in enumerate(sizes)]
     sent = []
 
@@ -221,10 +231,10 @@ def test_batches_hold_each_group_once_and_whole(sizes, places, pace):
         future.set_result(Timed(batch, pace * len(batch)))
         return future
 
-    found = list(in_batches(groups, submit, lambda: places, Future.result))
+    found = list(in_batches(groups, submit, lambda: places, Future.result, most))
     assert sorted(chain(*found)) == sorted(chain(*groups))
     assert list(chain(*sent)) == list(chain(*groups))
-    assert all(len(batch) < LARGEST + max([0, *sizes]) for batch in sent)
+    assert all(len(batch) <= max([most, *sizes]) for batch in sent)
     # As many as there are places end together.
     assert all(len(batch) <= 4 for batch in sent[-WAITING * places :] if places)
 
@@ -282,7 +292,7 @@ def test_a_worker_with_other_source_is_one_line(study, client, tmp_path, change,
     with engine.reached(client.scheduler.address, 1) as elsewhere:
         (tmp_path / "cells").mkdir()
         with pytest.raises(InputError, match=f"worker tcp://.* has {what}"):
-            list(elsewhere([[replace(cell, **change)]], tmp_path))
+            list(elsewhere([[replace(cell, **change)]], tmp_path, False))
     assert not cells_in(tmp_path)
 
 
@@ -304,3 +314,16 @@ def test_a_batch_that_kills_its_workers_is_the_machines_fault():
     future: Future[Timed] = Future()
     future.set_exception(distributed.KilledWorker("batch", None, 3))
     assert engine._taken(future).result == (([], engine.KILLED), {})
+
+
+def test_the_code_of_the_handbook_runs(study, alone, client, tmp_path, monkeypatch, capsys):
+    page = Path(__file__).parents[2] / "paper" / "handbook" / "on-a-cluster.md"
+    code, slurm = [block.content for block in blocks(page) if block.language == "python"]
+    compile(slurm, page.name, "exec")
+    (tmp_path / "page.py").write_text(code)
+    (tmp_path / "my_study.toml").write_text(study.read_text())
+    monkeypatch.chdir(tmp_path)
+    two = partial(nullcontext, SimpleNamespace(scheduler_address=client.scheduler.address))
+    monkeypatch.setattr(distributed, "LocalCluster", lambda **_: two())
+    runpy.run_path("page.py", run_name="__main__")
+    assert "ok" in capsys.readouterr().out

@@ -1,6 +1,7 @@
 """The runner of protocols: nothing is chosen by what it is tested on."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -163,6 +164,20 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
     monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
     run_studies(study_of(tmp_path, protocol_text), tmp_path, jobs=2)
     assert_same(files(folder), files(tmp_path))
+
+
+def test_a_protocol_that_was_renamed_is_the_same(done, tmp_path, monkeypatch):
+    folder, _, dataset = done
+    place = shutil.copytree(folder, tmp_path / "place")
+    (place / "small0.toml").rename(place / "renamed.toml")
+    (place / "mine.toml").write_text(f'title = "mine"\nprotocols = ["{place}/renamed.toml"]\n')
+    for name in ("workers.evaluate", "timing.timed_tests"):
+        monkeypatch.setattr(f"vehiclemor.study.{name}", None)
+    again = run_studies(str(place / "mine.toml"), place)["predictive-renamed"]
+    xr.testing.assert_equal(again, dataset)
+    for name in ("digest", "drawn_on", "content"):
+        assert again.attrs[name] == dataset.attrs[name]
+    assert (place / "studies" / "predictive-renamed.nc").exists()
 
 
 def test_the_best_candidate_that_is_stable_everywhere_is_chosen():

@@ -320,7 +320,7 @@ def test_a_collection_may_have_two_studies_of_one_name(place, computed):
 def test_a_study_that_was_renamed_is_the_same(place, computed, monkeypatch):
     path = (place / "small.toml").rename(place / "renamed.toml")
     before = reread(place)
-    monkeypatch.setattr("vehiclemor.study.run.grid_dataset", None)
+    monkeypatch.setattr("vehiclemor.study.run.combined", None)
     after = run_studies(str(path), place / "out")["renamed"]
     xr.testing.assert_equal(after.drop_vars(TIMED), before)
     assert after.attrs["study"] == "renamed"

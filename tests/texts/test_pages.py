@@ -120,14 +120,18 @@ def test_the_example_of_readme_runs_and_shows_what_readme_says(here, capsys):
 
 
 def test_the_example_study_runs(here, capsys):
-    first, *_ = [block.content for block in blocks(STUDY_FILES) if block.language == "toml"]
-    (here / "my_study.toml").write_text(first)
+    names = re.findall(r"Saved as `([\w.]+)`", STUDY_FILES.read_text(encoding="utf-8"))
+    studies = [block.content for block in blocks(STUDY_FILES) if block.language == "toml"]
+    for name, content in zip(names, studies, strict=False):
+        (here / name).write_text(content)
+    code = [block.content for block in blocks(STUDY_FILES) if block.language == "python"]
+    (here / "example.py").write_text("\n".join(code))
+    runpy.run_path("example.py")
+    told = capsys.readouterr().out
+    assert "frequency_factor" in told
+    assert "each car" in told
     for words in console_commands(STUDY_FILES):
         assert main(words[1:]) == 0, words
-    (code,) = [block.content for block in blocks(STUDY_FILES) if block.language == "python"]
-    (here / "example.py").write_text(code)
-    runpy.run_path("example.py")
-    assert "frequency_factor" in capsys.readouterr().out
 
 
 PAGES_WITH_CODE = (

@@ -9,6 +9,7 @@ from vehiclemor import __version__
 from vehiclemor.cli.cite import cite
 from vehiclemor.cli.compare import compare
 from vehiclemor.cli.conversion import strict
+from vehiclemor.cli.convert import convert
 from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.export import export
@@ -45,6 +46,7 @@ COMMANDS = {
     "figures": figures,
     "report": report,
     "export": export,
+    "convert": convert,
     "cite": cite,
 }
 for name, command in COMMANDS.items():

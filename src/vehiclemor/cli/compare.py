@@ -36,13 +36,14 @@ def compare(
     jobs
         Number of processes for missing studies.
     """
+    from vehiclemor.report.comparison.kinds import compare as compared
+    from vehiclemor.report.comparison.kinds import comparison_text
+
     with shown_progress():
-        rows = api.compare(what, out, jobs)
+        rows = compared(what, out, jobs)
     if json_output:
         print_json(rows)
     else:
-        from vehiclemor.report.comparison.kinds import comparison_text
-
         print(comparison_text(what, rows, out))
     # A protocol that a model has by default, and a grid, judge nothing.
     judged = what not in api.models() and "verdict" in rows

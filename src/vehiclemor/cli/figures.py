@@ -1,4 +1,4 @@
-"""`vehiclemor figures`: the paper's figures from stored results."""
+"""`vehiclemor figures`: the paper's figures, and those of any study, from stored results."""
 
 from pathlib import Path
 
@@ -16,14 +16,15 @@ def figures(
     style: str = "",
     dpi: int | None = None,
 ) -> int:
-    """Regenerate the paper's figures from stored results.
+    """Draw the paper's figures, or those of any study, from stored results.
 
     Parameters
     ----------
     only
         Names of figures, separated by commas: those of the paper, such as 6, or histories-,
-        errors-, map- or pareto- and the name of a model.  All by default, but Pareto figures only
-        where their study is stored.
+        errors-, map- or pareto- and the name of a model; or a study, collection or protocol by name
+        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default, but
+        Pareto figures only where their study is stored.
     out
         Folder of the figures.
     results
@@ -38,12 +39,13 @@ def figures(
     chosen = [name.strip() for name in only.split(",") if name.strip()]
     if only and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    with shown_progress():
-        written = api.figures(chosen, out, results, jobs, style=style, dpi=dpi)
-    for path in written:
-        print(path)
+    from vehiclemor.report.regenerate import figures as drawn
     from vehiclemor.report.regenerate import left_out
 
+    with shown_progress():
+        written = drawn(chosen, out, results, jobs, style=style, dpi=dpi)
+    for path in written:
+        print(path)
     missing = {} if chosen else left_out(results)
     if missing:
         made = "vehiclemor run predictive makes their studies"

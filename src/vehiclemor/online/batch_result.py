@@ -36,6 +36,10 @@ class Selection(NamedTuple):
     columns: np.ndarray
     times: np.ndarray | None
 
+    def part(self, times: np.ndarray, names: np.ndarray) -> Selection:
+        """Some of the names, by their numbers, at some of the times."""
+        return Selection(tuple(self.names[k] for k in names), self.columns[names], times)
+
     def samples(self, maneuver: Maneuver) -> tuple[np.ndarray | None, np.ndarray]:
         """Times at which a run is recorded, if not at its own output times, and the rows kept.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -42,6 +43,7 @@ CHUNK = 64
 LARGEST = 4 << 30
 # Parameter sets whose models are kept.
 MOST_SETS = 32
+NO_COLUMNS = np.zeros(0, dtype=np.int64)
 
 
 def simulate_many(
@@ -73,7 +75,8 @@ def simulate_many(
         In SI units: name -> value for all runs, or values by run; or one mapping for each run.  Of
         a model whose method gives other cars than its own, see `ReducedOrderModel.for_parameters`.
     outputs
-        Names of outputs, coordinates or speeds to be kept; all outputs by default.
+        Names of outputs, coordinates or speeds to be kept.  By default none: all outputs are there,
+        but made where they are read, by doing the runs of which they are once more.
     times
         Times in s at which they are kept; the output times of the signals by default.  A run is
         watched at its own output times whatever is kept.  Models whose runs are done one by one
@@ -110,20 +113,39 @@ def simulate_many(
     def labelled(found: Found, first: int) -> xr.Dataset:
         return dataset(reduced.model, chosen, kept, found, first).assign_attrs(about)
 
-    size = runs * len(kept) * len(chosen.names) * 8
+    if path is None and outputs is not None:
+        return labelled(_whole(work, runs, threads, len(kept)), 0)
     if path is None:
-        if size > LARGEST:
-            raise InputError(
-                f"the result would take {size / 1e9:.1f} GB of memory: choose outputs= and "
-                f"times=, or write it to path="
-            )
-        whole = Found.empty(runs, (len(kept), len(chosen.names)), len(reduced.model.counts))
-        for first, found in _chunks(work, runs, threads):
-            whole.write(slice(first, first + len(found.status)), found)
-        return labelled(whole, 0)
+        from vehiclemor.online.later_values import later
+
+        # Nothing is chosen: what is told of the runs now, values where they are read.
+        unread = work.some(chosen.part(kept[:1], NO_COLUMNS))
+        found = _whole(unread, runs, threads, 1)
+
+        def make(numbers: np.ndarray, samples: np.ndarray, names: np.ndarray) -> np.ndarray:
+            some = work.some(chosen.part(kept[samples], names), numbers)
+            return _whole(some, len(numbers), threads, len(samples)).values
+
+        values = later((runs, len(kept), len(chosen.names)), make)
+        return labelled(found._replace(values=values), 0)
     target = checked_target(file_path("path", path))
     written(target, (labelled(found, first) for first, found in _chunks(work, runs, threads)))
     return opened(target)
+
+
+def _whole(work: _Work, runs: int, threads: int, samples: int) -> Found:
+    """Results of all runs in memory; `InputError` if they don't fit."""
+    shape = samples, len(work.chosen.names)
+    size = 8 * runs * math.prod(shape)
+    if size > LARGEST:
+        raise InputError(
+            f"the result would take {size / 1e9:.1f} GB of memory: choose outputs= and "
+            f"times=, or write it to path="
+        )
+    whole = Found.empty(runs, shape, len(work.reduced.model.counts))
+    for first, found in _chunks(work, runs, threads):
+        whole.write(slice(first, first + len(found.status)), found)
+    return whole
 
 
 def _attributes(reduced: ReducedOrderModel, runs: int) -> dict[str, object]:
@@ -173,6 +195,14 @@ class _Work:
         self._runners: dict[tuple, Runner] = {}
         self._lock = Lock()
 
+    def some(self, chosen: Selection, runs: np.ndarray | None = None) -> _Work:
+        """The same with another choice, of some of the runs."""
+        if runs is None:
+            return _Work(self.reduced, chosen, self.signals, self.starts, self.sets)
+        signals, starts = _taken(self.signals, runs), _taken(self.starts, runs)
+        sets = None if self.sets is None else _taken(self.sets, runs)
+        return _Work(self.reduced, chosen, signals, starts, sets)
+
     def __call__(self, part: slice) -> Found:
         """Results of the runs in a slice."""
         signals, starts = self.signals[part], self.starts[part]
@@ -207,6 +237,11 @@ class _Work:
                     self._runners.clear()
                 self._runners[given] = runner
         return runner
+
+
+def _taken(own: Any, runs: np.ndarray) -> Any:
+    """What belongs to some of the runs."""
+    return own[runs] if isinstance(own, Signals | np.ndarray) else [own[run] for run in runs]
 
 
 def _cores() -> int:

@@ -14,8 +14,8 @@ from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.report.predictive.rows import STUDY, draws_of, method_rows, protocol_of
 from vehiclemor.report.printing import Line, fixed, short, table_text, terms, wrapped
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.store import read_dataset
 
 Row = dict[str, Any]
 RULE = "fewest silent misses first, then fewest misses, then the largest speed-up of whole calls"
@@ -78,7 +78,7 @@ def leaderboard(out: str | Path = "results") -> pd.DataFrame:
 
 def _rows_of(dataset: xr.Dataset, folder: Path) -> list[Row]:
     rows = method_rows(dataset, protocol_of(dataset), draws_of(dataset, folder))
-    head = {name: str(dataset.attrs[name]) for name in ("title", "drawn_on")}
+    head: Row = {name: str(dataset.attrs[name]) for name in ("title", "drawn_on")}
     head["sealed"] = bool((dataset["scenario_set"] == "drawn").any())
     return [{**head, "place": n, **row} for n, row in enumerate(sorted(rows, key=rank), 1)]
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.errors import FileError
+from vehiclemor.arguments import count, file_path, quoted
+from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
@@ -78,6 +79,43 @@ def regenerate_figures(
     if not only:
         written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
     return written
+
+
+def figures(
+    only: Sequence[str] = (),
+    out: str | Path = "results",
+    results: str | Path = "results",
+    jobs: int = 1,
+    *,
+    style: str = "",
+    dpi: int | None = None,
+) -> list[Path]:
+    """Draw figures of the paper or of any study; studies that are missing are run first.
+
+    Parameters
+    ----------
+    only
+        Figure names such as `6`, or `histories-`, `errors-`, `map-` or `pareto-` and the name of a
+        model, or studies and protocols by name or TOML file; the paper's by default.
+    out
+        Folder of the figures.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+    style, dpi
+        Name or file of a Matplotlib style on top of the package's, and dots an inch of PNG files.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+    """
+    folders = file_path("results", results), file_path("out", out)
+    chosen = [only] if isinstance(only, str) else only
+    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
+        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
+    return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)
 
 
 def left_out(results: Path) -> dict[str, str]:

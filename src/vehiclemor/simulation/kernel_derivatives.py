@@ -9,13 +9,15 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.tangent import FEW, Tangent, tangent, tangent_source
+from vehiclemor.codegen.tangent import Tangent, tangent, tangent_source
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 
 # Places of the arguments of a kernel.
 STATE, INPUTS, CONSTANTS = range(3)
 PLACES = {"state": STATE, "inputs": INPUTS}
+# Directions that loops take at once: more take as long, and longer to compile.
+AT_ONCE = (4, 2, 1)
 # State, inputs and constants, as kernels want them.
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 # What derivatives are taken by: `state`, `inputs`, or names of parameters.
@@ -40,8 +42,8 @@ def _tangent(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int)
 
 
 def lanes_of(directions: int) -> int:
-    """How many of so many directions a compiled loop takes at once: one, or `FEW`."""
-    return FEW if directions >= FEW else min(directions, 1)
+    """How many of so many directions a compiled loop takes at once."""
+    return next((lanes for lanes in AT_ONCE if lanes <= directions), 0)
 
 
 def address_of_tangent(kernels: Kernels, name: str, lanes: int) -> int:

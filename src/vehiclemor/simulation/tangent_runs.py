@@ -7,7 +7,6 @@ of the system's own kernel, and the step size control covers both.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -111,7 +110,7 @@ def side_by_side(states: np.ndarray, moved: np.ndarray) -> np.ndarray:
     return np.hstack((states, moved.reshape(len(moved), -1)))
 
 
-def apart(path: np.ndarray, directions: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def apart(path: np.ndarray, directions: int) -> tuple[np.ndarray, np.ndarray]:
     """States (samples, n) and tangents (samples, directions, n) of a path of both."""
-    parts = path.reshape(len(path), 1 + len(directions), -1)
+    parts = path.reshape(len(path), 1 + directions, -1)
     return parts[:, 0], parts[:, 1:]

@@ -7,33 +7,28 @@ compiled kernels they ask the driver, and one another, before one of them makes 
 from __future__ import annotations
 
 import logging
-import threading
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.object_cache import asking, cache_folder, held, packed, unpacked
-from vehiclemor.codegen.once import once
-from vehiclemor.errors import FileError, InputError, MachineError, one_line
-from vehiclemor.files import probe_folder, temporary_path, write_text
-from vehiclemor.study.cell_file import encoded
-from vehiclemor.study.evaluate import model_of
+from vehiclemor.codegen.object_cache import cache_folder, held, packed
+from vehiclemor.errors import InputError, MachineError, one_line
+from vehiclemor.files import temporary_path, write_text
+from vehiclemor.study.cluster_worker import Place, Sent, on_worker
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.store import write_encoded
 from vehiclemor.study.workers import (
     KILLED,
+    LARGEST,
     Done,
     Engine,
     Groups,
     Timed,
-    evaluate_and_store,
-    evaluated,
     in_batches,
     timed_batch,
 )
@@ -41,36 +36,16 @@ from vehiclemor.study.workers import (
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
-    import xarray as xr
     from distributed import Client
 
 LOCAL = "local"
-# Key -> content of a cell's file, and whether a bug has ended it: what the driver is to write.
-Sent = dict[str, tuple[bytes, bool]]
-# Seconds: to reach a scheduler, until the driver has answered, between two looks at who works.
-REACH, ANSWER, LOOK = 10.0, 20.0, 1.0
+# Seconds: to reach a scheduler, and between two looks at who works.
+REACH, LOOK = 10.0, 1.0
 # Ctrl-C reaches all processes of a terminal, and the driver ends the workers.
 NO_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 # Packages that must be the same everywhere; that of Python is its first two numbers.
 SAME = ("python", "distributed")
 _LOG = logging.getLogger("vehiclemor")
-
-
-class Place(NamedTuple):
-    """Where results belong, and how a worker finds out whether it sees that folder.
-
-    Attributes
-    ----------
-    token, text
-        A file of the driver's, and what it holds.
-    topic
-        Under which the driver is asked for kernels.
-    """
-
-    folder: Path
-    token: Path
-    text: str
-    topic: str
 
 
 @contextmanager
@@ -106,8 +81,13 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
             )
         client = stack.enter_context(_client(address))
         topic = f"vehiclemor-{uuid.uuid4().hex}"
-        client.subscribe_topic(topic, partial(_answer, client, topic))
-        yield partial(evaluated_by_cluster, client=client, topic=topic)
+        asked: set[str] = set()
+        client.subscribe_topic(topic, partial(_answer, client, topic, asked))
+        try:
+            yield partial(evaluated_by_cluster, client=client, topic=topic)
+        finally:
+            for name in asked:
+                distributed.Variable(name, client=client).delete()
 
 
 @contextmanager
@@ -132,6 +112,7 @@ def _client(address: Any) -> Iterator[Client]:
 def _knock(address: str) -> None:
     """Raise `InputError` if there is no scheduler: a client that fails hangs when it is deleted."""
     import asyncio
+    from concurrent.futures import ThreadPoolExecutor
 
     from distributed.core import connect
     from distributed.security import Security
@@ -143,7 +124,9 @@ def _knock(address: str) -> None:
         connection.abort()
 
     try:
-        asyncio.run(knock())
+        # A notebook has a loop of its own in this thread.
+        with ThreadPoolExecutor(1) as other:
+            other.submit(lambda: asyncio.run(knock())).result()
     except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
         reason = " ".join(str(error).split()) or f"no answer in {REACH:g} s"
         raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
@@ -170,33 +153,42 @@ def _versions(entry: dict[str, Any] | None) -> dict[str, str]:
     return found | {"python": ".".join(found["python"].split(".")[:2])}
 
 
-async def _answer(client: Client, topic: str, event: tuple[float, str]) -> None:
+async def _answer(client: Client, topic: str, asked: set[str], event: tuple[float, str]) -> None:
     """Give a worker a file of this process's cache; nothing if it has none."""
     import asyncio
 
     from distributed import Variable
 
     name = event[1]
+    shared = f"{topic} {name}"
+    asked.add(shared)
     content = await asyncio.to_thread(held, name)
-    answer = b"" if content is None else packed(name, content)
-    await Variable(f"{topic} {name}", client=client).set(answer)
+    await Variable(shared, client=client).set(b"" if content is None else packed(name, content))
 
 
 def evaluated_by_cluster(
     groups: Groups,
     folder: Path,
+    alone: bool = False,
+    *,
     client: Client,
     topic: str,
     work: Callable[..., tuple[Done, Sent]] | None = None,
 ) -> Generator[Done, None, None]:
-    """What `evaluate_and_store` gives for each batch, by the workers of a cluster."""
+    """What `evaluate_and_store` gives for each batch, by the workers of a cluster.
+
+    Parameters
+    ----------
+    alone
+        Whether each group is a batch of its own, so that one that kills workers spoils no other.
+    """
     from distributed.cfexecutor import ClientExecutor
 
     folder = folder.absolute()
     token = temporary_path(folder / "cells" / "token")
     place = Place(folder, token, uuid.uuid4().hex, topic)
     pool = ClientExecutor(client, pure=False)
-    seen, number = 0.0, 0
+    seen, number, most = 0.0, 0, 1 if alone else LARGEST
 
     def submit(batch: list[Experiment]) -> Future[Timed]:
         return pool.submit(timed_batch, work or on_worker, batch, place)
@@ -209,7 +201,7 @@ def evaluated_by_cluster(
 
     try:
         write_text(token, place.text)
-        for done, results in in_batches(groups, submit, places, _taken):
+        for done, results in in_batches(groups, submit, places, _taken, most):
             for key, (content, broken) in results.items():
                 write_encoded(content, folder, key, broken=broken)
             yield done
@@ -237,79 +229,3 @@ def _taken(future: Future[Timed]) -> Timed:
             f"scheduler: a worker lacks what this process has ({one_line(error)}); "
             f"install the same versions"
         ) from error
-
-
-# On a worker
-
-
-def on_worker(experiments: Sequence[Experiment], place: Place) -> tuple[Done, Sent]:
-    """Evaluate some experiments; gives their results too, if the driver is to write them."""
-    with _turn(), asking(partial(_from_others, place.topic)):
-        _same_source(experiments)
-        if _sees(place):
-            return evaluate_and_store(experiments, place.folder), {}
-        results: Sent = {}
-
-        def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
-            results[key] = encoded(dataset, key, seconds), "error" in dataset["status"].values
-
-        return evaluated(experiments, keep), results
-
-
-@once
-def _turn() -> threading.Lock:
-    """Cells of one process take turns: the limit of linear algebra is one for all its threads."""
-    from threadpoolctl import threadpool_limits
-
-    threadpool_limits(1)
-    return threading.Lock()
-
-
-@cache
-def _sees(place: Place) -> bool:
-    """Whether a worker can write into the driver's own folder, not into another of its name."""
-    try:
-        if place.token.read_text() != place.text:
-            return False
-        probe_folder(place.token.parent)
-    except (OSError, FileError, MachineError):
-        return False
-    return True
-
-
-def _same_source(experiments: Sequence[Experiment]) -> None:
-    """Raise `InputError` if results would be those of other source or another compiler."""
-    for e in experiments:
-        what = ""
-        if code_digest(e.model, e.method) != e.code:
-            what = "another version of vehiclemor, or of the package of"
-        elif model_of(e).kernel_hash != e.kernel:
-            what = "another processor or compiler, which gives other kernels of"
-        if what:
-            from distributed import get_worker
-
-            raise InputError(
-                f"scheduler: worker {get_worker().address} has {what} {e.model} with {e.method}; "
-                f"cells are known by what computes them, so it must be the driver's own"
-            )
-
-
-def _from_others(topic: str, name: str, make: Callable[[], bytes]) -> bytes:
-    """A file of the cache: the driver's, or another worker's, or else made for all."""
-    from distributed import Lock, Variable, get_client, get_worker
-
-    client = get_client()
-    shared = Variable(f"{topic} {name}", client=client)
-    with Lock(f"{topic} {name}"):
-        for answer in (0.0, ANSWER):
-            if answer:
-                get_worker().log_event(topic, name)
-            try:
-                content = unpacked(name, shared.get(timeout=answer))
-            except TimeoutError:
-                continue
-            if content is not None:
-                return content
-        content = make()
-        shared.set(packed(name, content))
-    return content

@@ -331,7 +331,8 @@ def _tested(
 
 def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
     """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
-    if run.trust and run.trust.reason:
+    # What has learned from nothing is the full order of a protocol's second runs.
+    if (run.trust and run.trust.reason) or not experiment.training:
         return run
     method: Method = component("method", experiment.method)
     judges_itself = run.trust or method.own_limits

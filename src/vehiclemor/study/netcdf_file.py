@@ -57,7 +57,8 @@ def write_parts(parts: Parts, path: Path, further: Mapping[str, object]) -> None
 
     def fill(file: netCDF4.Dataset) -> None:
         _, first = next(parts.parts)
-        grown = [n for n, v in first.variables.items() if set(v.dims) & set(parts.dimensions)]
+        found = first.variables.items()
+        grown = [str(n) for n, v in found if set(v.dims) & set(parts.dimensions)]
         first.assign_attrs(further).dump_to_store(
             NetCDF4DataStore(file),
             encoding={name: {"chunksizes": first[name].shape} for name in grown},

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 Groups = Sequence[Sequence[Experiment]]
 # Keys of what is finished of a group, and how the machine has failed in the rest, if it has.
 Done = tuple[list[str], str]
-# What evaluates groups elsewhere and stores their results: in processes, or on a cluster.
-Engine = Callable[[Groups, Path], Generator[Done, None, None]]
+# What evaluates groups elsewhere and stores their results, if so each by itself.
+Engine = Callable[[Groups, Path, bool], Generator[Done, None, None]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
 # Batches sent for each worker, so that none is idle; more would not fit into its queue.
@@ -119,7 +119,7 @@ class Workers:
         first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
         work.sort(key=lambda group: id(group) not in first)
         if self.elsewhere:
-            engine = self.elsewhere(work, self.folder)
+            engine = self.elsewhere(work, self.folder, again)
         else:
             engine = evaluated_by_workers(work, self.folder, self.jobs)
         with closing(engine):
@@ -188,6 +188,7 @@ def in_batches(
     submit: Callable[[list[Experiment]], Future[Timed]],
     places: Callable[[], int],
     taken: Callable[[Future[Timed]], Timed],
+    most: int = LARGEST,
 ) -> Generator[Any, None, None]:
     """Send groups to workers, several at once where they are quick; gives what comes back.
 
@@ -199,6 +200,8 @@ def in_batches(
         Tells how many batches can be worked at a time.
     taken
         Gives what a batch that is done has given.
+    most
+        Experiments of a batch, unless one group has more.
     """
     from concurrent.futures import FIRST_COMPLETED, wait
 
@@ -209,13 +212,13 @@ def in_batches(
         while left and len(waiting) < at_once:
             batch = list(left.popleft())
             # The last batches are small, so that workers end together.
-            while left and len(batch) < min(size, len(left) // at_once):
+            while left and len(batch) + len(left[0]) <= min(size, len(left) // at_once):
                 batch += left.popleft()
             waiting[submit(batch)] = len(batch)
         for future in wait(waiting, return_when=FIRST_COMPLETED).done:
             number, (result, seconds) = waiting.pop(future), taken(future)
             if seconds > 0.0:
-                size = int(min(max(BATCH * number / seconds, 1), LARGEST))
+                size = int(min(max(BATCH * number / seconds, 1), most))
             yield result
 
 

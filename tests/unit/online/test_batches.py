@@ -60,6 +60,28 @@ def check_alone(model, signals, found: xr.Dataset, starts=None) -> None:
             assert own.until.item() == alone.trust.until
 
 
+def test_what_is_not_chosen_is_made_where_it_is_read(full, monkeypatch):
+    signals, masses = vm.Signals(TIMES, steering(70), "cubic"), np.linspace(1300.0, 1500.0, 70)
+    made, whole = [], batches._Work.__call__
+    monkeypatch.setattr(
+        batches._Work,
+        "__call__",
+        lambda work, part: made.append((len(work.signals), work.chosen.names)) or whole(work, part),
+    )
+    given = {"parameters": {"sprung_mass": masses}, "jobs": 1}
+    found = vm.simulate_many(full, signals, **given)
+    assert made == [(70, ())] * 2
+    made.clear()
+    names, rows, runs = ["roll", "yaw"], [30, 7, 7], [66, 2]
+    read = found["values"].sel(output=names).isel(time=rows, run=runs).values
+    assert made == [(2, ("yaw", "roll"))]
+    chosen = vm.simulate_many(full, signals, **given, outputs=names)
+    np.testing.assert_array_equal(read, chosen["values"].isel(time=rows, run=runs))
+    one = found["values"].sel(output="roll").isel(time=40, run=3)
+    assert one.item() == chosen["values"].sel(output="roll").isel(time=40, run=3).item()
+    assert found["values"].isel(run=[]).values.shape == (0, len(found.time), len(found.output))
+
+
 @pytest.mark.parametrize("kept", [{}, KEPT, {"outputs": "yaw"}], ids=["all", "few", "state"])
 @pytest.mark.parametrize("start", [None, "dropped"])
 @pytest.mark.parametrize("which", ["reduced", "full"])
@@ -295,10 +317,11 @@ def test_wrong_input_is_one_line(changes, line, full):
     assert "\n" not in str(error.value)
 
 
-def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
+def test_what_can_not_be_kept_is_refused(full, tmp_path, monkeypatch):
     signals = vm.Signals(TIMES, steering(2))
+    fitted = vm.reduce(full.model, "operator_inference", training="nominal")
     with pytest.raises(InputError, match="is fitted to one car"):
-        vm.simulate_many(reduced, signals, parameters={"sprung_mass": 1400.0})
+        vm.simulate_many(fitted, signals, parameters={"sprung_mass": 1400.0})
     (tmp_path / "runs.nc").mkdir()
     with pytest.raises(FileError, match="exists already"):
         vm.simulate_many(full, signals, path=tmp_path / "runs.nc")
@@ -310,7 +333,9 @@ def test_what_can_not_be_kept_is_refused(reduced, full, tmp_path, monkeypatch):
     assert (tmp_path / "mine.nc").read_text() == "mine"
     monkeypatch.setattr(batches, "LARGEST", 1000)
     with pytest.raises(InputError, match="GB of memory: choose outputs= and times="):
-        vm.simulate_many(full, signals)
+        vm.simulate_many(full, signals, outputs=["yaw", "roll"])
+    with pytest.raises(InputError, match="GB of memory: choose outputs= and times="):
+        vm.simulate_many(full, signals)["values"].load()
     with pytest.raises(InputError, match=r"u \(3,\)"):
         vm.Signals(TIMES, [1.0, 2.0, 3.0])
     with pytest.raises(InputError, match="run 1 holds what is not finite"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vehiclemor.arguments import count, file_path
 from vehiclemor.registry import names, unknown
 from vehiclemor.resources import data_names
 
@@ -12,19 +13,36 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def comparison(what: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
+def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> pd.DataFrame:
     """A comparison as a table; studies and timings that are missing are run first.
 
     Parameters
     ----------
     what
-        `paper`, `predictive`, the name of a model, or a study by its name or TOML file.
+        `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
+        not seen, beside full-order integrators.  The name of a model: every method that fits it,
+        nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
+        name or TOML file: errors of every method over the grid, or on the protocol's inputs.
+    out
+        Results folder.
+    jobs
+        Number of processes.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
+        floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
+        that the paper doesn't have), measure, reason, threshold_source; described at
+        `comparison.rows.Row`, those of the others at `predictive_comparison`,
+        `model_comparison` and `study_comparison` in `vehiclemor.report`.
 
     Raises
     ------
     InputError
         If there is no such comparison.
     """
+    folder, jobs = file_path("out", out), count("jobs", jobs)
     if what == "paper":
         from vehiclemor.report.comparison.paper import paper_comparison
 

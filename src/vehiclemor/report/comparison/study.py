@@ -13,12 +13,24 @@ from vehiclemor.registry import component
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.rows import protocol_rows
 from vehiclemor.report.predictive.text import predictive_text
-from vehiclemor.report.printing import Line, fixed, power, short, table_text, terms, wrapped
+from vehiclemor.report.printing import (
+    Footnotes,
+    Line,
+    fixed,
+    power,
+    short,
+    table_text,
+    terms,
+    wrapped,
+)
 from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED
+from vehiclemor.study.plans.study_file import PARAMETER
 from vehiclemor.study.run import run_studies
 
 Row = dict[str, Any]
 KIND = "errors"
+# Places of the grid that stand in a column; longer ones are below the table.
+LONGEST = 28
 LEGEND = {
     "median, largest": "RMS errors of the runs of a method that have come to their end, over the "
     "grid, SI units; at: where in the grid the largest is",
@@ -64,8 +76,8 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
         "grid": _grid_words(dataset),
     }
     count = EVALUATIONS[component("model", head["model"]).kind]
-    kept = ["status", "seconds", "offline_seconds", "rms_error", "max_error", "floor_rms_error"]
-    small = dataset[[*kept, count]].load()
+    errors = ["rms_error", "max_error", "floor_rms_error"]
+    small = dataset[[*errors, "cell_key", "status", "seconds", "offline_seconds", count]].load()
     rows: list[Row] = []
     for start in dataset["start"].values:
         for method in dataset["method"].values:
@@ -83,6 +95,9 @@ def _grid_words(dataset: xr.Dataset) -> str:
         if name not in ("method", "start") and (len(values) > 1 or values != ["1"]):
             every = ", ".join(values) if len(values) <= 8 else f"{values[0]} to {values[-1]}"
             words.append(f"{name} {every}" + (f" ({len(values)})" if len(values) > 8 else ""))
+    for name, values in dataset.coords.items():
+        if values.dims == ("sample",) and name != "sample":
+            words.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")
     return "; ".join(words)
 
 
@@ -90,15 +105,9 @@ def _different(part: xr.Dataset) -> xr.Dataset:
     """Without dimensions of the grid that a method's runs do not depend on."""
     for name in part["status"].dims:
         first = part.isel({name: 0})
-        # A run that is computed twice takes another time.
-        names = ("seconds", "rms_error", "status")
-        if all(_same(part[n], first[n]) for n in names):
+        if bool((part["cell_key"] == first["cell_key"]).all()):
             part = first.drop_vars(str(name))
     return part
-
-
-def _same(values: xr.DataArray, first: xr.DataArray) -> bool:
-    return bool(((values == first) | ((values != values) & (first != first))).all())
 
 
 def _rows_of_method(part: xr.Dataset, count: str) -> list[Row]:
@@ -157,7 +166,7 @@ def _grid_text(rows: list[Row]) -> str:
     """One study: a block for each start and output that the model shows, then costs."""
     first = rows[0]
     shown = component("model", first["model"]).shown.printed_outputs
-    starts = list(dict.fromkeys(row["start"] for row in rows))
+    starts, notes = list(dict.fromkeys(row["start"] for row in rows)), Footnotes()
     head = f"{first['study']}: {first['title']}"
     about = f"{first['model']}, training {first['training']}"
     about += f"; {first['grid']}" if first["grid"] else ""
@@ -169,9 +178,8 @@ def _grid_text(rows: list[Row]) -> str:
         for output in shown:
             found = [row for row in part if row["output"] == output]
             heading = f"{from_start}{label_of(output).words}, {found[0]['unit']}"
-            errors += [
-                Line(_error_cells(row), heading="" if i else heading) for i, row in enumerate(found)
-            ]
+            cells = [_error_cells(row, notes) for row in found]
+            errors += [Line(row, heading="" if i else heading) for i, row in enumerate(cells)]
         found = [row for row in part if row["output"] == shown[0]]
         costs += [
             Line(_cost_cells(row), heading="" if i else from_start.removesuffix(": "))
@@ -181,13 +189,16 @@ def _grid_text(rows: list[Row]) -> str:
         table_text(["", "median", "largest", "floor", "at"], errors, (0, 4)),
         table_text(["", "runs", "failed", "evaluations", "us", "off."], costs),
     ]
-    return "\n".join([wrapped(head), wrapped(about, 2, 2), *tables])
+    parts = [wrapped(head), wrapped(about, 2, 2), tables[0], notes.text(), tables[1]]
+    return "\n".join(filter(None, parts))
 
 
-def _error_cells(row: Row) -> list[str]:
+def _error_cells(row: Row, notes: Footnotes) -> list[str]:
     cells = [f"  {row['method']}", *(power(row[name]) for name in ("median", "largest", "floor"))]
     lost = f"{row['failed']:.0f} failed" if row["failed"] else ""
-    return [*cells, "; ".join(filter(None, (row["largest_at"], lost)))]
+    place = row["largest_at"].replace(PARAMETER, "")
+    place = place if len(place) <= LONGEST else notes.marks(place)
+    return [*cells, "; ".join(filter(None, (place, lost)))]
 
 
 def _cost_cells(row: Row) -> list[str]:

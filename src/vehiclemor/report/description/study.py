@@ -4,6 +4,7 @@ from vehiclemor.registry import component
 from vehiclemor.study.plans.protocol import SETS
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.study_file import (
+    Sampling,
     load_studies,
     named_file,
     read_study,
@@ -33,21 +34,38 @@ def study_description(name: str) -> dict[str, object]:
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
         "training": study.training,
+        "cars trained on": study.cars
+        if isinstance(study.cars, str)
+        else f"{len(study.cars)} listed",
+        "parameters": ", ".join(f"{key}={value}" for key, value in study.parameters.items()),
         "grid points": study.points,
         "keeps": study.keep,
         "grid": [
             {"dimension": key, "values": ", ".join(map(str, entry))} for key, entry in grid.items()
         ],
+        "sampling": _sampling(study.sampling),
         "methods": [
             {
                 "label": label,
                 "method": entry.method,
                 "preset": entry.preset,
+                "cars": entry.cars,
                 "settings": ", ".join(f"{k}={v}" for k, v in entry.settings.items()),
             }
             for label, entry in study.labelled.items()
         ],
     }
+
+
+def _sampling(plan: Sampling | None) -> list[dict[str, object]]:
+    """Ranges of a sampling plan, each with how it is sampled."""
+    if plan is None:
+        return []
+    how = f"{plan.plan}, {plan.count} points, seed {plan.seed}"
+    return [
+        {"name": name, "from": low, "to": high, "plan": how}
+        for name, (low, high) in plan.ranges.items()
+    ]
 
 
 def _protocol(name: str) -> dict[str, object]:

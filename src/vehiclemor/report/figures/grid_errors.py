@@ -1,4 +1,4 @@
-"""Errors of any study over what it varies: curves, bands, maps, or clouds of samples.
+"""Errors of any study over what it varies: curves, bands or maps.
 
 Which of them follows from the dimensions of its grid, whatever model and methods it has.
 """
@@ -18,7 +18,7 @@ from vehiclemor.report.figures.lines import CROSS, Style, legend_outside, letter
 from vehiclemor.report.figures.places import FEW_DECADES, Places, places_of, tick_decades
 from vehiclemor.report.labels import error_label, method_text, readable_unit, unit_of
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.study_file import FACTORS
+from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 # Lines of a panel, starts with panels of their own, columns of maps, and cells of a map with their
 # number.
@@ -42,12 +42,6 @@ class Line(NamedTuple):
     text: str
     style: Style
     errors: xr.DataArray
-
-
-def sample_axis(dataset: xr.Dataset) -> str:
-    """The dimension whose places are samples without an order, empty if there is none."""
-    grid = [str(d) for d in dataset["status"].dims if dataset.sizes[d] > 1]
-    return next((d for d in grid if d == "sample" or d.endswith("_seed")), "")
 
 
 def figure_grid_errors(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure | None:
@@ -90,7 +84,7 @@ def _lines(
     errors = errors.isel({d: 0 for d in others if d not in own}, drop=True)
     found = {}
     for place in itertools.product(*(errors[d].values.tolist() for d in own)):
-        values = [f"{name.replace('_', ' ')} {v}" for name, v in zip(own, place, strict=True)]
+        values = [f"{_words([name])} {v}" for name, v in zip(own, place, strict=True)]
         chosen = errors.sel(dict(zip(own, place, strict=True)), drop=True)
         name, text = (", ".join([m, *values]) for m in (method, method_text(method)))
         found[name] = text, chosen
@@ -109,8 +103,8 @@ def _curves(
     figure, grid = panels(rows, wide, (6.7 if wide < 3 else 8.5, 2.5 * rows + 0.7), sharex=True)
     places = places_of(dataset, axis)
     contents = [(output, start) for output in outputs for start in columns]
-    rest = sorted({d for line in lines for d in line.errors.dims} - {axis, starts, "output"})
-    rest = [str(d) for d in rest if dataset.sizes[d] > 1]
+    rest = sorted({str(d) for line in lines for d in line.errors.dims})
+    rest = [d for d in rest if d not in (axis, starts, "output") and dataset.sizes[d] > 1]
     for number, (panel, (output, start)) in enumerate(zip(grid.flat, contents, strict=False)):
         place = {"output": output} | ({starts: start} if starts else {})
         chosen = [line._replace(errors=line.errors.sel(place)) for line in lines]
@@ -127,12 +121,13 @@ def _curves(
     title = (
         f"medians over {_words(rest)}, bands from the smallest to the largest error" if rest else ""
     )
-    figure.suptitle(_titled(dataset, title))
+    figure.suptitle(titled(dataset, title))
     legend_outside(figure, figure.axes, 0, "lower")
     return figure
 
 
-def _titled(dataset: xr.Dataset, more: str) -> str:
+def titled(dataset: xr.Dataset, more: str) -> str:
+    """Title of the result, and a line below it."""
     return "\n".join(filter(None, (str(dataset.attrs.get("title", "")), more)))
 
 
@@ -156,18 +151,18 @@ def _draw(panel: Axes, where: Places, lines: Sequence[Line], axis: str) -> None:
         middle = np.full(len(places), np.nan)
         middle[some] = np.nanmedian(known[some], axis=1)
         # Names have no order that a line could follow.
-        look = style | ({"linestyle": "none"} if where.names else {})
-        marker = MARKERS[number % len(MARKERS)]
-        panel.plot(places, middle, label=text, marker=marker, markersize=4, **look)
+        look: Style = {**style, "marker": MARKERS[number % len(MARKERS)], "markersize": 4}
+        look |= {"linestyle": "none"} if where.names else {}
+        panel.plot(places, middle, label=text, **look)
         if values.shape[1] > 1:
             low, high = (f(known[some], axis=1) for f in (np.nanmin, np.nanmax))
             band: Style = {"color": style["color"], "alpha": 0.15, "linewidth": 0.0}
             panel.fill_between(places[some], low, high, **band)
-        _draw_edges(panel, places, values, style["color"])
-    _scale(panel)
+        draw_edges(panel, places, values, style["color"])
+    scale_errors(panel)
 
 
-def _scale(panel: Axes) -> None:
+def scale_errors(panel: Axes) -> None:
     """A logarithmic axis of errors, and last in the legend what it can't show."""
     panel.set_yscale("log")
     tick_decades(panel.yaxis, *panel.get_ylim())
@@ -180,7 +175,7 @@ def _scale(panel: Axes) -> None:
         panel.plot([], [], color="black", label="error 0, off the log axis", **NONE)
 
 
-def _draw_edges(panel: Axes, places: np.ndarray, values: np.ndarray, color: str) -> None:
+def draw_edges(panel: Axes, places: np.ndarray, values: np.ndarray, color: str) -> None:
     """What a logarithmic axis can't show: failed runs above it, errors that are 0 below it."""
     edge: Style = {"color": color, "transform": panel.get_xaxis_transform(), "clip_on": False}
     failed = places[np.isinf(values).any(axis=1) | np.isnan(values).any(axis=1)]
@@ -205,80 +200,16 @@ def _map(
     written = math.prod(dataset.sizes[d] for d in axes) <= WRITTEN
     options = {"outputs": outputs, "methods": texts, "values": written, "axes": axes}
     figure = figure_error_map({"": largest}, **options)
-    figure.suptitle(_titled(dataset, _largest_over(dataset, rest).removeprefix(", ")))
+    figure.suptitle(titled(dataset, largest_over(dataset, rest).removeprefix(", ")))
     return figure
 
 
-def _largest_over(dataset: xr.Dataset, dimensions: Sequence[str]) -> str:
+def largest_over(dataset: xr.Dataset, dimensions: Sequence[str]) -> str:
     """What is said of dimensions over which the largest error is drawn."""
     several = [d for d in dimensions if dataset.sizes[d] > 1]
     return f", the largest error over {_words(several)}" if several else ""
 
 
 def _words(dimensions: Sequence[str]) -> str:
-    *head, last = (d.replace("_", " ") for d in dimensions or [""])
+    *head, last = (d.removeprefix(PARAMETER).replace("_", " ") for d in dimensions or [""])
     return f"{', '.join(head)} and {last}" if head else last
-
-
-def figure_samples(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure:
-    """RMS errors of all samples: over what was sampled, or beside each other for each method."""
-    sample = sample_axis(dataset)
-    errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-    rest = [str(d) for d in errors.dims if d not in (sample, "method", "output")]
-    errors = errors.max(rest)
-    methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
-    methods = methods or [str(m) for m in dataset["method"].values]
-    sampled = _sampled(dataset, sample, errors.sel(method=methods))
-    columns = sampled or [""]
-    height = 2.4 * len(outputs) + 0.9
-    size = (max(5.0, 1.2 + 2.4 * len(columns)), height)
-    figure, grid = panels(len(outputs), len(columns), size, sharex="col", sharey="row")
-    looks = styles(methods)
-    for row, output in enumerate(outputs):
-        for column, name in enumerate(columns):
-            panel = grid[row, column]
-            for number, method in enumerate(methods):
-                values = errors.sel({"method": method, "output": output}).values
-                order = (0.5 + np.arange(values.size) * 0.6180339887) % 1.0
-                places = number + 0.6 * (order - 0.5)
-                places = places_of(dataset, name).at if name else places
-                look: Style = {"color": looks[method]["color"], "linestyle": "none", "alpha": 0.6}
-                look |= {"marker": MARKERS[number % len(MARKERS)], "markersize": 3}
-                look |= {"markeredgewidth": 0.0, "rasterized": values.size > 1000}
-                shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-                text = method_text(method) if name else None
-                panel.plot(places, shown, label=text, **look)
-                _draw_edges(panel, places, values[:, None], looks[method]["color"])
-                if not name and np.isfinite(shown).any():
-                    middle = np.full(2, np.nanmedian(shown))
-                    panel.plot(number + np.array([-0.4, 0.4]), middle, color="black")
-            _scale(panel)
-            panel.set_title(letter(row * len(columns) + column))
-            if not name:
-                panel.set_xticks(range(len(methods)), map(method_text, methods), fontsize=7)
-        grid[row, 0].set_ylabel(error_label(dataset, "RMS error", output))
-    for panel, name in zip(grid[-1], columns, strict=True):
-        if name:
-            places_of(dataset, name).scale(panel)
-    words = f"{dataset.sizes[sample]} samples" + _largest_over(dataset, rest)
-    figure.suptitle(_titled(dataset, words))
-    legend_outside(figure, figure.axes, 0, "lower")
-    return figure
-
-
-def _sampled(dataset: xr.Dataset, sample: str, errors: xr.DataArray) -> list[str]:
-    """Sampled quantities; of many those that the errors follow most (rank correlation)."""
-    from scipy.stats import spearmanr
-
-    names = [
-        str(name)
-        for name, values in dataset.coords.items()
-        if values.dims == (sample,) and name != sample and values.dtype.kind == "f"
-    ]
-    names = [name for name in names if np.ptp(dataset[name].values) > 0.0]
-    ranks = errors.transpose(sample, ...).values.reshape(dataset.sizes[sample], -1).mean(axis=1)
-
-    def follows(name: str) -> float:
-        return -abs(float(spearmanr(dataset[name].values, ranks).statistic))
-
-    return sorted(names, key=follows)[:3] if len(names) > 3 else names

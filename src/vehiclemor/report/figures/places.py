@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from vehiclemor.study.plans.study_file import FACTORS
+from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 UNITS = {"control_period": "s"}
 # Ratio of the largest to the smallest number from which on an axis is logarithmic; names that there
@@ -68,7 +68,7 @@ class Places(NamedTuple):
 
 def places_of(dataset: xr.Dataset, name: str) -> Places:
     """Places of a dimension of a grid, or of a coordinate on one."""
-    values, words = dataset[name].values, name.replace("_", " ")
+    values, words = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
     if name in FACTORS:
         return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
     if not np.issubdtype(values.dtype, np.number):

@@ -22,11 +22,7 @@ from vehiclemor.report.figures.curves import (
     draw_largest_errors,
     positions,
 )
-from vehiclemor.report.figures.grid_errors import (
-    figure_grid_errors,
-    figure_samples,
-    sample_axis,
-)
+from vehiclemor.report.figures.grid_errors import figure_grid_errors
 from vehiclemor.report.figures.lines import (
     CROSS,
     FULL,
@@ -36,6 +32,7 @@ from vehiclemor.report.figures.lines import (
     styles,
 )
 from vehiclemor.report.figures.places import tick_decades
+from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import method_text, unit_of
 from vehiclemor.report.result_selection import drawn

@@ -8,7 +8,7 @@ from typing import Any
 
 from vehiclemor.errors import FileError
 from vehiclemor.report.html.parts import Cell
-from vehiclemor.study.store import read_dataset, result_path
+from vehiclemor.study.store import read_cell
 
 # A value whose JSON is longer stands apart, once for all cells that have it.
 LONG = 240
@@ -19,7 +19,7 @@ MISSING = "The cell's own file is not among the results: this is what the study'
 def stored_cell(folder: Path, key: str, known: Mapping[str, Any]) -> Cell:
     """A cell by its key; where its file is gone what is `known` of it."""
     try:
-        found = json.loads(read_dataset(result_path(folder, key), "cell", key).configuration)
+        found = json.loads(read_cell(folder, key).configuration)
     except FileError:
         return Cell(f"cell {key}", known, MISSING)
     tests = found["test"]

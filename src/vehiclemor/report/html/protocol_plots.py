@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.report.figures.lines import COLORS
-from vehiclemor.report.html.interactive import HINT, as_items, new_figure, with_legend
+from vehiclemor.report.html.interactive import HINT, as_items, legend_name, new_figure, with_legend
 from vehiclemor.report.html.parts import Plot
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -46,7 +46,7 @@ def runs_plot(name: str, judged: xr.Dataset, protocol: ProtocolFile) -> list[Plo
         data = {"x": shown.astype("i4"), "y": found[order][shown].astype("f4")}
         data |= {"run": runs[shown].tolist(), "name": [label] * len(shown)}
         dots = made.scatter(
-            "x", "y", source=data, size=5, color=color, alpha=0.8, legend_label=label
+            "x", "y", source=data, size=5, color=color, alpha=0.8, legend_label=legend_name(label)
         )
         dots.visible = label == first
     made.add_layout(Span(location=1.0, dimension="width", line_width=1))

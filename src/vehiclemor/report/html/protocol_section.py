@@ -24,7 +24,7 @@ from vehiclemor.report.html.parts import (
     quantity,
 )
 from vehiclemor.report.html.protocol_plots import runs_plot
-from vehiclemor.report.html.provenance import facts, source_text
+from vehiclemor.report.html.provenance import facts, name_of, source_text
 from vehiclemor.report.html.vector import svg_element
 from vehiclemor.report.labels import label_of, unit_of
 from vehiclemor.report.leaderboard import RULE, rank
@@ -42,7 +42,7 @@ COUNTS = ("misses", "silent", "flagged")
 
 def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
     """Everything that a combined dataset of a protocol holds, within a bounded size."""
-    name, protocol = str(dataset.attrs["study"]), protocol_of(dataset)
+    name, protocol = name_of(dataset), protocol_of(dataset)
     draws = draws_of(dataset, folder)
     rows = sorted(method_rows(dataset, protocol, draws), key=rank)
     anchors = _anchors(dataset)
@@ -85,7 +85,7 @@ def _anchors(dataset: xr.Dataset) -> dict[str, str]:
     judged = judged_set(set(dataset["scenario_set"].values))
     found = {}
     for number, label in enumerate(map(str, dataset["row"].values)):
-        own = f"row-{dataset.attrs['study']}-{number}"
+        own = f"row-{name_of(dataset)}-{number}"
         if "cell_keys" in dataset:
             own = f"cell-{json.loads(dataset['cell_keys'].values[number])[judged]}"
         found[label] = own

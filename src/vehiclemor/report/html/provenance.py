@@ -20,6 +20,11 @@ WORDS = {
 }
 
 
+def name_of(dataset: xr.Dataset) -> str:
+    """Name of the file of a study's results: two studies may have one name, but not one file."""
+    return Path(dataset.encoding.get("source", dataset.attrs["study"])).stem
+
+
 def facts(dataset: xr.Dataset, cells: Mapping[str, Cell]) -> dict[str, str]:
     """Versions, machine and hashes that a dataset and its cells were stored with."""
     found = {words: str(dataset.attrs[k]) for k, words in WORDS.items() if k in dataset.attrs}

@@ -12,12 +12,14 @@ from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.interactive import (
     HINT,
     as_items,
+    legend_name,
     look,
     new_figure,
     tapped,
     with_legend,
 )
 from vehiclemor.report.html.parts import Plot
+from vehiclemor.report.html.study_table import sampled
 from vehiclemor.report.labels import label_of, method_text, unit_of
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.study.plans.study_file import FACTORS
@@ -57,7 +59,7 @@ def _paths(dataset: xr.Dataset) -> tuple[list[Any], str]:
     for label, (outputs, style) in curves.items():
         x, y = outputs.sel(output=PATH).transpose("output", "time").values[:, every].astype("f4")
         data: dict[str, Any] = {"x": x, "y": y, "time": times, "name": [label] * len(x)}
-        made.line("x", "y", source=data, legend_label=label, **look(style))
+        made.line("x", "y", source=data, legend_label=legend_name(label), **look(style))
     at = f" at {words}" if words else ""
     return [with_legend(made)], f"Interactive: paths of all methods{at}. {HINT}"
 
@@ -80,8 +82,10 @@ def _errors(dataset: xr.Dataset) -> tuple[list[Any], str]:
         return [], ""
     at = f", at {', '.join(words)}" if words else ""
     if len(axes) == 1:
-        caption = f"Interactive: {label} over {axes[0].replace('_', ' ')}{at}; a tap on a point "
-        return [_curves(tables, axes[0], label)], f"{caption}leads to its cell. {HINT}"
+        # Samples have no order: the first of what differs between them stands for it.
+        axis = [*sampled(dataset), *axes][0] if axes == ["sample"] else axes[0]
+        caption = f"Interactive: {label} over {axis.replace('_', ' ')}{at}; a tap on a point "
+        return [_curves(tables, axis, label)], f"{caption}leads to its cell. {HINT}"
     shown = dict(list(tables.items())[:MAPS])
     caption = (
         f"Interactive: {label} over the grid{at}; a tap leads to the cell, where it is listed."
@@ -113,33 +117,31 @@ def _table(values: xr.DataArray, keys: xr.DataArray | None, method: str, axes: l
     """Columns of the points of a method that have an error above zero."""
     from bokeh.models import ColumnDataSource
 
-    part = values.sel({"method": method}).squeeze(drop=True).transpose(*axes)
-    grid = np.meshgrid(*(part[a].values for a in axes), indexing="ij")
-    found = part.values.ravel()
-    good = np.isfinite(found) & (found > 0.0)
-    columns: dict[str, Any] = {a: g.ravel()[good] for a, g in zip(axes, grid, strict=True)}
-    columns |= {"error": found[good].astype("f4"), "name": [method_text(method)] * int(good.sum())}
-    names = np.full(found.shape, "", dtype=object)
+    part = values.sel({"method": method}).squeeze(drop=True).stack(place=axes)
+    part = part[np.isfinite(part.values) & (part.values > 0.0)]
+    own = {
+        str(n): c.values for n, c in part.coords.items() if n != "place" and c.dims == ("place",)
+    }
+    columns = own | {"error": part.values.astype("f4"), "name": [method_text(method)] * part.size}
+    names: list[str] = [""] * part.size
     if keys is not None:
-        names = keys.sel({"method": method}).squeeze(drop=True).transpose(*axes).values.ravel()
-    columns |= {"cell": [f"cell-{name}" for name in names[good]]}
+        found = keys.sel({"method": method}).squeeze(drop=True).stack(place=axes)
+        names = [f"cell-{key}" for key in found.sel(place=part["place"]).values]
+    columns["cell"] = names
     return ColumnDataSource(columns)
 
 
 def _curves(tables: dict[str, Any], axis: str, label: str) -> Any:
-    words = axis.replace("_", " ")
-    told = {"": "@name", words: f"@{axis}", "error": "@error{0.00e}", "at": "@cell"}
-    made = new_figure(words, label, told, y_axis_type="log")
+    any_table = next(iter(tables.values()))
+    told = {"": "@name", "error": "@error{0.00e}"}
+    places = [n for n in any_table.column_names if n not in ("error", "name", "cell")]
+    told |= {n.replace("_", " "): f"@{{{n}}}" for n in places} | {"at": "@cell"}
+    made = new_figure(axis.replace("_", " "), label, told, y_axis_type="log")
     for (method, source), style in zip(tables.items(), styles(tables).values(), strict=True):
-        made.line(axis, "error", source=source, legend_label=method_text(method), **look(style))
-        made.scatter(
-            axis,
-            "error",
-            source=source,
-            size=6,
-            color=style["color"],
-            legend_label=method_text(method),
-        )
+        common = {"source": source, "legend_label": legend_name(method_text(method))}
+        if "sample" not in places:
+            made.line(axis, "error", **common, **look(style))
+        made.scatter(axis, "error", size=6, color=style["color"], **common)
         tapped(made, source)
     return with_legend(made)
 
@@ -154,7 +156,7 @@ def _maps(tables: dict[str, Any], axes: list[str]) -> list[Any]:
     made = []
     for method, source in tables.items():
         colors = LogColorMapper(palette="Viridis256", low=low, high=high)
-        told = {a.replace("_", " "): f"@{a}" for a in axes}
+        told = {a.replace("_", " "): f"@{{{a}}}" for a in axes}
         told |= {"error": "@error{0.00e}", "at": "@cell"}
         x, y = axes
         figure = new_figure(

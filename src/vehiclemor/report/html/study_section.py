@@ -12,7 +12,7 @@ from vehiclemor.report.figures.saving import styled
 from vehiclemor.report.html.cells import UNNAMED, stored_cell
 from vehiclemor.report.html.interactive import available
 from vehiclemor.report.html.parts import Cell, Picture, Section
-from vehiclemor.report.html.provenance import facts, source_text
+from vehiclemor.report.html.provenance import facts, name_of, source_text
 from vehiclemor.report.html.study_plots import study_plots
 from vehiclemor.report.html.study_table import Place, error_table, places
 from vehiclemor.report.html.vector import svg_element
@@ -27,7 +27,7 @@ PICTURES = {
 
 def study_section(dataset: xr.Dataset, folder: Path) -> Section:
     """What a combined dataset of a grid holds, within a bounded size."""
-    name, definition = str(dataset.attrs["study"]), json.loads(dataset.attrs["configuration"])
+    name, definition = name_of(dataset), json.loads(dataset.attrs["configuration"])
     rows = places(dataset)
     table = error_table(dataset, rows)
     linked = {entry.anchor for row in table.rows for entry in row if entry.anchor}
@@ -39,7 +39,7 @@ def study_section(dataset: xr.Dataset, folder: Path) -> Section:
     }
     ends = Counter(str(row["status"]) for row in rows)
     told = ", ".join(f"{n} {status}" for status, n in sorted(ends.items()))
-    what = f"Study {name} of {dataset.attrs['model']}"
+    what = f"Study {dataset.attrs['study']} of {dataset.attrs['model']}"
     size = f"{len(rows)} places of the grid, {len({row['anchor'] for row in rows})} cells"
     return Section(
         f"study-{name}",

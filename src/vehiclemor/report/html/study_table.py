@@ -8,6 +8,7 @@ import xarray as xr
 from vehiclemor.report.errors import flat
 from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.parts import MISSING, Entry, Table, count, quantity
+from vehiclemor.report.html.provenance import name_of
 from vehiclemor.report.labels import label_of, method_text, unit_of
 
 # A table with more rows is summed up.
@@ -24,20 +25,30 @@ Place = dict[str, Any]
 
 def places(dataset: xr.Dataset) -> list[Place]:
     """Every place of the grid: values, errors, counts, status, and the anchor of its cell."""
-    table = flat(dataset, tuple(map(str, dataset["output"].values)))
+    table = flat(dataset, tuple(shown_outputs(dataset)))
     if "cell_key" in dataset:
         keys = dataset["cell_key"].transpose(*dataset["status"].dims).values.ravel()
         table["anchor"] = [f"cell-{key}" for key in keys]
     else:
         # Stored before cells were named.
-        table["anchor"] = [f"place-{dataset.attrs['study']}-{n}" for n in range(len(table))]
+        table["anchor"] = [f"place-{name_of(dataset)}-{n}" for n in range(len(table))]
+    for name in sampled(dataset):
+        values = dict(zip(dataset["sample"].values, dataset[name].values, strict=True))
+        table[name] = [values[sample] for sample in table["sample"]]
     return [{str(k): v for k, v in row.items()} for row in table.to_dict("records")]
+
+
+def sampled(dataset: xr.Dataset) -> list[str]:
+    """What differs between samples, where a study has any."""
+    found = {str(name): c for name, c in dataset.coords.items() if c.dims == ("sample",)}
+    return [name for name in found if name != "sample"]
 
 
 def error_table(dataset: xr.Dataset, rows: Sequence[Place]) -> Table:
     """RMS errors of the outputs that the model shows, with links."""
     dims = [str(d) for d in dataset["status"].dims]
     grid = [d for d in dims if d != "method" and dataset.sizes[d] > 1]
+    grid += sampled(dataset)
     outputs = {o: _heading(dataset, o) for o in shown_outputs(dataset)}
     return (_every if len(rows) <= MOST_ROWS else _summary)(rows, outputs, grid)
 

@@ -13,11 +13,11 @@ from vehiclemor.report.comparison.rows import from_start
 from vehiclemor.report.costs import LEGEND, cost_rows
 from vehiclemor.report.criteria import CRITERIA, VARIANTS, variants
 from vehiclemor.report.html.parts import Cell, Entry, Section, Table, judged_entry, quantity
-from vehiclemor.report.html.provenance import facts
+from vehiclemor.report.html.provenance import facts, name_of
 from vehiclemor.report.published import Published, load_published
 from vehiclemor.report.verdicts import counted
 
-HEADS = ("item", "variant", "start", "published", "bound", "reproduced", "unit", "verdict", "why")
+HEADS = ("item", "verdict", "variant", "start", "published", "bound", "reproduced", "unit", "why")
 INTRO = (
     "Masoudi, Uchida, McPhee (2015), doi:10.1115/1.4029390: every printed number and claim beside "
     "what is reproduced. A number leads to its cell, a time to what was timed, the number of a "
@@ -56,13 +56,13 @@ def _entries(row: dict[str, Any], origin: tuple[str, str]) -> list[Entry]:
     why = "; ".join(filter(None, (row["measure"], row["reason"], studies)))
     return [
         Entry(row["item"]),
+        judged_entry(row["verdict"]),
         Entry(row["variant"]),
         Entry(row["start"]),
         quantity(row["published"]),
         quantity(row["bound"]),
         quantity(row["reproduced"], anchor),
         Entry(row["unit"]),
-        judged_entry(row["verdict"]),
         Entry(why),
     ]
 
@@ -77,7 +77,10 @@ def _origin(row: dict[str, Any], published: Published, results: Studies) -> tupl
         CRITERIA[name](asked, next(iter(variants(name))))
         if not asked.names:
             return "", "from the training runs alone"
-        return f"study-{asked.names[0]}", f"from {', '.join(dict.fromkeys(asked.names))}"
+        return (
+            f"study-{name_of(results[asked.names[0]])}",
+            f"from {', '.join(dict.fromkeys(asked.names))}",
+        )
     if number.kind == "time_reduction":
         return f"costs-{number.model}", ""
     label = next((label for label, text in VARIANTS.items() if text == row["variant"]), "")

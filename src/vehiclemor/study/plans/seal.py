@@ -52,7 +52,7 @@ def seal(protocol: Protocol, rows: Sequence[Row]) -> str:
             for row in rows
         ],
         "validation": [scenario.content for scenario in protocol.sets["validation"]],
-        "protocol": [protocol.path.stem, protocol.own],
+        "own": protocol.own,
         "judging": source_digest((), [f"study/{name}.py" for name in JUDGING], ()),
         "rules": rules(protocol),
     }

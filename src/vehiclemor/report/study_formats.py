@@ -1,0 +1,177 @@
+"""Combined datasets in other formats: Zarr as they are, Parquet and CSV as a row for each cell."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+from collections.abc import Iterator
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from vehiclemor.arguments import file_path
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.files import not_written, temporary_path, write_whole
+from vehiclemor.registry import unknown
+from vehiclemor.report.result_selection import stored_result
+from vehiclemor.study.netcdf_file import PART, regions
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+Format = Literal["zarr", "parquet", "csv"]
+FORMATS: tuple[str, ...] = get_args(Format)
+# Package that writes a format, of the extra `convert`.
+ENGINES = {"zarr": "zarr", "parquet": "pyarrow"}
+
+
+def convert(
+    study: str | Path,
+    to: Format,
+    out: str | Path | None = None,
+    results: str | Path = "results",
+) -> Path:
+    """Write the stored result of a study in another format, part by part.
+
+    Parameters
+    ----------
+    study
+        Name or file of a study that has been run, or a netCDF file of its result.
+    to
+        `zarr`: the whole dataset.  `parquet`, `csv`: a table with a row for each point of the grid,
+        without histories; the columns of an output's errors are `rms_error.toe` and so on.  What
+        columns mean and their units stand beside it in `NAME.columns.csv`.
+    out
+        New file or folder; under the study's name here by default.
+    results
+        Results folder.
+
+    Raises
+    ------
+    VehiclemorError
+        If there is no such result, a package is missing, or something is there already.
+    """
+    if to not in FORMATS:
+        raise unknown("format", to, FORMATS)
+    engine = ENGINES.get(to)
+    if engine and not find_spec(engine):
+        raise InputError(f"{to} needs the package {engine}: pip install 'vehiclemor[convert]'")
+    name = str(file_path("study", study))
+    path = Path(f"{Path(name).stem}.{to}") if out is None else file_path("out", out)
+    columns = path.with_suffix(".columns.csv")
+    for target in (path,) if to == "zarr" else (path, columns):
+        if target.exists():
+            raise FileError(f"{target}: exists already; move it away")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: there is no such folder")
+    dataset = stored_result(name, file_path("results", results))
+    if "status" not in dataset:
+        raise InputError(f"{name}: not the result of a study")
+    if to == "zarr":
+        _write_zarr(dataset, path)
+        return path
+    described = _columns(dataset)
+    write_whole(columns, lambda file: described.to_csv(file, index=False))
+    write = _write_csv if to == "csv" else _write_parquet
+    return write_whole(path, partial(write, tables(dataset)))
+
+
+def tables(dataset: xr.Dataset) -> Iterator[pd.DataFrame]:
+    """Rows of the points of a grid, in order, in parts that can be held."""
+    grid = [str(dimension) for dimension in dataset["status"].dims]
+    sizes = [dataset.sizes[dimension] for dimension in grid]
+    kept = [name for name, of in _rest(dataset).items() if of is not None]
+    rows = dataset[kept]
+    at_once = max(PART * max(int(np.prod(sizes)), 1) // max(rows.nbytes, 1), 1)
+    for region in regions(sizes, at_once):
+        yield _table(rows.isel(dict(zip(grid, region, strict=True))).load(), grid)
+
+
+def _rest(dataset: xr.Dataset) -> dict[str, list[str] | None]:
+    """Variable -> its dimensions beyond the grid's; None of a history."""
+    grid = set(dataset["status"].dims)
+    found: dict[str, list[str] | None] = {}
+    for name, variable in dataset.variables.items():
+        rest = [str(d) for d in variable.dims if d not in grid]
+        inside = name not in dataset.coords or (not rest and bool(variable.dims))
+        if inside:
+            history = {"time", "input"} & set(rest)
+            found[str(name)] = None if history else rest
+    return found
+
+
+def _table(part: xr.Dataset, grid: list[str]) -> pd.DataFrame:
+    import pandas as pd
+    import xarray as xr
+
+    columns: dict[str, np.ndarray] = {}
+    like = part["status"]
+    for name, rest in sorted(_rest(part).items(), key=lambda item: item[0] not in part.coords):
+        assert rest is not None
+        whole = xr.broadcast(part[name], like)[0].transpose(*grid, *rest)
+        values = whole.values.reshape(like.size, -1)
+        for number, column in enumerate(_names(part, name, rest)):
+            columns[column] = values[:, number]
+    return pd.DataFrame(columns)
+
+
+def _names(dataset: xr.Dataset, name: str, rest: list[str]) -> list[str]:
+    """Names of the columns of a variable."""
+    labels = itertools.product(*(dataset[d].values.astype(str).tolist() for d in rest))
+    return [".".join((name, *label)) for label in labels]
+
+
+def _columns(dataset: xr.Dataset) -> pd.DataFrame:
+    """Meaning and unit of every column."""
+    import pandas as pd
+
+    rows: list[dict[str, str]] = []
+    for name, rest in _rest(dataset).items():
+        if rest is None:
+            continue
+        attributes, names = dataset[name].attrs, _names(dataset, name, rest)
+        units = [attributes.get("units", "")] * len(names)
+        # Of outputs that do not share one unit each has its own.
+        if "units" not in attributes and len(rest) == 1 and f"{rest[0]}_unit" in dataset.coords:
+            units = dataset[f"{rest[0]}_unit"].values.tolist()
+        meaning = str(attributes.get("long_name", ""))
+        rows += [
+            {"column": column, "unit": unit, "meaning": meaning}
+            for column, unit in zip(names, units, strict=True)
+        ]
+    return pd.DataFrame(rows)
+
+
+def _write_csv(parts: Iterator[pd.DataFrame], path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for number, part in enumerate(parts):
+            part.to_csv(file, index=False, header=number == 0)
+
+
+def _write_parquet(parts: Iterator[pd.DataFrame], path: Path) -> None:
+    from pyarrow import Table
+    from pyarrow.parquet import ParquetWriter
+
+    first = Table.from_pandas(next(parts), preserve_index=False)
+    with ParquetWriter(path, first.schema) as file:
+        file.write_table(first)
+        for part in parts:
+            file.write_table(Table.from_pandas(part, first.schema, preserve_index=False))
+
+
+def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
+    # Texts of any length, as those of other chunks may be longer.
+    texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
+    temporary = temporary_path(path)
+    try:
+        dataset.assign(texts).drop_encoding().to_zarr(temporary, mode="w", consolidated=False)  # type: ignore[call-overload]
+        os.replace(temporary, path)
+    except OSError as error:
+        raise not_written(path, error) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

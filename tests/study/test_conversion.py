@@ -1,0 +1,93 @@
+"""Results of studies in other formats hold what the combined dataset holds."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import vehiclemor as vm
+from vehiclemor.cli import main
+from vehiclemor.errors import VehiclemorError
+from vehiclemor.report import study_formats
+
+STUDY = """
+title = "for the tests"
+model = "double_wishbone"
+grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], rank = [2, 3] }
+[[methods]]
+method = "full_order"
+[[methods]]
+method = "pod"
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Result of a study, and the folder that holds it."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "mine.toml").write_text(STUDY)
+    return vm.run_study(folder / "mine.toml", out=folder / "results"), folder
+
+
+@pytest.mark.parametrize("to", ["csv", "parquet"])
+@pytest.mark.parametrize("part", [study_formats.PART, 2000])
+def test_a_table_has_a_row_for_each_point(study, tmp_path, monkeypatch, to, part):
+    if to == "parquet":
+        pytest.importorskip("pyarrow")
+    monkeypatch.setattr(study_formats, "PART", part)
+    found, folder = study
+    path = vm.convert(folder / "mine.toml", to, tmp_path / f"mine.{to}", folder / "results")
+    read = {"csv": lambda p: pd.read_csv(p, keep_default_na=False), "parquet": pd.read_parquet}
+    table = read[to](path)
+    assert len(table) == 8
+    point = {"parameters.tie_rod_inner.z": -0.09, "rank": 3, "method": "pod"}
+    row = table.query("`parameters.tie_rod_inner.z` == -0.09 and rank == 3 and method == 'pod'")
+    here = found.sel(point).squeeze()
+    assert row["status"].item() == "ok"
+    assert row["cell_key"].item() == here["cell_key"].item()
+    toe = float(here["rms_error"].sel(output="toe"))
+    assert float(row["rms_error.toe"].item()) == pytest.approx(toe, rel=1e-14)
+    columns = pd.read_csv(tmp_path / "mine.columns.csv", index_col="column", keep_default_na=False)
+    assert set(columns.index) == set(table.columns)
+    assert columns.loc["rms_error.toe", "unit"] == "rad"
+    assert columns.loc["rms_error.spindle_y", "unit"] == "m"
+    assert columns.loc["parameters.tie_rod_inner.z", "unit"] == "m"
+
+
+def test_zarr_holds_the_whole_dataset(study, tmp_path):
+    pytest.importorskip("zarr")
+    found, folder = study
+    arguments = ["--to", "zarr", "--out", str(tmp_path / "mine.zarr")]
+    stored = str(folder / "results" / "studies" / "mine.nc")
+    assert main(["convert", stored, *arguments]) == 0
+    with xr.open_zarr(tmp_path / "mine.zarr", consolidated=False) as opened:
+        for name, variable in found.variables.items():
+            np.testing.assert_array_equal(opened[name].values, variable.values)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "words"),
+    [
+        ("mine.toml", {"to": "xls"}, "unknown format 'xls'"),
+        ("mine.toml", {"to": "csv", "out": "there.csv"}, "exists already"),
+        ("mine.toml", {"to": "csv", "out": "nowhere/mine.csv"}, "no such folder"),
+        ("mine.toml", {"to": "csv", "results": "elsewhere"}, "no such result"),
+        ("paper", {"to": "csv"}, "is a collection"),
+    ],
+)
+def test_wrong_conversions_leave_nothing(study, tmp_path, monkeypatch, name, arguments, words):
+    _, folder = study
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.csv").write_text("kept")
+    given = folder / name if name.endswith(".toml") else name
+    with pytest.raises(VehiclemorError, match=words):
+        vm.convert(given, **({"results": folder / "results"} | arguments))
+    assert [path.name for path in tmp_path.iterdir()] == ["there.csv"]
+    assert (tmp_path / "there.csv").read_text() == "kept"
+
+
+def test_a_missing_engine_is_one_line(study, tmp_path, monkeypatch):
+    _, folder = study
+    monkeypatch.setattr(study_formats, "find_spec", lambda _: None)
+    with pytest.raises(VehiclemorError, match=r"pip install 'vehiclemor\[convert\]'"):
+        vm.convert(folder / "mine.toml", "parquet", tmp_path / "a.parquet", folder / "results")
