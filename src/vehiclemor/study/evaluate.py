@@ -335,10 +335,13 @@ def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory
     if (run.trust and run.trust.reason) or not experiment.training:
         return run
     method: Method = component("method", experiment.method)
+    judges_itself = run.trust or method.own_limits
+    if judges_itself and method.learns_from == "inputs":
+        return run
     known = input_range(model, trained_for(experiment.training, test))
     if outside := known.outside(method, car_of(model, test)):
         return run.judged(outside)
-    return run if run.trust or method.own_limits else run.judged(known.trust(model, test))
+    return run if judges_itself else run.judged(known.trust(model, test))
 
 
 def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
