@@ -13,6 +13,9 @@ from vehiclemor.study.plans.study_file import (
 )
 from vehiclemor.toml_files import read_toml
 
+# Values of an axis that are printed.
+SHOWN = 40
+
 
 def study_description(name: str) -> dict[str, object]:
     """Grid and methods of a study, its members if it is a collection, or its protocols."""
@@ -40,9 +43,7 @@ def study_description(name: str) -> dict[str, object]:
         "parameters": ", ".join(f"{key}={value}" for key, value in study.parameters.items()),
         "grid points": study.points,
         "keeps": study.keep,
-        "grid": [
-            {"dimension": key, "values": ", ".join(map(str, entry))} for key, entry in grid.items()
-        ],
+        "grid": [{"dimension": key, "values": _shown(entry)} for key, entry in grid.items()],
         "sampling": _sampling(study.sampling),
         "methods": [
             {
@@ -55,6 +56,13 @@ def study_description(name: str) -> dict[str, object]:
             for label, entry in study.labelled.items()
         ],
     }
+
+
+def _shown(axis: list[int | float | str]) -> str:
+    """Values of an axis; of a long one both ends."""
+    if len(axis) <= SHOWN:
+        return ", ".join(map(str, axis))
+    return f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)"
 
 
 def _sampling(plan: Sampling | None) -> list[dict[str, object]]:
