@@ -1,12 +1,11 @@
 """A study: what it runs, and how many cells its grid has."""
 
 from vehiclemor.registry import component
-from vehiclemor.study.plans.protocol import SETS
+from vehiclemor.study.plans.protocol import SETS, protocol_path
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.study_file import (
     Sampling,
     load_studies,
-    named_file,
     read_study,
     study_path,
     values,
@@ -78,7 +77,7 @@ def _sampling(plan: Sampling | None) -> list[dict[str, object]]:
 
 def _protocol(name: str) -> dict[str, object]:
     """What a protocol trains, chooses by and tests; scenarios are counted."""
-    protocol = read_toml(named_file("protocol", "protocols", name), ProtocolFile)
+    protocol = read_toml(protocol_path(name), ProtocolFile)
     counted = {s: sum(g.scenarios for g in getattr(protocol, s)) for s in SETS}
     draws = {"drawn": protocol.drawn, "drawn outside": protocol.drawn_outside}
     counted |= {name: draw.runs for name, draw in draws.items() if draw}
