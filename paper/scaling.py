@@ -11,7 +11,6 @@ and some minutes.  A smaller share makes grids with as much fewer cells, to try 
 from __future__ import annotations
 
 import argparse
-import logging
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -90,9 +89,8 @@ def options(engine: str) -> Iterator[dict[str, Any]]:
     if engine == "dask":
         from distributed import LocalCluster
 
-        with LocalCluster(
-            n_workers=JOBS, threads_per_worker=1, silence_logs=logging.ERROR
-        ) as cluster:
+        cluster: Any = LocalCluster(n_workers=JOBS, threads_per_worker=1, silence_logs=40)
+        with cluster:
             yield {"scheduler": cluster.scheduler_address}
     else:
         yield {"jobs": JOBS if engine == "joblib" else 1}

@@ -24,7 +24,8 @@ from vehiclemor.simulation.sensitivities import (
     Component,
     Sensitivities,
     components,
-    observed,
+    directions_of,
+    outputs_along,
     recorded,
     sizes_of,
 )
@@ -78,7 +79,8 @@ def reduced_sensitivities(
         states = own.full_states(np.ascontiguousarray(states), paths[1])
     found = recorded(own.model, maneuver, run, states)
     trusted = found.judged(reduced.simulate(maneuver, begun).trust)
-    return observed(model, along, trusted, moved)
+    outputs = outputs_along(model, trusted, moved, directions_of(model, along))
+    return Sensitivities(trusted, along, moved, outputs)
 
 
 def _lifts(own: ReducedSystem) -> bool:

@@ -142,17 +142,16 @@ def sensitivities(
         found = tangent_run(model.system, space, maneuver, model.start(start), tangents, chosen)
         states, moved = apart(found.path, len(along))
         run = recorded(model, maneuver, found, states)
-    return observed(model, along, run, moved)
-
-
-def observed(
-    model: Model, along: tuple[Component, ...], run: Trajectory, moved: np.ndarray
-) -> Sensitivities:
-    """A run of the model with derivatives (samples, components, states) of its states."""
-    paths = side_by_side(run.states, moved), run.inputs
-    constants = model.constants, directions_of(model, along)
-    outputs = tangents_along(model.kernels, "outputs", constants, paths, len(model.outputs))
+    outputs = outputs_along(model, run, moved, directions)
     return Sensitivities(run, along, moved, outputs)
+
+
+def outputs_along(
+    model: Model, run: Trajectory, moved: np.ndarray, directions: np.ndarray
+) -> np.ndarray:
+    """Derivatives (samples, components, outputs) by those of states and constants along a run."""
+    paths, constants = (side_by_side(run.states, moved), run.inputs), (model.constants, directions)
+    return tangents_along(model.kernels, "outputs", constants, paths, len(model.outputs))
 
 
 def directions_of(model: Model, along: Sequence[Component]) -> np.ndarray:

@@ -99,10 +99,11 @@ def _client(address: Any) -> Iterator[Client]:
     with warnings.catch_warnings():
         # What differs is an error below.
         warnings.simplefilter("ignore")
-        client = Client(address, timeout=REACH, set_as_default=False)
+        # Its types are those of awaited calls too.
+        client: Any = Client(address, timeout=REACH, set_as_default=False)
     with client:
         _same_versions(client)
-        number = sum(client.nthreads().values())
+        number = _places(client)
         work = f"{number} places for cells" if number else "no worker yet, cells wait for the first"
         at, dashboard = client.scheduler.address, client.dashboard_link
         _LOG.info("scheduler %s: %s; dashboard %s", at, work, dashboard)
@@ -132,7 +133,11 @@ def _knock(address: str) -> None:
         raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
 
 
-def _same_versions(client: Client) -> None:
+def _places(client: Any) -> int:
+    return sum(client.nthreads().values())
+
+
+def _same_versions(client: Any) -> None:
     """Raise `InputError` if the scheduler or a worker runs other versions than this process."""
     found = client.get_versions()
     own = _versions(found["client"])
@@ -196,7 +201,7 @@ def evaluated_by_cluster(
     def places() -> int:
         nonlocal seen, number
         if time.monotonic() - seen > LOOK:
-            seen, number = time.monotonic(), sum(client.nthreads().values())
+            seen, number = time.monotonic(), _places(client)
         return number
 
     try:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vehiclemor.codegen.object_cache import asking, packed, unpacked
 from vehiclemor.codegen.once import once
@@ -101,7 +101,7 @@ def from_others(topic: str, name: str, make: Callable[[], bytes]) -> bytes:
     from distributed import Lock, Variable, get_client, get_worker
 
     client = get_client()
-    shared = Variable(f"{topic} {name}", client=client)
+    shared: Any = Variable(f"{topic} {name}", client=client)
     with Lock(f"{topic} {name}"):
         for answer in (0.0, ANSWER):
             if answer:
