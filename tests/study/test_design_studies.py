@@ -44,3 +44,42 @@ def test_a_reduced_car_finds_the_same_springs_and_dampers(springs, stiff):
     (found,) = springs["front"](soft, [0.101])
     assert np.abs(found.design - point.design).max() < 0.01
     np.testing.assert_allclose(fine.values(found.design), fine.values(point.design), rtol=0.005)
+
+
+@pytest.fixture(scope="module")
+def joints():
+    return runpy.run_path(str(ROOT / "examples" / "suspension_hard_points.py"))
+
+
+def squares(joints, change):
+    """Sum of squares at a design, of a suspension that is built anew."""
+    values = vm.model(joints["MODEL"]).parameters.values()
+    points = {name.split(".")[0]: list(values[name.split(".")[0]]) for name in joints["DESIGN"]}
+    for name, part in zip(joints["DESIGN"], change, strict=True):
+        points[name.split(".")[0]]["xyz".index(name[-1])] += part
+    model = vm.model(joints["MODEL"], parameters=points)
+    run = vm.simulate(model, maneuver=joints["travel"](), errors=False)
+    z = run["inputs"].sel(input="z").values
+    off = [
+        run["outputs"].sel(output=name).values - slope * z
+        for name, slope in zip(("toe", "camber"), joints["TARGETS"], strict=True)
+    ]
+    return np.sum(np.square(off))
+
+
+def test_hard_points_are_optimal_within_their_bounds_and_the_path_map_finds_them(joints):
+    designers = joints["designers"]()
+    found = joints["designed"](designers["full order, exact derivatives"])
+    slope = np.array(
+        [
+            (squares(joints, found.x + h) - squares(joints, found.x - h)) / 2e-5
+            for h in 1e-5 * np.eye(len(found.x))
+        ]
+    )
+    at = np.sign(found.x) * (np.abs(found.x) > joints["LARGEST"] * (1.0 - 1e-4))
+    assert 0 < np.count_nonzero(at) < len(at)
+    size = np.abs(slope).max()
+    assert np.abs(slope[at == 0]).max() < 1e-4 * size
+    assert (slope[at != 0] * at[at != 0] < 0.0).all()
+    mapped = joints["designed"](designers["path map, differences"])
+    np.testing.assert_allclose(mapped.x, found.x, atol=1e-7)
