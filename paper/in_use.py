@@ -97,8 +97,8 @@ def runs() -> Values:
     """Whole calls with a signal that was never seen: outside of compiled loops, and by name."""
     number, inside, compiled = iter(range(1_000_000)), [0.0], Prepared.__call__
 
-    def fresh() -> vm.Signal:
-        return vm.Signal.from_samples(TIMES, MULTISINE * (1.0 - 1e-6 * next(number)))
+    def fresh(hold: str = "linear") -> vm.Signal:
+        return vm.Signal.from_samples(TIMES, MULTISINE * (1.0 - 1e-6 * next(number)), hold)
 
     def timed(loop: Prepared) -> Any:
         began = time.thread_time()
@@ -114,14 +114,16 @@ def runs() -> Values:
             signal = fresh()
             made = time.thread_time()
             with patch.object(Prepared, "__call__", timed):
-                car.simulate(signal, "equilibrium")
+                run = car.simulate(signal, "equilibrium")
             call = time.thread_time() - made
-            spent.append((made - began, call, call - inside[0]))
-        for part, seconds in zip(("signal", "call", "Python"), np.min(spent, axis=0), strict=True):
+            spent.append((made - began, call, call - inside[0], made - began + call - run.seconds))
+        parts = ("signal", "call", "Python", "beyond")
+        for part, seconds in zip(parts, np.min(spent, axis=0), strict=True):
             values[f"fresh {kind} {part}, us"] = 1e6 * seconds
     simulate = partial(vm.simulate, VEHICLES["gv"][0])
     return values | cpu(
         {
+            "cubic signal": partial(fresh, "cubic"),
             "by name": simulate,
             "by name with a fresh signal": lambda: simulate(maneuver=fresh()),
             "by name without errors": lambda: simulate(maneuver=fresh(), errors=False),

@@ -3,18 +3,18 @@
 Usage: python paper/scaling.py [--results DIR] [--share 1.0]
 
 Writes DIR/scaling.nc, named values with units, which `paper/facts.py` writes into the texts, and
-prints them.  Wall clock of whole runs, from reading the study to the combined dataset, the start of
-processes included: it wants an idle machine of two cores, and some minutes.  A smaller share makes
-grids with as much fewer cells, to try it.
+prints them.  Wall clock of whole runs, from reading the study to the combined dataset, by processes
+that have begun; what it takes to begin them is told apart.  It wants an idle machine of two cores,
+and some minutes.  A smaller share makes grids with as much fewer cells, to try it.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,22 +40,23 @@ training = "nominal"
 keep = "metrics"
 
 [grid]
-frequency_factor = {{ first = 0.8, last = 1.2, count = {count} }}
-amplitude_factor = {{ first = 0.8, last = 1.1, count = 50 }}
+frequency_factor = {{ first = 0.8, last = 1.2, count = {frequencies} }}
+amplitude_factor = {{ first = 0.8, last = 1.1, count = {amplitudes} }}
 rank = {ranks}
+
+[[methods]]
+method = "full_order"
+
+[[methods]]
+method = "pod"
 """
-METHOD = '\n[[methods]]\nmethod = "{}"\n'
-# Short name -> model, ranks, methods: at each of the frequencies (of all of them) and 50 amplitudes
-# one cell of a method without a rank, and one for each rank.
+# Short name -> model, ranks and frequencies; at each frequency and each of so many amplitudes there
+# is one cell of the full order, and one for each rank.
 STUDIES = {
-    "suspension": ("double_wishbone", [2, 3, 4], ("full_order", "pod"), 50),
-    "vehicle": ("independent_suspension_vehicle", [3], ("full_order", "pod"), 10),
+    "suspension": ("double_wishbone", [2, 3, 4], 50),
+    "vehicle": ("independent_suspension_vehicle", [3], 10),
 }
-ENGINES: dict[str, dict[str, Any]] = {
-    "one": {},
-    "joblib": {"jobs": 2},
-    "dask": {"jobs": 2, "scheduler": LOCAL},
-}
+AMPLITUDES, JOBS = 50, 2
 
 
 def nothing(experiments: Sequence[Experiment], _: object) -> Done:
@@ -69,32 +70,58 @@ def nothing_sent(experiments: Sequence[Experiment], place: object) -> tuple[Done
 
 
 def study(short: str, share: float, folder: Path) -> Path:
-    """File of a study."""
-    model, ranks, methods, count = STUDIES[short]
-    path = folder / f"{short}.toml"
-    head = HEAD.format(model=model, ranks=ranks, count=max(round(share * count), 2))
-    path.write_text(head + "".join(METHOD.format(method) for method in methods))
+    """File of a study; with no share of the cells it has a few."""
+    model, ranks, frequencies = STUDIES[short]
+    path = folder / f"{short}-{share}.toml"
+    text = HEAD.format(
+        model=model,
+        ranks=ranks,
+        frequencies=max(round(share * frequencies), 2),
+        amplitudes=AMPLITUDES if share else 2,
+    )
+    path.write_text(text)
     return path
+
+
+@contextmanager
+def options(engine: str) -> Iterator[dict[str, Any]]:
+    """What a run is told of an engine, while its processes live."""
+    if engine == "dask":
+        from distributed import LocalCluster
+
+        cluster: Any = LocalCluster(n_workers=JOBS, threads_per_worker=1, silence_logs=40)
+        with cluster:
+            yield {"scheduler": cluster.scheduler_address}
+    else:
+        yield {"jobs": JOBS if engine == "joblib" else 1}
+
+
+def seconds_of(path: Path, folder: Path, how: dict[str, Any]) -> float:
+    """Wall clock of a study that runs into a new folder."""
+    began = time.perf_counter()
+    (found,) = run_studies(str(path), folder, **how).values()
+    assert set(found["status"].values.ravel()) == {"ok"}
+    return time.perf_counter() - began
 
 
 def whole_runs(share: float, folder: Path) -> Values:
     """Runs of each study by each engine; what they compile is compiled before."""
     values: Values = {}
     for short in STUDIES:
-        path = study(short, share, folder)
-        run_studies(str(study(short, 0.0, folder / "small")), folder / "warm")
-        for engine, options in ENGINES.items():
+        few, path = study(short, 0.0, folder), study(short, share, folder)
+        seconds_of(few, folder / f"{short} before", {})
+        for engine in ("one", "joblib", "dask"):
+            out, name = folder / f"{short} {engine}", f"{short} {engine}"
             began = time.perf_counter()
-            (found,) = run_studies(str(path), folder / f"{short} {engine}", **options).values()
-            seconds = time.perf_counter() - began
-            cells = len(list((folder / f"{short} {engine}" / "cells").rglob(f"*{ENDING}")))
-            assert set(found["status"].values.ravel()) == {"ok"}
+            with options(engine) as how:
+                seconds_of(few, folder / f"{short} {engine} few", how)
+                start = time.perf_counter() - began
+                seconds = seconds_of(path, out, how)
+            cells = sum(1 for _ in (out / "cells").rglob(f"*{ENDING}"))
             values[f"{short} cells, 1"] = cells
-            values[f"{short} {engine} rate, 1/s"] = cells / seconds
-            values[f"{short} {engine} cell, ms"] = 1e3 * seconds / cells
-        for engine in ("joblib", "dask"):
-            rates = [values[f"{short} {name} rate, 1/s"] for name in (engine, "one")]
-            values[f"{short} {engine} gain, 1"] = rates[0] / rates[1]
+            values |= {f"{name} start, s": start, f"{name} rate, 1/s": cells / seconds}
+            gain = values[f"{name} rate, 1/s"] / values[f"{short} one rate, 1/s"]
+            values[f"{name} gain, 1"] = gain
     return values
 
 
@@ -113,8 +140,8 @@ def overheads(share: float, folder: Path) -> Values:
             least = min(least, 1e3 * (time.perf_counter() - began) / number)
         return least
 
-    values = {"joblib overhead, ms": spent(partial(evaluated_by_workers, jobs=2), nothing)}
-    with reached(LOCAL, 2) as elsewhere:
+    values = {"joblib overhead, ms": spent(partial(evaluated_by_workers, jobs=JOBS), nothing)}
+    with reached(LOCAL, JOBS) as elsewhere:
         values["dask overhead, ms"] = spent(elsewhere, nothing_sent)
     return values
 
@@ -122,7 +149,6 @@ def overheads(share: float, folder: Path) -> Values:
 def measured(folder: Path, anew: bool = False, share: float = 1.0) -> xr.Dataset:
     """What the results folder holds; measured where it lacks it, or once more."""
     with tempfile.TemporaryDirectory() as scratch:
-        (Path(scratch) / "small").mkdir()
         parts = [partial(part, share, Path(scratch)) for part in (overheads, whole_runs)]
         return measured_values(folder / FILE, TITLE, parts, anew)
 
@@ -139,4 +165,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
-    from vehiclemor.api import write_report as write_report
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.online.batch_signals import Signals as Signals
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
     from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.comparison.kinds import compare as compare
+    from vehiclemor.report.html.document import write_report as write_report
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
@@ -43,9 +43,7 @@ _DEFINED_IN = {
         ("describe", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
-    **dict.fromkeys(
-        ("run_study", "simulate", "status", "studies", "write_report"), "vehiclemor.api"
-    ),
+    **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
     "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
@@ -54,6 +52,7 @@ _DEFINED_IN = {
     "compare": "vehiclemor.report.comparison.kinds",
     "figures": "vehiclemor.report.regenerate",
     "leaderboard": "vehiclemor.report.leaderboard",
+    "write_report": "vehiclemor.report.html.document",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import count, file_path, number, quoted, real_array
+from vehiclemor.arguments import file_path, number, quoted, real_array
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.registry import component, names
 
@@ -332,42 +332,3 @@ def plot(
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
     return ResultAccessor(result).plot(kind, path, **at)
-
-
-def write_report(
-    studies: str | Sequence[str] = (),
-    out: str | Path = "report.html",
-    results: str | Path = RESULTS,
-    jobs: int = 1,
-) -> Path:
-    """Write results as one HTML file that needs no network and no other file.
-
-    Parameters
-    ----------
-    studies
-        Names of studies or collections, TOML files, run first where results are missing, or models,
-        of which their studies by default are meant; all that is stored by default.
-    out
-        The file.
-    results
-        Results folder.
-    jobs
-        Number of processes for missing studies.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    VehiclemorError
-        If a name is wrong, nothing is stored, or the file can't be written.
-    """
-    from vehiclemor.report.html import document
-
-    page, folder = file_path("out", out), file_path("results", results)
-    chosen = [studies] if isinstance(studies, str) else studies
-    if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
-        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
-    return document.write_report(chosen, page, folder, count("jobs", jobs))

@@ -48,7 +48,7 @@ def component(kind: str, name: str) -> Any:
     # A module may even end the interpreter.
     except (Exception, SystemExit) as error:
         raise InputError(f"{where} can't be imported: {one_line(error)}") from error
-    wanted = EntryPoint(kind, CLASSES[kind], "").load()
+    wanted = _class(kind)
     if not isinstance(loaded, wanted):
         found = type(loaded).__name__
         raise InputError(f"{where} is of type {found}: it must be a {wanted.__name__}")
@@ -63,6 +63,11 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     known = sorted(known)
     hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
     return InputError(f"unknown {kind} {quoted(name)}; {hint}")
+
+
+@cache
+def _class(kind: str) -> type:
+    return EntryPoint(kind, CLASSES[kind], "").load()
 
 
 @cache

@@ -20,7 +20,7 @@ from vehiclemor.report.html.page import page
 from vehiclemor.report.html.study_section import study_section
 from vehiclemor.report.html.verdict_section import verdict_section
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
-from vehiclemor.study import timing
+from vehiclemor.study import netcdf_file, timing
 from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
@@ -278,6 +278,16 @@ def test_a_large_grid_is_summed_up_with_links(made, undrawn, monkeypatch):
 WORDS = ("least", "median", "largest")
 
 
+def test_a_study_that_is_read_in_parts_gives_the_same(made, undrawn, monkeypatch):
+    folder = made[0]
+    sections = []
+    for large in (netcdf_file.LARGE, 0):
+        monkeypatch.setattr(netcdf_file, "LARGE", large)
+        sections.append(study_section(dataset_of(folder, "hostile"), folder))
+    one, other = sections
+    assert one._replace(plots=[]) == other._replace(plots=[])
+
+
 def test_results_of_before_cells_were_named_are_shown(made, undrawn):
     folder = made[0]
     found = Page(
@@ -293,11 +303,22 @@ def test_verdicts_lead_to_cells_and_studies(results, results_folder):
         pytest.skip("no test before this one has timed the models")
     section = verdict_section(stored.studies, stored.timings)
     rows = [row for table in section.tables for row in table.rows if table.columns[0] == "item"]
-    anchors = {row[5].anchor for row in rows}
+    anchors = [row[6].anchor for row in rows]
     keys = {f"cell-{key}" for d in results.values() for key in d["cell_key"].values.ravel()}
     ids = {f"study-{name}" for name in results} | {table.id for table in section.tables}
-    assert anchors <= keys | ids | {""}
-    assert sum(anchor.startswith("cell-") for anchor in anchors) > 10
+    assert set(anchors) <= keys | ids | {""}
+    # Two errors of each model, by two variants; of the vehicles from two starts.
+    assert sum(anchor in keys for anchor in anchors) == 20
+    shown = {
+        row[6].anchor: row[6].value
+        for row in rows
+        if row[0].text.startswith("RMS error of the pitch")
+    }
+    vehicle = results["figures-2-4"].stack(place=results["figures-2-4"]["status"].dims)
+    for anchor, value in shown.items():
+        cell = vehicle.isel(place=np.flatnonzero(vehicle["cell_key"].values == anchor[5:])[0])
+        error = cell["rms_error"].sel(output="pitch").item()
+        assert value == error or (value is None and error != error)
 
 
 def test_a_damaged_file_is_named_and_left_out(made, tmp_path):
@@ -327,6 +348,13 @@ def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys
     assert told.count("\n") == 1
     assert words in told
     assert list(tmp_path.glob("*.html")) == []
+
+
+@pytest.mark.parametrize("studies", [3, [3], ["no-such-study"]])
+def test_wrong_names_in_python_are_one_line(studies, tmp_path):
+    with pytest.raises(vm.VehiclemorError, match="stud") as caught:
+        vm.write_report(studies, tmp_path / "d.html", tmp_path)
+    assert "\n" not in str(caught.value)
 
 
 # Both frames tell how far their pages are wider than they; a frame can be as narrow as a telephone.

@@ -1,5 +1,7 @@
 """Studies over cars: axes and samples of parameters, and what is trained on."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -48,7 +50,7 @@ grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" 
         car = vm.model("independent_suspension_vehicle", own)
         alone = vm.simulate(car, "pod", rank=4, start="dropped")
         here = found.sel({"parameters.sprung_mass": mass, "method": "pod"}).squeeze()
-        for name in ("rms_error", "signal_range"):
+        for name in ("rms_error", "floor_rms_error", "signal_range"):
             np.testing.assert_array_equal(here[name], alone[name])
 
 
@@ -137,16 +139,20 @@ def test_training_policies_and_maneuvers_are_axes():
             "training": ["matched", "nominal"],
             "maneuver": ["sine_travel", "chirp_travel"],
             "amplitude_factor": [0.9],
+            "cars": ["own", "nominal"],
+            "parameters.tie_rod_inner.z": [-0.09],
         },
         "methods": [{"method": "pod"}],
     }
     grid = expand("mine", StudyFile.model_validate(given))
     seen = {
-        (cell.test[0].maneuver.name, cell.training[0].maneuver.amplitude_factor)
+        (run.maneuver.name, run.maneuver.amplitude_factor, run.parameters)
         for cell in grid.unique.values()
+        for run in cell.training
     }
-    names = {"sine_travel", "chirp_travel"}
-    assert seen == {(name, factor) for name in names for factor in (0.9, 1.0)}
+    cars = ((), (("tie_rod_inner.z", -0.09),))
+    names = ("sine_travel", "chirp_travel")
+    assert seen == set(itertools.product(names, (0.9, 1.0), cars))
 
 
 @pytest.mark.parametrize(
@@ -163,6 +169,8 @@ def test_training_policies_and_maneuvers_are_axes():
         ('grid = { cars = ["owned"] }', "did you mean own"),
         ('grid = { training = ["mached"] }', "did you mean matched"),
         ('grid = { maneuver = ["sine_travl"] }', "did you mean sine_travel"),
+        ('grid = { start = ["equilibrum"] }', "unknown start 'equilibrum'"),
+        ('grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]', "start is set twice"),
         ('grid = { "parameters.toe.z" = [1.0] }\nparameters = { "toe.z" = 1.0 }', "set twice"),
     ],
 )
@@ -222,3 +230,15 @@ def test_wrong_samplings_are_told(change, words):
     }
     with pytest.raises(ValueError, match=words):
         Sampling.model_validate(given | change)
+
+
+def test_histories_of_other_output_times_are_refused():
+    given = {
+        "title": "t",
+        "model": "independent_suspension_vehicle",
+        "grid": {"maneuver": ["lane_change", "step_steer"]},
+        "methods": [{"method": "full_order"}],
+    }
+    with pytest.raises(FileError, match='need keep = "metrics"'):
+        expand("mine", StudyFile.model_validate(given))
+    assert expand("mine", StudyFile.model_validate(given | {"keep": "metrics"})).unique

@@ -215,7 +215,7 @@ def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(tmp_path, cap
             raise KeyboardInterrupt
 
     def kill(_, done, __):
-        if done >= 9 and not killed:
+        if done and not killed:
             killed.append(active_children()[0].pid)
             os.kill(*killed, signal.SIGKILL)
 
@@ -224,8 +224,10 @@ def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(tmp_path, cap
     assert len(processes) == 2
     assert not any(process.is_alive() for process in processes)
     assert not list((tmp_path / "cells").glob(".partial-*"))
+    # Batches may have finished nearly all of it by then.
+    again = tmp_path / "again"
     with listening(kill):
-        cells = run_studies(str(path), tmp_path, jobs=2)["eight"]
+        cells = run_studies(str(path), again, jobs=2)["eight"]
     assert caplog.messages == [f"eight: {workers.KILLED}; what it has spoiled is tried again"]
     assert set(cells["status"].values.ravel()) == {"ok"}
-    assert len(list((tmp_path / "cells").glob("??/*"))) == 17
+    assert len(list((again / "cells").glob("??/*"))) == 17

@@ -1,5 +1,6 @@
 """What experiments of a study have in common is fitted once."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -7,12 +8,13 @@ import pytest
 
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.registry import component
+from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import fresh_fit, kept_fit
 from vehiclemor.study.experiment import make_experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.method_settings import complete_settings
-from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.scenario import Scenario, input_hash
 
 FAILING = 3
 SCENARIOS = (Scenario(component("maneuver", "lane_change"), "equilibrium"),)
@@ -68,3 +70,23 @@ def test_a_guarded_model_fails_as_its_fast_one_does(vehicle, fits):
     found = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
     assert found == Failure("diverged", "no fit")
     assert fits
+
+
+def sent(maneuver):
+    """What another process gets of a scenario's maneuver."""
+    return pickle.loads(pickle.dumps(Scenario(maneuver, "equilibrium"))).maneuver  # noqa: S301 - own
+
+
+def test_a_registered_maneuver_that_was_sent_is_the_same_again():
+    # Its functions are made by another, which no process could find by name.
+    maneuver = component("maneuver", "lane_change").perturbed(1.1, 0.9)
+    assert sent(maneuver) == maneuver
+    # Of two batches it is one, by which a worker finds what it has fitted.
+    assert sent(maneuver) is sent(maneuver)
+
+
+def test_a_maneuver_of_ones_own_is_sent_whole(nominal):
+    own = replace(nominal, duration=2.0 * nominal.duration)
+    assert sent(own) == own != nominal
+    log = Signal.from_samples([0.0, 1.0, 2.0], [0.0, 0.1, 0.0], inputs="delta").perturbed(1.0, 2.0)
+    assert input_hash(sent(log)) == input_hash(log)

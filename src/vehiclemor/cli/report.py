@@ -27,7 +27,9 @@ def report(
         Number of processes for missing studies.
     """
     page = page_file("--out", out)
+    from vehiclemor.report.html.document import write_report
+
     with shown_progress():
-        written = api.write_report(studies, page, results, jobs)
+        written = write_report(studies, page, results, jobs)
     print(f"written: {written}")
     return 0

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from vehiclemor.arguments import real_array
-from vehiclemor.codegen.loops import Ready, address_of_array, loops, ready
+from vehiclemor.codegen.loops import Ready, address_of_array, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_stages import addresses, batch_loop, stage
@@ -17,7 +17,7 @@ from vehiclemor.piecewise import through
 from vehiclemor.sample_loops import Pieces
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
-from vehiclemor.simulation.input_polynomials import SIGNAL_LOOPS, recorded_inputs, signal_of
+from vehiclemor.simulation.input_polynomials import recorded_inputs, sampled, signal_of
 from vehiclemor.simulation.maneuver_checks import cut_short
 
 
@@ -155,7 +155,7 @@ class Signals(Sequence[Signal], ShortRepr):
 def _sampled(first: Ready, words: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Inputs (runs, samples, inputs) at some times, of signals in words; one of them is ready."""
     result = np.empty((len(words), len(times), first.bundle.coefficients.shape[1]))
-    call = loops(SIGNAL_LOOPS, ("sampled",))["sampled"].prepared(first, times, result[0])
+    call = sampled().prepared(first, times, result[0])
     begin = call.address("signal.edges")
     places = [*range(begin, begin + words.shape[1]), call.address("inputs")]
     batch_loop("for_each_run")(stage(call, places, [words, addresses(result)]))

@@ -113,29 +113,31 @@ def simulate_many(
     def labelled(found: Found, first: int) -> xr.Dataset:
         return dataset(reduced.model, chosen, kept, found, first).assign_attrs(about)
 
-    if path is None and outputs is not None:
-        return labelled(_whole(work, runs, threads, len(kept)), 0)
     if path is None:
-        from vehiclemor.online.later_values import later
-
-        # Nothing is chosen: what is told of the runs now, values where they are read.
-        unread = work.some(chosen.part(kept[:1], NO_COLUMNS))
-        found = _whole(unread, runs, threads, 1)
-
-        def make(numbers: np.ndarray, samples: np.ndarray, names: np.ndarray) -> np.ndarray:
-            some = work.some(chosen.part(kept[samples], names), numbers)
-            return _whole(some, len(numbers), threads, len(samples)).values
-
-        values = later((runs, len(kept), len(chosen.names)), make)
-        return labelled(found._replace(values=values), 0)
+        whole = _unread(work, kept, threads) if outputs is None else _whole(work, kept, threads)
+        return labelled(whole, 0)
     target = checked_target(file_path("path", path))
     written(target, (labelled(found, first) for first, found in _chunks(work, runs, threads)))
     return opened(target)
 
 
-def _whole(work: _Work, runs: int, threads: int, samples: int) -> Found:
-    """Results of all runs in memory; `InputError` if they don't fit."""
-    shape = samples, len(work.chosen.names)
+def _unread(work: _Work, kept: np.ndarray, threads: int) -> Found:
+    """What is told of all runs, and values that are made where they are read."""
+    from vehiclemor.online.later_values import later
+
+    chosen, runs = work.chosen, len(work.signals)
+
+    def make(numbers: np.ndarray, samples: np.ndarray, names: np.ndarray) -> np.ndarray:
+        some = work.some(chosen.part(kept[samples], names), numbers)
+        return _whole(some, kept[samples], threads).values
+
+    told = _whole(work.some(chosen.part(kept[:1], NO_COLUMNS)), kept[:1], threads)
+    return told._replace(values=later((runs, len(kept), len(chosen.names)), make))
+
+
+def _whole(work: _Work, kept: np.ndarray, threads: int) -> Found:
+    """Results of all runs at the kept times; `InputError` if they don't fit into memory."""
+    runs, shape = len(work.signals), (len(kept), len(work.chosen.names))
     size = 8 * runs * math.prod(shape)
     if size > LARGEST:
         raise InputError(
@@ -199,8 +201,8 @@ class _Work:
         """The same with another choice, of some of the runs."""
         if runs is None:
             return _Work(self.reduced, chosen, self.signals, self.starts, self.sets)
-        given = self.signals, self.starts, self.sets
-        signals, starts, sets = (None if own is None else _taken(own, runs) for own in given)
+        signals, starts = _taken(self.signals, runs), _taken(self.starts, runs)
+        sets = None if self.sets is None else _taken(self.sets, runs)
         return _Work(self.reduced, chosen, signals, starts, sets)
 
     def __call__(self, part: slice) -> Found:

@@ -17,14 +17,15 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.simulation.constants import differences
-from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.sensitivities import (
+    TOLERANCE,
     Component,
     Sensitivities,
     components,
-    observed,
+    directions_of,
+    outputs_along,
     recorded,
     sizes_of,
 )
@@ -67,18 +68,19 @@ def reduced_sensitivities(
     constants, starts = _of_cars(reduced, along, begun, first)
     tangents = Tangents(starts, constants, sizes_of(along))
     state = own.encode(model.start(begun), first)
-    chosen = REFERENCE_TOLERANCE if tolerance is None else tolerance
+    chosen = TOLERANCE if tolerance is None else tolerance
     run = tangent_run(own.system, own.spaces, maneuver, state, tangents, chosen)
-    states, moved = apart(run.path, along)
+    states, moved = apart(run.path, len(along))
     if own.slopes is not None:
         paths = run.path, recorded_inputs(maneuver)[1]
         size, kernels = len(model.definition.states), own.system.kernels
         given = own.system.constants, constants
         moved = tangents_along(kernels, "full_state", given, paths, size)
         states = own.full_states(np.ascontiguousarray(states), paths[1])
-    found = recorded(model, maneuver, run, states)
+    found = recorded(own.model, maneuver, run, states)
     trusted = found.judged(reduced.simulate(maneuver, begun).trust)
-    return observed(model, along, trusted, moved)
+    outputs = outputs_along(model, trusted, moved, directions_of(model, along))
+    return Sensitivities(trusted, along, moved, outputs)
 
 
 def _lifts(own: ReducedSystem) -> bool:

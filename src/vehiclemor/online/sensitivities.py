@@ -43,7 +43,8 @@ def sensitivities(
         Initial condition by name, which moves with the parameters; or a state (n,), which does
         not; the model's first by default.
     tolerance
-        Of the integration, as of `Model.simulate`: of derivatives times the parameter's size.
+        Of the integration, 1e-10 by default: of states, and of derivatives times the size of the
+        parameter; of a mechanism the largest last step of an iteration.
 
     Returns
     -------

@@ -11,8 +11,8 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.files import make_folder
 from vehiclemor.resources import data_folder, data_names
+from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.provenance import code_digest
-from vehiclemor.study.store import read_dataset, write_dataset
 from vehiclemor.toml_files import FileSchema, read_toml
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, loops, ready
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.sample_loops import Pieces
@@ -34,10 +34,16 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     if "recorded" not in maneuver.kept:
         ready, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
         inputs = np.empty((len(times), ready.bundle.coefficients.shape[1]))
-        loops(SIGNAL_LOOPS, ("sampled",))["sampled"](ready, times, inputs)
+        sampled()(ready, times, inputs)
         inputs.flags.writeable = False
         maneuver.kept["recorded"] = times, inputs
     return maneuver.kept["recorded"]
+
+
+@cache
+def sampled() -> Loop:
+    """The loop that gives inputs at some times."""
+    return loops(SIGNAL_LOOPS, ("sampled",))["sampled"]
 
 
 def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:

@@ -18,7 +18,7 @@ from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.constants import SMALLEST, constants_along, starts_along
 from vehiclemor.simulation.constants import components as numbers_of
-from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
+from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
@@ -33,6 +33,9 @@ from vehiclemor.simulation.tangent_runs import (
     tangents_along,
 )
 from vehiclemor.simulation.trajectory import Start, Trajectory
+
+# Of runs with tangents, if none is asked for: derivatives are then good to a millionth.
+TOLERANCE = 1e-10
 
 
 class Component(NamedTuple):
@@ -116,7 +119,7 @@ def sensitivities(
     start
         Initial condition by name, which moves with the parameters, or a state, which does not.
     tolerance
-        As of `Model.simulate`; of derivatives times the size of the parameter.
+        Of a dynamic model `TOLERANCE` by default; of derivatives times the parameter's size.
 
     Raises
     ------
@@ -133,23 +136,22 @@ def sensitivities(
     else:
         assert isinstance(model, DynamicModel)
         begun = starts_of(model, along, start), directions, sizes_of(along)
-        chosen = REFERENCE_TOLERANCE if tolerance is None else tolerance
+        chosen = TOLERANCE if tolerance is None else tolerance
         maneuver = checked_maneuver(maneuver, model.definition)
         space, tangents = whole_space(len(model.definition.states)), Tangents(*begun)
         found = tangent_run(model.system, space, maneuver, model.start(start), tangents, chosen)
-        states, moved = apart(found.path, along)
+        states, moved = apart(found.path, len(along))
         run = recorded(model, maneuver, found, states)
-    return observed(model, along, run, moved)
-
-
-def observed(
-    model: Model, along: tuple[Component, ...], run: Trajectory, moved: np.ndarray
-) -> Sensitivities:
-    """A run of the model with derivatives (samples, components, states) of its states."""
-    paths = side_by_side(run.states, moved), run.inputs
-    constants = model.constants, directions_of(model, along)
-    outputs = tangents_along(model.kernels, "outputs", constants, paths, len(model.outputs))
+    outputs = outputs_along(model, run, moved, directions)
     return Sensitivities(run, along, moved, outputs)
+
+
+def outputs_along(
+    model: Model, run: Trajectory, moved: np.ndarray, directions: np.ndarray
+) -> np.ndarray:
+    """Derivatives (samples, components, outputs) by those of states and constants along a run."""
+    paths, constants = (side_by_side(run.states, moved), run.inputs), (model.constants, directions)
+    return tangents_along(model.kernels, "outputs", constants, paths, len(model.outputs))
 
 
 def directions_of(model: Model, along: Sequence[Component]) -> np.ndarray:

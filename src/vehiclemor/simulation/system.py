@@ -59,8 +59,8 @@ CALLED = {
     "vehicle_frame": ("derivative",),
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
-    "sensitivities": ("derivative",),
     "state_sensitivities": ("derivative",),
+    catalogue.SENSITIVITIES: ("derivative",),
 }
 
 
@@ -92,7 +92,7 @@ class System(ShortRepr):
         Number of the state that each becomes in the mirror image; empty where there is none.
     directions
         Derivatives (parameters, constants) of the constants along which the states have tangents,
-        see `formulations/sensitivities.py`; scales and reference are as long as both together.
+        see `formulations/sensitivities.py`; scales are as long as both together.
     """
 
     kernels: Kernels
@@ -221,6 +221,9 @@ class System(ShortRepr):
                 stored = catalogue.Stored(
                     self.frame.packed([chosen.stepped.tables(block) for block in blocks])
                 )
+            elif len(self.directions) and chosen.operators is not None:
+                blocks = 1 + len(self.directions)
+                stored = catalogue.repeated_functions(self.turning_jacobian, blocks)
             elif chosen.operators is not None:
                 own = chosen.formulation == "vehicle_frame"
                 jacobian = self.turning_jacobian if own else self.frozen_jacobian
@@ -352,7 +355,8 @@ class System(ShortRepr):
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
-        catalogue.check_formulation(name, full)
+        if windows.formulation != catalogue.SENSITIVITIES:
+            catalogue.check_formulation(name, full)
         steps = self.steps(name) if full else ""
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)

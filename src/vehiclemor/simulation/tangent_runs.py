@@ -7,7 +7,6 @@ of the system's own kernel, and the step size control covers both.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,8 +22,11 @@ from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.system import System
 
-# Formulation of a system -> the same with tangents.
-WITH_TANGENTS = {"full": "sensitivities", "state": "state_sensitivities"}
+# Formulation of a system -> the same with tangents, and what integrates it.
+WITH_TANGENTS = {
+    "full": ("sensitivities", "exponential_adams"),
+    "state": ("state_sensitivities", "dopri5"),
+}
 
 
 class Tangents(NamedTuple):
@@ -61,19 +63,17 @@ def tangent_run(
     InputError
         As of `with_tangents`, or if the tolerance is out of bounds.
     """
-    formulation = with_tangents(windows)
+    formulation, solver = with_tangents(windows)
     parts = 1 + len(tangents.sizes)
     scale = np.concatenate([[1.0], 1.0 / tangents.sizes])[:, None] * system.error_scale
     start = np.concatenate([state, tangents.start.ravel()])
-    wide = replace(
-        system, reference=start, error_scale=scale.ravel(), directions=tangents.directions
-    )
+    wide = replace(system, error_scale=scale.ravel(), directions=tangents.directions)
     spaces = replace(windows, formulation=formulation, ranks=windows.ranks * parts)
-    return wide.run(maneuver, start, spaces, Solver("dopri5", tolerance))
+    return wide.run(maneuver, start, spaces, Solver(solver, tolerance))
 
 
-def with_tangents(windows: ProjectionWindows) -> str:
-    """Formulation of a system with tangents; `InputError` if there is none."""
+def with_tangents(windows: ProjectionWindows) -> tuple[str, str]:
+    """Formulation of a system with tangents and its integrator; `InputError` if there is none."""
     if windows.formulation not in WITH_TANGENTS:
         raise InputError(
             f"the projection of {windows.formulation} has no tangents: choose formulation='state'"
@@ -111,7 +111,7 @@ def side_by_side(states: np.ndarray, moved: np.ndarray) -> np.ndarray:
     return np.hstack((states, moved.reshape(len(moved), -1)))
 
 
-def apart(path: np.ndarray, directions: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def apart(path: np.ndarray, directions: int) -> tuple[np.ndarray, np.ndarray]:
     """States (samples, n) and tangents (samples, directions, n) of a path of both."""
-    parts = path.reshape(len(path), 1 + len(directions), -1)
+    parts = path.reshape(len(path), 1 + directions, -1)
     return parts[:, 0], parts[:, 1:]

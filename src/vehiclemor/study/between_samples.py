@@ -4,7 +4,7 @@ A polynomial goes through the seven samples about a place.  What is found is thu
 samples alone, and its derivatives by them are exact.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def crossing(time: np.ndarray, y: np.ndarray, sample: int) -> Found:
 
     polynomial = _about(time, y, sample)
     end = polynomial.near[1]
-    place = brentq(lambda z: polynomial.at(z).value, 0.0, end, xtol=1e-14)
+    place: Any = brentq(lambda z: polynomial.at(z).value, 0.0, end, xtol=1e-14)
     return polynomial.at(float(place))
 
 

@@ -7,24 +7,20 @@ compiled kernels they ask the driver, and one another, before one of them makes 
 from __future__ import annotations
 
 import logging
-import threading
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.object_cache import asking, cache_folder, held, packed, unpacked
-from vehiclemor.codegen.once import once
-from vehiclemor.errors import FileError, InputError, MachineError, one_line
-from vehiclemor.files import probe_folder, temporary_path, write_text
-from vehiclemor.study.cell_file import encoded
-from vehiclemor.study.evaluate import model_of
+from vehiclemor.codegen.object_cache import cache_folder, held, packed
+from vehiclemor.errors import InputError, MachineError, one_line
+from vehiclemor.files import temporary_path, write_text
+from vehiclemor.study.cluster_worker import Place, Sent, on_worker
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.store import write_encoded
 from vehiclemor.study.workers import (
     KILLED,
@@ -33,8 +29,6 @@ from vehiclemor.study.workers import (
     Engine,
     Groups,
     Timed,
-    evaluate_and_store,
-    evaluated,
     in_batches,
     timed_batch,
 )
@@ -42,36 +36,16 @@ from vehiclemor.study.workers import (
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
-    import xarray as xr
     from distributed import Client
 
 LOCAL = "local"
-# Key -> content of a cell's file, and whether a bug has ended it: what the driver is to write.
-Sent = dict[str, tuple[bytes, bool]]
-# Seconds: to reach a scheduler, until the driver has answered, between two looks at who works.
-REACH, ANSWER, LOOK = 10.0, 20.0, 1.0
+# Seconds: to reach a scheduler, and between two looks at who works.
+REACH, LOOK = 10.0, 1.0
 # Ctrl-C reaches all processes of a terminal, and the driver ends the workers.
 NO_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 # Packages that must be the same everywhere; that of Python is its first two numbers.
 SAME = ("python", "distributed")
 _LOG = logging.getLogger("vehiclemor")
-
-
-class Place(NamedTuple):
-    """Where results belong, and how a worker finds out whether it sees that folder.
-
-    Attributes
-    ----------
-    token, text
-        A file of the driver's, and what it holds.
-    topic
-        Under which the driver is asked for kernels.
-    """
-
-    folder: Path
-    token: Path
-    text: str
-    topic: str
 
 
 @contextmanager
@@ -125,10 +99,11 @@ def _client(address: Any) -> Iterator[Client]:
     with warnings.catch_warnings():
         # What differs is an error below.
         warnings.simplefilter("ignore")
-        client = Client(address, timeout=REACH, set_as_default=False)
+        # Its types are those of awaited calls too.
+        client: Any = Client(address, timeout=REACH, set_as_default=False)
     with client:
         _same_versions(client)
-        number = sum(client.nthreads().values())
+        number = _places(client)
         work = f"{number} places for cells" if number else "no worker yet, cells wait for the first"
         at, dashboard = client.scheduler.address, client.dashboard_link
         _LOG.info("scheduler %s: %s; dashboard %s", at, work, dashboard)
@@ -158,7 +133,11 @@ def _knock(address: str) -> None:
         raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
 
 
-def _same_versions(client: Client) -> None:
+def _places(client: Any) -> int:
+    return sum(client.nthreads().values())
+
+
+def _same_versions(client: Any) -> None:
     """Raise `InputError` if the scheduler or a worker runs other versions than this process."""
     found = client.get_versions()
     own = _versions(found["client"])
@@ -222,7 +201,7 @@ def evaluated_by_cluster(
     def places() -> int:
         nonlocal seen, number
         if time.monotonic() - seen > LOOK:
-            seen, number = time.monotonic(), sum(client.nthreads().values())
+            seen, number = time.monotonic(), _places(client)
         return number
 
     try:
@@ -255,79 +234,3 @@ def _taken(future: Future[Timed]) -> Timed:
             f"scheduler: a worker lacks what this process has ({one_line(error)}); "
             f"install the same versions"
         ) from error
-
-
-# On a worker
-
-
-def on_worker(experiments: Sequence[Experiment], place: Place) -> tuple[Done, Sent]:
-    """Evaluate some experiments; gives their results too, if the driver is to write them."""
-    with _turn(), asking(partial(_from_others, place.topic)):
-        _same_source(experiments)
-        if _sees(place):
-            return evaluate_and_store(experiments, place.folder), {}
-        results: Sent = {}
-
-        def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
-            results[key] = encoded(dataset, key, seconds), "error" in dataset["status"].values
-
-        return evaluated(experiments, keep), results
-
-
-@once
-def _turn() -> threading.Lock:
-    """Cells of one process take turns: the limit of linear algebra is one for all its threads."""
-    from threadpoolctl import threadpool_limits
-
-    threadpool_limits(1)
-    return threading.Lock()
-
-
-@cache
-def _sees(place: Place) -> bool:
-    """Whether a worker can write into the driver's own folder, not into another of its name."""
-    try:
-        if place.token.read_text() != place.text:
-            return False
-        probe_folder(place.token.parent)
-    except (OSError, FileError, MachineError):
-        return False
-    return True
-
-
-def _same_source(experiments: Sequence[Experiment]) -> None:
-    """Raise `InputError` if results would be those of other source or another compiler."""
-    for e in {(e.model, e.method): e for e in experiments}.values():
-        what = ""
-        if code_digest(e.model, e.method) != e.code:
-            what = "another version of vehiclemor, or of the package of"
-        elif model_of(e).kernel_hash != e.kernel:
-            what = "another processor or compiler, which gives other kernels of"
-        if what:
-            from distributed import get_worker
-
-            raise InputError(
-                f"scheduler: worker {get_worker().address} has {what} {e.model} with {e.method}; "
-                f"cells are known by what computes them, so it must be the driver's own"
-            )
-
-
-def _from_others(topic: str, name: str, make: Callable[[], bytes]) -> bytes:
-    """A file of the cache: the driver's, or another worker's, or else made for all."""
-    from distributed import Lock, Variable, get_client, get_worker
-
-    client = get_client()
-    shared = Variable(f"{topic} {name}", client=client)
-    with Lock(f"{topic} {name}"):
-        for answer in (0.0, ANSWER):
-            if answer:
-                get_worker().log_event(topic, name)
-            try:
-                content = unpacked(name, shared.get(timeout=answer))
-            except TimeoutError:
-                continue
-            if content is not None:
-                return content
-        content = make()
-        shared.set(packed(name, content))
-    return content

@@ -255,7 +255,7 @@ def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
         if fit.shared:
             of_all = _kept_fit(fit._replace(car=()))
-            if hasattr(of_all, "for_car"):
+            if not isinstance(of_all, Failure) and hasattr(of_all, "for_car"):
                 return of_car(method, of_all, with_parameters(fit.model, fit.car), complete)
         return fitted(method, *_given(fit), complete, others)
 
@@ -335,10 +335,13 @@ def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory
     if (run.trust and run.trust.reason) or not experiment.training:
         return run
     method: Method = component("method", experiment.method)
+    judges_itself = run.trust or method.own_limits
+    if judges_itself and method.learns_from == "inputs":
+        return run
     known = input_range(model, trained_for(experiment.training, test))
     if outside := known.outside(method, car_of(model, test)):
         return run.judged(outside)
-    return run if run.trust or method.own_limits else run.judged(known.trust(model, test))
+    return run if judges_itself else run.judged(known.trust(model, test))
 
 
 def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:

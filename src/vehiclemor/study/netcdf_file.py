@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 INTEGRITY = "integrity"
 # Bytes of the largest part of a dataset that is made, written or checked at a time, and of the
 # smallest file that is read only where it is asked for.
-PART, LARGE = 1 << 26, 1 << 28
+PART, LARGE = 1 << 24, 1 << 28
 # One slice of each dimension.
 Region = tuple[slice, ...]
 
@@ -65,6 +65,9 @@ def write_parts(parts: Parts, path: Path, further: Mapping[str, object]) -> None
             unlimited_dims=list(parts.dimensions),
         )
         file.set_auto_maskandscale(False)
+        for name in grown:
+            # Chunks are written whole and once: kept ones would fill the memory.
+            file[name].set_var_chunk_cache(size=1)
         for region, part in parts.parts:
             at = dict(zip(parts.dimensions, region, strict=True))
             for name in grown:
@@ -208,10 +211,12 @@ def _digest(file: netCDF4.Dataset) -> str:
     for name, variable in file.variables.items():
         kind = np.dtype(object if variable.dtype is str else variable.dtype)
         digest.update(f"{name} {variable.dimensions} {kind} {variable.shape}".encode())
+        if variable.shape:
+            variable.set_var_chunk_cache(size=1)
         for number, region in enumerate(regions(variable.shape, PART // kind.itemsize)):
             values = np.asarray(variable[region] if region else variable[...])
             if kind.kind in "OUS":
                 digest.update(b"\n" * (number > 0) + "\n".join(map(str, values.ravel())).encode())
             else:
-                digest.update(values.tobytes())
+                digest.update(np.ascontiguousarray(values).data)
     return digest.hexdigest()

@@ -13,6 +13,7 @@ from vehiclemor.arguments import count, within
 from vehiclemor.errors import InputError
 from vehiclemor.progress import telling
 from vehiclemor.study.cluster import LOCAL, reached
+from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.netcdf_file import Parts
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, combined
@@ -20,7 +21,7 @@ from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import StudyFile, owner, studies_and_files
 from vehiclemor.study.progress import tell
-from vehiclemor.study.store import cell_path, combined_path, stored
+from vehiclemor.study.store import cell_path
 from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:

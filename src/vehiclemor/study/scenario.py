@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import TrainingRun, policy_factors
+from vehiclemor.registry import component
 from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
@@ -87,6 +89,34 @@ class Scenario:
     def run_key(self) -> tuple[Any, ...]:
         """Equal for scenarios that are one run of the model, whatever their names."""
         return input_hash(self.maneuver), self.start, self.speed, self.parameters
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"maneuver": _sent(self.maneuver)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state | {"maneuver": _received(state["maneuver"])})
+
+
+# As many as the references that a process keeps.
+@lru_cache(maxsize=1024)
+def _sent(maneuver: Maneuver) -> Maneuver | tuple[str, float, float]:
+    """What goes to another process: the name of a registered maneuver, and its factors.
+
+    Its functions would be new ones each time: what was fitted or solved with it were not found.
+    """
+    sent = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor
+    with suppress(InputError):
+        if _received(sent) == maneuver:
+            return sent
+    return maneuver
+
+
+@lru_cache(maxsize=1024)
+def _received(sent: Maneuver | tuple[str, float, float]) -> Maneuver:
+    if isinstance(sent, Maneuver):
+        return sent
+    name, *factors = sent
+    return component("maneuver", name).perturbed(*factors)
 
 
 # Of as many as are looked at by turns; settings vary over each of them.

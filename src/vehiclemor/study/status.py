@@ -12,11 +12,12 @@ import numpy as np
 
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
+from vehiclemor.study.combined import Owner, combined_path
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import validation_experiments
 from vehiclemor.study.plans.study_file import owner, studies_and_files
-from vehiclemor.study.store import Owner, cell_end, combined_path
+from vehiclemor.study.store import cell_end
 
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")

@@ -27,6 +27,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, timed
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.study.combined import stored
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure, attempt
@@ -34,7 +35,6 @@ from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.progress import tell
 from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.scenario import Scenario, start_of
-from vehiclemor.study.store import stored
 from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
@@ -255,7 +255,9 @@ def _warm_fits(
     cars: dict[object, tuple[ReducedModel | None, float]] = {}
     for scenario in experiment.test:
         if scenario.parameters not in cars:
-            cars[scenario.parameters] = _warm_fit(model, experiment, scenario, bool(wanted.any()))
+            # One car tells how long a fit takes.
+            needed = not cars and bool(wanted.any())
+            cars[scenario.parameters] = _warm_fit(model, experiment, scenario, needed)
     reduced = [cars[scenario.parameters][0] for scenario in experiment.test]
     return reduced, sum(seconds for _, seconds in cars.values())
 

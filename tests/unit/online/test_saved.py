@@ -263,7 +263,7 @@ FEATURES = "reduced.fields.features.fields"
         ("reduced.fields.offline", {"code": HARM}),
         ("reduced.fields.offline", {"method": "__reduce__", "of": {"model": ""}}),
         ("reduced.fields.offline", {"same": "reduced.nothing"}),
-        ("reduced.fields.offline.fields", {"seconds": 0.0}),
+        ("reduced.fields.offline.fields", {"minutes": 0.0}),
         ("reduced", {"tuple": [1.0]}),
         ("known", {"function": "vehiclemor.reduction.trust:trust_of"}),
         ("reduced.fields.coefficients", {"array": "reduced.nothing"}),

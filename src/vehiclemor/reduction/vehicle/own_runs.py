@@ -26,14 +26,22 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     targets,
 )
 from vehiclemor.registry import component
+from vehiclemor.simulation.build import reparametrised
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.trajectory import Start
 
 # Runs that correct a car's model, and further ones that check it; steps of the correction.
-CORRECTING, CHECKING, STEPS = 5, 3, 2
+CORRECTING, CHECKING, STEPS = 26, 4, 2
+# Their speeds lie apart by this part of how far training runs do.
+APART = 0.8
 # Weight of the prior, of one run of the training each.
 PRIOR = 0.3
-# Error of a checking run, in the units of `trajectory_fit`, above which the car's model is not
-# trusted.
-TRUSTED = 1.0
+# How many times the first car's error on the same run, or 1 in the units of `trajectory_fit`, that
+# of another car may be.
+TRUSTED = 2.0
+
+
+SPEED = "initial_speed"
 
 
 class Input(NamedTuple):
@@ -72,8 +80,9 @@ def corrected(
     inputs: Sequence[Input],
     free: Free,
     prior: np.ndarray,
-) -> ReducedVehicle:
-    """A reduced vehicle corrected by its car's own runs, and not trusted if others say so.
+    speeds: float,
+) -> tuple[ReducedVehicle, np.ndarray]:
+    """A reduced vehicle corrected by its car's own runs, and its errors on others.
 
     Parameters
     ----------
@@ -81,23 +90,40 @@ def corrected(
         The same, as states are encoded that are no starts.
     prior
         Normal matrix of a run of the training.
+    speeds
+        How far speeds of the training lie from the car's own in m/s.
     """
     model = reduced.model
-    runs = [TrainingRun(model, entry.made, model.starts[0]) for entry in inputs]
+    starts = [_start(model, APART * speeds * k) for k in (-1, 0, 1)]
+    runs = [
+        TrainingRun(model, entry.made, starts[i % len(starts)]) for i, entry in enumerate(inputs)
+    ]
     if len(runs) <= CHECKING:
-        return reduced
+        return reduced, np.zeros(0)
     goals = targets(plain, runs, [run.recorded() for run in runs])
-    # The first ones check: they are no others than the next.
-    checking, correcting = goals[::2][:CHECKING], [*goals[1::2], *goals[::2][CHECKING:]]
+    every = len(goals) // CHECKING
+    checking = goals[::every][:CHECKING]
+    correcting = [goal for goal in goals if not any(goal is other for other in checking)]
     online = {"solver": reduced.solver, "tolerance": reduced.tolerance}
     fine = replace(reduced, solver=plain.solver, tolerance=plain.tolerance)
     for _ in range(STEPS):
         fine = _stepped(fine, correcting, free, prior)
-    worst = float(np.max(run_errors(fine, checking)))
-    doubt = ""
-    if not worst <= TRUSTED:
-        doubt = f"checked on runs of this car it is off by {worst:.2g} times what is trusted"
-    return replace(fine, doubt=doubt, **online)
+    return replace(fine, **online), run_errors(fine, checking)
+
+
+def doubt(errors: np.ndarray, first: np.ndarray) -> str:
+    """Why a car is not trusted, by its errors on the checking runs and those of the first car."""
+    worst = float(np.max(errors / np.maximum(first, 1.0), initial=0.0))
+    if worst <= TRUSTED:
+        return ""
+    return f"on runs of this car that check it, it errs {worst:.2g} times as much as on the first"
+
+
+def _start(model: DynamicModel, faster: float) -> Start:
+    """The first start, so much faster, of a model that has an initial speed."""
+    if SPEED not in model.parameters.entries or not faster:
+        return model.starts[0]
+    return reparametrised(model, {SPEED: float(model.parameters[SPEED]) + faster}).start()
 
 
 def _stepped(

@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected
+from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected, doubt
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import (
@@ -108,7 +108,7 @@ def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, l
 
 def member(training: Training, like: SlowModes) -> Member:
     """A car by its runs, in coordinates like those of the first one."""
-    model = training[0].model
+    model = cast("DynamicModel", training[0].model)
     shape = VehicleShape(model)
     modes, runs = as_of(shape, like), [run.recorded() for run in training]
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
@@ -132,9 +132,9 @@ class Box(ShortRepr):
         Changes (monomials, terms, states + 3) of the coefficients.
     lifting
         Coefficients (monomials, terms, n) of the lifting.
-    inputs, prior
-        Inputs of runs of each car itself, and normal matrix of a run of the training; see
-        `own_runs`.
+    inputs, prior, errors
+        Inputs of runs of each car itself, normal matrix of a run of the training, and errors of the
+        first car on runs that check; see `own_runs`.
     """
 
     cars: Cars
@@ -147,6 +147,7 @@ class Box(ShortRepr):
     lifting: np.ndarray
     inputs: tuple[Input, ...]
     prior: np.ndarray
+    errors: np.ndarray
 
     def monomials(self, model: DynamicModel) -> np.ndarray:
         """Monomials (m,) of the place of a car."""
@@ -159,7 +160,7 @@ class SlowVehicle(ReducedVehicle):
 
     box: Box | None = None
 
-    def for_car(self, model: DynamicModel) -> SlowVehicle:
+    def for_car(self, model: DynamicModel) -> ReducedVehicle:
         """The reduced vehicle of another car."""
         assert self.box is not None
         began = time.process_time()
@@ -178,8 +179,12 @@ class SlowVehicle(ReducedVehicle):
             left.append(found.remainder(state[None], no_input, found.excited(state))[0])
         found = replace(found, reach=self.reach.with_starts(np.array(left)))
         plain = replace(_plain(found, modes), solver="dopri5", tolerance=FINE)
-        found = corrected(found, plain, box.inputs, box.table.free, box.prior)
-        return replace(found, offline=offline_cost(began, model))
+        known = box.table.ranges.speed
+        found, errors = corrected(found, plain, box.inputs, box.table.free, box.prior, known)
+        found = replace(found, offline=offline_cost(began, model))
+        if not len(box.errors):
+            return replace(found, box=replace(box, errors=errors))
+        return replace(found, doubt=doubt(errors, box.errors))
 
 
 def of_car(
@@ -255,9 +260,8 @@ def fitted_box(
     normals = [normal_matrix(changed(v, table.free, c), own, table.free) for v, own, c in some]
     prior = np.sum(normals, axis=0) / sum(len(own) for _, own, _ in some)
     inputs = chosen_inputs(members[0].training)
-    box = Box(
-        cars, table, members[0].modes, turning, hull, degree, coefficients, lifting, inputs, prior
-    )
+    common = table, members[0].modes, turning, hull, degree, coefficients, lifting
+    box = Box(cars, *common, inputs, prior, np.zeros(0))
     return SlowVehicle(
         **{name: getattr(first, name) for name in first.__dataclass_fields__}, box=box
     )
@@ -271,13 +275,14 @@ def _by_rates(
 ) -> np.ndarray:
     """Change (monomials, free coefficients) with which the rates of all cars fit best."""
     m, terms = rows.shape[1], len(table.features.terms)
-    squares, products = np.zeros((m, terms, m, terms)), 0.0
+    squares = np.zeros((m, terms, m, terms))
+    products = np.zeros((m, *vehicles[0].coefficients.shape))
     for vehicle, car, row in zip(vehicles, members, rows, strict=True):
         columns = car.columns(table.features, vehicle.parameters)
         rest = car.rates - columns @ vehicle.coefficients
         part = columns.T @ columns / len(columns)
         squares += np.einsum("i,j,kl->ikjl", row, row, part)
-        products = products + np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
+        products += np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
     found = []
     for chosen, column in table.free:
         kept = np.ix_(range(m), chosen)

@@ -136,7 +136,7 @@ def find(name: str, results: Path) -> list[Entry]:
     kind, _, model = name.partition("-")
     boxes = data_names("sobol")
     if kind == "sobol" and model in boxes:
-        options = {"model": model, "results": str(results)}
+        options: dict[str, object] = {"model": model, "results": str(results)}
         caption = f"{model}: first and total Sobol indices of objectives over a box of parameters"
         return [Entry(name=name, draw="sobol", caption=caption, options=options)]
     if kind not in OF_A_MODEL or model not in names("model"):

@@ -15,7 +15,10 @@ WIDTH = 0.8
 
 
 def figure_sobol(*, model: str, results: str) -> Figure:
-    """A panel for each objective: bars of each parameter, with intervals of 95 %."""
+    """A panel for each objective: bars of each parameter, with intervals of 95 %.
+
+    Legends tell the CPU time of all runs of a model.
+    """
     data = sobol_dataset(model, Path(results))
     names = data["objective"].values
     figure, axes = panels(len(names), 1, (6.7, 1.2 + 2.2 * len(names)), sharex=True)
@@ -33,7 +36,7 @@ def figure_sobol(*, model: str, results: str) -> Figure:
     axes[-1, 0].set_xticks(
         np.arange(len(parameters)), [p.replace(" ", "\n", 1) for p in parameters]
     )
-    legend_outside(figure, [axes[0, 0]], columns=3)
+    legend_outside(figure, [axes[0, 0]], columns=2)
     return figure
 
 
@@ -46,7 +49,7 @@ def _draw(axis: Axes, data: xr.Dataset) -> None:
         for name, opacity, shift in (("total_order", 0.35, 0.2), ("first_order", 1.0, -0.2)):
             values = own[name].values
             ends = np.array([values - own[f"{name}_low"], own[f"{name}_high"] - values])
-            text = str(label) if opacity == 1.0 else None
+            text = f"{label} ({float(own['seconds']):.0f} s)" if opacity == 1.0 else None
             axis.bar(at, values, width, color=color, alpha=opacity, label=text)
             # Of the first order on the left of a bar, of the total on its right.
             interval = {"yerr": np.maximum(ends, 0.0), "fmt": "none", "ecolor": "black"}

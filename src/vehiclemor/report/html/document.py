@@ -7,6 +7,7 @@ from typing import NamedTuple
 import xarray as xr
 from pydantic import ValidationError
 
+from vehiclemor.arguments import count, file_path, quoted
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import names
@@ -34,21 +35,42 @@ class Found(NamedTuple):
     left_out: dict[str, str]
 
 
-def write_report(studies: Sequence[str], out: Path, folder: Path, jobs: int = 1) -> Path:
-    """Write the report of some studies, which are run first where results are missing.
+def write_report(
+    studies: str | Sequence[str] = (),
+    out: str | Path = "report.html",
+    results: str | Path = "results",
+    jobs: int = 1,
+) -> Path:
+    """Write results as one HTML file that needs no network and no other file.
 
     Parameters
     ----------
     studies
-        Names of studies or collections, TOML files, or models, of which their studies by default
-        are meant.  None: all results that are stored, as they are.
+        Names of studies or collections, TOML files, run first where results are missing, or models,
+        of which their studies by default are meant.  None: all results that are stored, as they
+        are.
+    out
+        The file.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
     VehiclemorError
         If a name is wrong, nothing is stored, or the file can't be written.
     """
-    found = _run(studies, folder, jobs) if studies else _stored(folder)
+    path, folder = file_path("out", out), file_path("results", results)
+    studies = [studies] if isinstance(studies, str) else studies
+    if not (isinstance(studies, Sequence) and all(isinstance(name, str) for name in studies)):
+        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
+    found = _run(studies, folder, count("jobs", jobs)) if studies else _stored(folder)
     left_out = dict(found.left_out)
     sections: list[Section] = []
     if found.timings and set(load_studies(PAPER)) <= set(found.studies):
@@ -61,7 +83,7 @@ def write_report(studies: Sequence[str], out: Path, folder: Path, jobs: int = 1)
             if studies:
                 raise
             left_out[name] = "stored by other source: vehiclemor run makes it again"
-    return write_text(out, page(sections, left_out))
+    return write_text(path, page(sections, left_out))
 
 
 def _run(studies: Sequence[str], folder: Path, jobs: int) -> Found:

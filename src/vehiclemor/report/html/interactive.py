@@ -14,6 +14,8 @@ TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 HINT = "Drag to move, zoom with the tools beside it, tap a name in the legend to hide or show it."
 # Names of a legend in two columns, and the longest name of all.
 SHORT, LONGEST = 20, 44
+# Pixels that a row of it takes.
+ROW = 24
 # What a tap on a point does: the page goes to its cell, if that is listed.
 GO_TO_CELL = """
 const row = source.selected.indices[0];
@@ -40,7 +42,7 @@ def new_figure(x: str, y: str, told: Mapping[str, str], **options: Any) -> Figur
     from bokeh.models import DataRange1d, HoverTool
     from bokeh.plotting import figure
 
-    given: dict[str, Any] = {"height": 420, "sizing_mode": "stretch_width", "tools": TOOLS}
+    given: dict[str, Any] = {"height": 380, "sizing_mode": "stretch_width", "tools": TOOLS}
     given |= {f"{axis}_range": DataRange1d(only_visible=True) for axis in "xy"}
     made = figure(x_axis_label=x, y_axis_label=y, active_scroll=None, **(given | options))
     made.add_tools(HoverTool(tooltips=list(told.items())))
@@ -55,20 +57,13 @@ def with_legend(figure: Figure) -> Figure:
     """The same with its legend below, whose names hide and show."""
     for legend in figure.legend:
         names = [item.label.value for item in legend.items]
+        columns = 2 if max(map(len, names)) <= SHORT else 1
         figure.add_layout(legend, "below")
-        legend.update(
-            click_policy="hide",
-            ncols=2 if max(map(len, names)) <= SHORT else 1,
-            location="bottom_left",
-            spacing=8,
-        )
-        legend.update(
-            label_text_font_size="11px",
-            glyph_width=30,
-            padding=4,
-            background_fill_alpha=0,
-            border_line_alpha=0,
-        )
+        # The plot above keeps its height.
+        figure.height += ROW * -(-len(names) // columns)
+        legend.update(click_policy="hide", ncols=columns, location="bottom_left", spacing=8)
+        legend.update(label_text_font_size="11px", glyph_width=30, padding=4)
+        legend.update(background_fill_alpha=0, border_line_alpha=0)
     return figure
 
 

@@ -25,7 +25,7 @@ Place = dict[str, Any]
 
 def places(dataset: xr.Dataset) -> list[Place]:
     """Every place of the grid: values, errors, counts, status, and the anchor of its cell."""
-    table = flat(dataset, tuple(map(str, dataset["output"].values)))
+    table = flat(dataset, tuple(shown_outputs(dataset)))
     if "cell_key" in dataset:
         keys = dataset["cell_key"].transpose(*dataset["status"].dims).values.ravel()
         table["anchor"] = [f"cell-{key}" for key in keys]

@@ -17,7 +17,7 @@ from vehiclemor.report.html.provenance import facts, name_of
 from vehiclemor.report.published import Published, load_published
 from vehiclemor.report.verdicts import counted
 
-HEADS = ("item", "variant", "start", "published", "bound", "reproduced", "unit", "verdict", "why")
+HEADS = ("item", "verdict", "variant", "start", "published", "bound", "reproduced", "unit", "why")
 INTRO = (
     "Masoudi, Uchida, McPhee (2015), doi:10.1115/1.4029390: every printed number and claim beside "
     "what is reproduced. A number leads to its cell, a time to what was timed, the number of a "
@@ -56,13 +56,13 @@ def _entries(row: dict[str, Any], origin: tuple[str, str]) -> list[Entry]:
     why = "; ".join(filter(None, (row["measure"], row["reason"], studies)))
     return [
         Entry(row["item"]),
+        judged_entry(row["verdict"]),
         Entry(row["variant"]),
         Entry(row["start"]),
         quantity(row["published"]),
         quantity(row["bound"]),
         quantity(row["reproduced"], anchor),
         Entry(row["unit"]),
-        judged_entry(row["verdict"]),
         Entry(why),
     ]
 

@@ -1,11 +1,16 @@
-"""The full system with its tangents: y = (x, dx/dp, ...), one tangent for each direction.
+"""The full system with its tangents, velocities in the vehicle's frame: z = R(-psi) x, dz/dp.
 
-Each is integrated by its own equation, d/dt dx/dp = f_x dx/dp + f_c dc/dp with the constants c, and
-the steps are short enough for all of them.
+With J, a right angle's turn of each pair that turns with the heading, and the subscript p for the
+derivative along a parameter,
+
+    x_p = R(psi) (z_p + psi_p J z),
+    z' = R(-psi) x' - psi' J z,
+    z_p' = R(-psi) x'_p - psi_p J R(-psi) x' - psi'_p J z - psi' J z_p.
 """
 
-from vehiclemor.codegen.loop_types import call_kernel, call_tangent, matrix
+from vehiclemor.codegen.loop_types import call_kernel, call_tangent, matrix, vector
 from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.simulation.integrators.step_grid import heading_of, rotate
 from vehiclemor.simulation.integrators.structures import DERIVATIVE, TANGENT
 
 INLINED = ("rhs",)
@@ -14,13 +19,71 @@ INLINED = ("rhs",)
 def rhs(problem, t, y, dy):
     """Right-hand side at time t into dy (dim,)."""
     input_at(problem, t, problem.u)
-    kernels, constants, u = problem.equations.kernels, problem.equations.constants, problem.u
-    directions, lanes = problem.equations.directions, problem.equations.lanes
+    equations, x, u = problem.equations, problem.x, problem.u
+    kernels, constants, turning = equations.kernels, equations.constants, equations.turning
+    directions, lanes = equations.directions, equations.lanes
     count = len(directions)
     n = len(y) // (1 + count)
-    call_kernel(kernels, DERIVATIVE, y, u, constants, dy)
-    moved, rates = matrix(y, n, count, n), matrix(dy, n, count, n)
+    lift(problem, y, x)
+    call_kernel(kernels, DERIVATIVE, x, u, constants, dy)
+    moved, rates = matrix(x, n, count, n), matrix(dy, n, count, n)
     for first in range(0, count, lanes):
         # The last may have been computed before.
         row = min(first, count - lanes)
-        call_tangent(kernels, TANGENT, y, u, constants, moved, directions, rates, row)
+        call_tangent(kernels, TANGENT, x, u, constants, moved, directions, rates, row)
+    if len(turning) == 0:
+        return
+    cosine, sine = heading_of(turning, y)
+    rotate(dy, turning, cosine, -sine)
+    rate = dy[turning[0]]
+    for part in range(count):
+        own, tangent = rates[part], vector(y, n * (1 + part), n)
+        turned, turned_rate = tangent[turning[0]], own[turning[0]]
+        rotate(own, turning, cosine, -sine)
+        for k in range(1, len(turning), 2):
+            a, b = turning[k], turning[k + 1]
+            own[a] += turned * dy[b] + turned_rate * y[b] + rate * tangent[b]
+            own[b] -= turned * dy[a] + turned_rate * y[a] + rate * tangent[a]
+    for k in range(1, len(turning), 2):
+        dy[turning[k]] += rate * y[turning[k + 1]]
+        dy[turning[k + 1]] -= rate * y[turning[k]]
+
+
+def lift(problem, y, x):
+    """State and tangents x (n (1 + count),) of the transformed ones."""
+    turning, count = problem.equations.turning, len(problem.equations.directions)
+    n = len(y) // (1 + count)
+    for i in range(len(x)):
+        x[i] = y[i]
+    if len(turning) == 0:
+        return
+    cosine, sine = heading_of(turning, y)
+    rotate(x, turning, cosine, sine)
+    for part in range(count):
+        own = vector(x, n * (1 + part), n)
+        turned = own[turning[0]]
+        for k in range(1, len(turning), 2):
+            a, b = turning[k], turning[k + 1]
+            own[a] -= turned * y[b]
+            own[b] += turned * y[a]
+        rotate(own, turning, cosine, sine)
+
+
+def project(problem, t, x, y, counts):
+    """Transformed state and tangents y (dim,) of those of a system x (n (1 + count),)."""
+    turning, count = problem.equations.turning, len(problem.equations.directions)
+    n = len(y) // (1 + count)
+    for i in range(len(y)):
+        y[i] = x[i]
+    if len(turning) == 0:
+        return
+    cosine, sine = heading_of(turning, x)
+    rotate(y, turning, cosine, -sine)
+    for part in range(count):
+        own = vector(y, n * (1 + part), n)
+        rotate(own, turning, cosine, -sine)
+        turned = own[turning[0]]
+        for k in range(1, len(turning), 2):
+            a, b = turning[k], turning[k + 1]
+            own[a] += turned * y[b]
+            own[b] -= turned * y[a]

@@ -29,6 +29,8 @@ RESTART = 0.05
 # A kernel of whole steps for more states than these would be too long.
 MOST_STATES = 64
 NOTHING = np.zeros((1, 1, 1))
+# Formulation of a full system with tangents, for the exponential Adams method.
+SENSITIVITIES = "sensitivities"
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,30 @@ def modal_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
     shared = [np.pad(part, ((0, 0), (0, n - part.shape[1]))) for part in parts]
     tables = exponential_modes.modal_tables(found, STEP_GRID, PHI)
     return Stored(tables, np.ascontiguousarray(np.vstack(shared)))
+
+
+def repeated_functions(jacobian: np.ndarray, blocks: int) -> Stored:
+    """The same of so many equal diagonal blocks, see `adams_blocks`."""
+    tables, parts = modal_functions(jacobian, np.empty(0))
+    n = len(jacobian)
+    r = len(parts) - n - 3
+    pairs = (tables.shape[2] - r) // 2
+    places = exponential_modes.repeated(r, pairs, blocks)
+    first, last = blocks * n, blocks * (n + r)
+    shared = np.zeros((last + 4, first))
+    wide = np.empty((*tables.shape[:2], blocks * tables.shape[2]))
+    for block, own in enumerate(places):
+        states = slice(block * n, (block + 1) * n)
+        shared[states, own] = parts[:n, :r]
+        shared[first + own, states] = parts[n : n + r]
+        shared[last, own] = parts[n + r, :r]
+        wide[:, :, own] = tables[:, :, :r]
+    # What pairs do to one another, forth and back.
+    shared[last + 1 : last + 3, : blocks * pairs] = np.tile(parts[n + r + 1 :, :pairs], blocks)
+    forth, back = tables[:, :, r : r + pairs], tables[:, :, r + pairs :]
+    wide[:, :, blocks * r :] = np.dstack([np.tile(forth, blocks), np.tile(back, blocks)])
+    shared[last + 3, :3] = blocks, r - 2 * pairs, pairs
+    return Stored(wide, shared)
 
 
 def block_matrix_functions(jacobian: np.ndarray, blocks: Sequence[Sequence[int]]) -> Stored:
@@ -313,6 +339,8 @@ def time_loop(chosen: Integrator, formulation: str, steps: str = "") -> Loop:
     own = chosen.fused_modules if steps == "fused" else chosen.modules
     if steps == "stepped" and chosen.stepped:
         own = chosen.stepped.modules
+    if formulation == SENSITIVITIES:
+        own = (*own, "adams_blocks")
     modules = (
         *_problem_modules(formulation),
         *(f"simulation.integrators.{name}" for name in own),
@@ -345,6 +373,7 @@ LOOP_SOURCES = (
             (*own.modules, *own.fused_modules, *(own.stepped.modules if own.stepped else ()))
         )
     ),
+    "simulation.integrators.adams_blocks",
     "simulation.integrators.structures",
     "simulation.integrators.loop",
     "simulation.path_loops",

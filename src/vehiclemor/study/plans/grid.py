@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import FileError, GeometryError, InputError
-from vehiclemor.registry import unknown
+from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.evaluate import refusal
@@ -116,6 +116,10 @@ class Grid:
         ]
         for place in itertools.product(*runs):
             check_run(self.model, self._run(place))
+        if self.definition.keep == "trajectories":
+            known = [component("maneuver", name) for name in self.dimensions.get("maneuver", ())]
+            if any(not np.array_equal(known[0].times, other.times) for other in known[1:]):
+                raise InputError('maneuvers of other output times need keep = "metrics"')
         for method in range(self.sizes[-1]):
             self._some_fits(method)
 
@@ -228,7 +232,7 @@ def _dimensions(
     dimensions |= {key: values(entry) for key, entry in study.grid.items()}
     if study.sampling:
         dimensions["sample"] = list(range(study.sampling.count))
-    dimensions["start"] = list(study.start or [model.starts[0]])
+    dimensions.setdefault("start", list(study.start or [model.starts[0]]))
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
     dimensions["method"] = list(study.labelled)

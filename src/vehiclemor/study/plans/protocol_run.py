@@ -18,6 +18,7 @@ from vehiclemor.errors import FileError
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
+from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
 from vehiclemor.study.plans.ledger import Ledger
@@ -29,7 +30,7 @@ from vehiclemor.study.plans.sensitive import reasons, second_run
 from vehiclemor.study.plans.study_file import owner
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import combined_path, result_path, stored
+from vehiclemor.study.store import result_path
 from vehiclemor.study.workers import Engine, Workers
 
 if TYPE_CHECKING:

@@ -12,13 +12,13 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from vehiclemor.errors import FileError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder, data_names
+from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.store import Owner
 from vehiclemor.toml_files import FileSchema, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
-TEXTS = ("maneuver", "training", "cars")
+TEXTS = ("maneuver", "start", "training", "cars")
 PARAMETER = "parameters."
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
@@ -125,7 +125,7 @@ class StudyFile(FileSchema):
     grid: dict[str, Axis] = Field(
         default_factory=dict,
         description="dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
-        "maneuver, training, cars, or any setting",
+        "maneuver, start, training, cars, or any setting",
     )
     sampling: Sampling | None = Field(
         None, description="points of a dimension `sample` beside those of the grid"
@@ -186,7 +186,7 @@ class StudyFile(FileSchema):
 
     def _set_once(self) -> None:
         own = {f"{PARAMETER}{name}" for name in self.parameters}
-        own |= {"maneuver"} if self.maneuver else set()
+        own |= {name for name in ("maneuver", "start") if getattr(self, name)}
         for where, names in (("sampling", self.sampling and self.sampling.ranges), ("study", own)):
             for name in self.grid.keys() & set(names or ()):
                 raise ValueError(f"{name} is set twice: in the grid and in the {where}")
