@@ -135,6 +135,7 @@ def test_the_example_study_runs(here, capsys):
 
 
 PAGES_WITH_CODE = (
+    "design",
     "export",
     "keep-a-model",
     "my-loop",
