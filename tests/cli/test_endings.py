@@ -5,11 +5,13 @@ import io
 import os
 import signal
 import sys
+import time
+from contextlib import suppress
 from dataclasses import replace
 
 import pytest
 
-from vehiclemor.cli import main
+from vehiclemor.cli import ending, main
 from vehiclemor.cli.ending import ended
 from vehiclemor.errors import MachineError
 from vehiclemor.reduction.methods import replay
@@ -54,6 +56,28 @@ def test_a_signal_that_a_library_drops_is_raised_again(capsys):
 
     assert ended(run) == 143
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no such timer")
+def test_a_signal_that_was_heard_does_not_cut_short_what_ends_workers(monkeypatch):
+    monkeypatch.setattr(ending, "AGAIN", 0.01)
+    closed = []
+
+    def run():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            with suppress(ZeroDivisionError):
+                raising(ZeroDivisionError())
+            time.sleep(0.1)
+            closed.append(True)
+
+    assert ended(run) == 143
+    assert closed
+
+
+def raising(error):
+    raise error
 
 
 @pytest.mark.parametrize(

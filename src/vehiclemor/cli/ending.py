@@ -54,9 +54,9 @@ def _stopped_by_signals() -> Iterator[None]:
 
     def stop(number: int, _: object) -> None:
         if hasattr(signal, "setitimer"):
-            # Libraries in C may drop an exception: it is raised again until the command has ended.
-            signal.signal(signal.SIGALRM, lambda *_: stop(number, None))
-            signal.setitimer(signal.ITIMER_REAL, AGAIN)
+            # Libraries in C may drop an exception: it is raised again until somebody has heard it.
+            signal.signal(signal.SIGALRM, lambda *_: _heard() or stop(number, None))
+            signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
         raise _StopError(number)
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -67,3 +67,11 @@ def _stopped_by_signals() -> Iterator[None]:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _heard() -> bool:
+    """Whether the command is ending: what closes workers may take longer, and must not be cut."""
+    error = sys.exception()
+    while error and not isinstance(error, _StopError):
+        error = error.__context__
+    return error is not None
