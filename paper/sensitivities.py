@@ -1,4 +1,6 @@
-"""What sensitivities cost and how exact they are: `python paper/sensitivities.py`.
+"""What sensitivities cost and how exact they are.
+
+Usage: python paper/sensitivities.py
 
 Loop times are CPU seconds of the thread, the least of interleaved rounds.  Errors are the largest
 difference from central differences of order 6 of whole runs at a tolerance of 1e-12, relative to

@@ -16,6 +16,8 @@ from vehiclemor.simulation.trajectory import Start
 if TYPE_CHECKING:
     import xarray as xr
 
+    from vehiclemor.simulation.sensitivities import Component
+
 
 def sensitivities(
     model: str | Model | ReducedOrderModel,
@@ -59,8 +61,6 @@ def sensitivities(
     ConvergenceError
         If the run fails.
     """
-    import xarray as xr
-
     from vehiclemor.online.reduced_sensitivities import reduced_sensitivities
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.sensitivities import sensitivities as sensitivities_of
@@ -90,14 +90,19 @@ def sensitivities(
             about["units"] = f"{name}_unit / parameter_unit"
             further[f"d_{name}"] = ("time", "parameter", name), values, about
     dataset = trajectory_dataset(full, found.trajectory, further)
+    return dataset.assign_coords(_labels(found.components))
+
+
+def _labels(components: Sequence[Component]) -> dict[str, xr.DataArray]:
+    """Coordinates of the dimension `parameter`."""
+    import xarray as xr
+
     labels = {
-        "parameter": ([own.label for own in found.components], "name of the parameter"),
-        "parameter_unit": ([own.unit for own in found.components], "SI unit of the parameter"),
-        "parameter_value": ([own.value for own in found.components], "its value, in the unit"),
+        "parameter": ([own.label for own in components], "name of the parameter"),
+        "parameter_unit": ([own.unit for own in components], "SI unit of the parameter"),
+        "parameter_value": ([own.value for own in components], "its value, in the unit"),
     }
-    return dataset.assign_coords(
-        {
-            key: xr.DataArray(values, dims="parameter", attrs={"long_name": text})
-            for key, (values, text) in labels.items()
-        }
-    )
+    return {
+        key: xr.DataArray(values, dims="parameter", attrs={"long_name": text})
+        for key, (values, text) in labels.items()
+    }
