@@ -123,7 +123,7 @@ def measured(time: np.ndarray, histories: np.ndarray) -> list[tuple[float, np.nd
     """
     peak = PEAK.measured(time, [histories[:, 0]])
     after = np.where(time >= STEERED, histories[:, 1], 0.0)
-    size, number = np.linalg.norm(after), np.count_nonzero(time >= STEERED)
+    size, number = float(np.linalg.norm(after)), np.count_nonzero(time >= STEERED)
     return [(peak.value, peak.weights[0]), (size / number**0.5, after / (size * number**0.5))]
 
 
