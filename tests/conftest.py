@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +11,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from vehiclemor import registry
+from tests.plugin.installation import installed
+from vehiclemor.cli import main
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -93,28 +93,9 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture(scope="module")
-def plug_in_package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """The package in `tests/plugin`, as `pip install -e` would register it, for new processes too.
-
-    What an installer writes is written here: neither a network nor a build is needed.
-    """
-    source = Path(__file__).parent / "plugin"
-    project = tomllib.loads((source / "pyproject.toml").read_text())["project"]
-    name, version = project["name"].replace("-", "_"), project["version"]
-    site = tmp_path_factory.mktemp("site")
-    installed = site / f"{name}-{version}.dist-info"
-    installed.mkdir()
-    (installed / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {version}\n"
-    )
-    lines = []
-    for group, entries in project["entry-points"].items():
-        lines += [f"[{group}]", *(f"{key} = {value}" for key, value in entries.items())]
-    (installed / "entry_points.txt").write_text("\n".join(lines))
-    with pytest.MonkeyPatch.context() as patch:
-        for folder in (source, site):
-            patch.syspath_prepend(folder)
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(source), str(site)]))
-        registry._entries.cache_clear()
-        yield
-    registry._entries.cache_clear()
+def plug_in_package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """What `vehiclemor new-plugin quarter_car` writes, as if installed."""
+    source = tmp_path_factory.mktemp("plugin") / "quarter_car_plugin"
+    assert main(["new-plugin", "quarter_car", "--out", str(source)]) == 0
+    with installed(source):
+        yield source

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import platform
+import shutil
 import tempfile
 import threading
 import time
@@ -76,6 +77,19 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
+    return path
+
+
+def write_folder(path: Path, write: Callable[[Path], object]) -> Path:
+    """As `write_whole`, of a folder that is not there yet."""
+    temporary = temporary_path(path.absolute())
+    try:
+        write(temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise not_written(path, error) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
     return path
 
 

@@ -12,8 +12,9 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor import api
 from vehiclemor.cli import main, progress
+from vehiclemor.report import regenerate
+from vehiclemor.report.comparison import kinds
 from vehiclemor.study import run as study_run
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.workers import Workers
@@ -147,7 +148,8 @@ def test_every_long_command_tells_of_cells(capsys, monkeypatch, tmp_path, comman
         Workers("mine", tmp_path, asked={"a", "b", "c"}, finished={"a"})._report()
         return pd.DataFrame({"verdict": []}) if command == "compare" else {}
 
-    monkeypatch.setattr(api, command, long, raising=False)
+    monkeypatch.setattr(kinds, "compare", long)
+    monkeypatch.setattr(regenerate, "figures", long)
     monkeypatch.setattr(study_run, "run_studies", long)
     arguments = {"run": ["figure-6"], "compare": ["--json"], "figures": []}
     assert main([command, *arguments[command]]) == 0

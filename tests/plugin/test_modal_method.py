@@ -1,15 +1,12 @@
-"""The modal method, a plug-in of one file: exact where the model is linear, and a good citizen."""
+"""The method of the plug-in: exact where the model is linear, and a good citizen."""
 
 from dataclasses import replace
-from importlib.metadata import EntryPoint
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor import registry
 from vehiclemor.contracts import check_method
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
@@ -18,6 +15,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.steering_maneuvers import lane_change
 
+pytestmark = pytest.mark.usefixtures("plug_in_package")
 # Two masses of 1 kg in a chain from the wall: stiffness in N/m, damping in proportion to it.
 STIFFNESS = 40.0 * np.array([[2.0, -1.0], [-1.0, 1.0]])
 DAMPING = 0.004 * STIFFNESS
@@ -45,21 +43,8 @@ class Chain:
         return Trajectory(times, inputs, states[:, :2], states[:, 2:], empty, named, seconds)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _installed():
-    """The plug-in's entry point, as if it were installed."""
-    folder = Path(__file__).parent / "vehiclemor_modal_method"
-    entry = EntryPoint("modal_basis", "vehiclemor_modal_method:METHOD", registry.GROUPS["method"])
-    known = {kind: dict(registry._entries(kind)) for kind in registry.GROUPS}
-    known["method"]["modal_basis"] = entry
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(folder)
-        patch.setattr(registry, "_entries", known.__getitem__)
-        yield
-
-
 def fitted(model, **settings):
-    method = component("method", "modal_basis")
+    method = component("method", "quarter_car_modes")
     return method.fit(model, (), validated(method, model.kind, settings))
 
 
@@ -112,7 +97,7 @@ def test_modes_are_projected_without_loss():
 
 
 def test_the_method_keeps_the_contract_on_a_vehicle():
-    check_method("modal_basis", "independent_suspension_vehicle")
+    check_method("quarter_car_modes", "independent_suspension_vehicle")
 
 
 def test_a_vehicle_is_near_its_modes_at_small_amplitude():
@@ -127,10 +112,10 @@ def test_a_vehicle_is_near_its_modes_at_small_amplitude():
 
 
 def test_the_plug_in_is_listed_and_simulates_as_a_built_in():
-    assert vm.methods()["modal_basis"] == "modes of the linearised model"
-    data = vm.simulate("independent_suspension_vehicle", "modal_basis", amplitude=0.01)
+    assert vm.methods()["quarter_car_modes"] == "modes of the linearised model"
+    data = vm.simulate("independent_suspension_vehicle", "quarter_car_modes", amplitude=0.01)
     assert data["status"].item() == "ok"
     with pytest.raises(InputError, match="reduces kind ode; double_wishbone is of kind ae"):
-        vm.simulate("double_wishbone", "modal_basis")
-    with pytest.raises(InputError, match="modal_basis: fastest is 0; it must be above 0"):
-        vm.simulate("independent_suspension_vehicle", "modal_basis", fastest=0)
+        vm.simulate("double_wishbone", "quarter_car_modes")
+    with pytest.raises(InputError, match="quarter_car_modes: fastest is 0; it must be above 0"):
+        vm.simulate("independent_suspension_vehicle", "quarter_car_modes", fastest=0)

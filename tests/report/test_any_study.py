@@ -2,7 +2,6 @@
 
 import json
 import re
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import vehiclemor as vm
 from tests.report.figure_texts import check_texts
-from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.comparison.study import grid_rows
@@ -23,7 +21,7 @@ from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
 
-MODAL = Path(__file__).parents[1] / "plugin" / "vehiclemor_modal_method"
+pytestmark = pytest.mark.usefixtures("plug_in_package")
 STUDY = """
 title = "My car, my method"
 model = "quarter_car"
@@ -38,18 +36,21 @@ method = "full_order"
 [[methods]]
 method = "replay"
 [[methods]]
-method = "modal_basis"
+method = "quarter_car_modes"
 label = "mine"
 """
 PROTOCOL = """
 title = "My car, my method, roads that it has not seen"
 model = "quarter_car"
 bounds.tire_force = { measure = "rms", bound = 20.0 }
-training = [{ maneuver = "sine_road" }]
-validation = [{ maneuver = "sine_road", frequency = [1.2] }]
-test = [{ maneuver = "sine_road", frequency = [0.9, 1.1], start = ["equilibrium", "dropped"] }]
+training = [{ maneuver = "quarter_car_road" }]
+validation = [{ maneuver = "quarter_car_road", frequency = [1.2] }]
 targets = [{ against = "equal accuracy", ratio = 2.0 }]
 failure_rate = 0.01
+[[test]]
+maneuver = "quarter_car_road"
+frequency = [0.9, 1.1]
+start = ["equilibrium", "dropped"]
 [[contestants]]
 label = "full order"
 method = "full_order"
@@ -61,25 +62,13 @@ method = "replay"
 role = "baseline"
 [[contestants]]
 label = "mine"
-method = "modal_basis"
+method = "quarter_car_modes"
 candidates = [{ fastest = 20.0 }, { fastest = 1000.0 }]
 """
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _modal_method(plug_in_package):
-    """The method of the second plug-in, as if it were installed beside the first."""
-    real = registry._entries
-    entry = EntryPoint("modal_basis", "vehiclemor_modal_method:METHOD", registry.GROUPS["method"])
-    methods = {**real("method"), "modal_basis": entry}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(MODAL)
-        patch.setattr(registry, "_entries", lambda k: methods if k == "method" else real(k))
-        yield
-
-
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
+def place(plug_in_package, tmp_path_factory):
     """A folder with a study, a protocol and a collection of both, and their results."""
     folder = tmp_path_factory.mktemp("mine")
     (folder / "mine.toml").write_text(STUDY.format(keep="trajectories"))
@@ -320,7 +309,7 @@ def test_the_leaderboard_holds_all_stored_protocols_and_names_what_is_none(place
         for words in ("fewest silent misses", "mine *", "replay (b)", "(f)", "road (quarter_car"):
             assert words in text
         # Two that can be read have the same rows: their methods are counted over both.
-        assert re.search(r"modal_basis +2 +8 ", text)
+        assert re.search(r"quarter_car_modes +2 +8 ", text)
         left_out = leaderboard(place / "results").attrs["left_out"]
         reasons = {Path(path).stem.removeprefix("predictive-"): r for path, r in left_out.items()}
         assert set(reasons) == {"torn", "text", "old", "foreign"}

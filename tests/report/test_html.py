@@ -20,7 +20,7 @@ from vehiclemor.report.html.page import page
 from vehiclemor.report.html.study_section import study_section
 from vehiclemor.report.html.verdict_section import verdict_section
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
-from vehiclemor.study import timing
+from vehiclemor.study import netcdf_file, timing
 from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
@@ -276,6 +276,16 @@ def test_a_large_grid_is_summed_up_with_links(made, undrawn, monkeypatch):
 
 
 WORDS = ("least", "median", "largest")
+
+
+def test_a_study_that_is_read_in_parts_gives_the_same(made, undrawn, monkeypatch):
+    folder = made[0]
+    sections = []
+    for large in (netcdf_file.LARGE, 0):
+        monkeypatch.setattr(netcdf_file, "LARGE", large)
+        sections.append(study_section(dataset_of(folder, "hostile"), folder))
+    one, other = sections
+    assert one._replace(plots=[]) == other._replace(plots=[])
 
 
 def test_results_of_before_cells_were_named_are_shown(made, undrawn):

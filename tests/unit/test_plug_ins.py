@@ -175,14 +175,14 @@ import numpy as np
 import sympy as sp
 from vehiclemor.symbolic.program import assemble
 from vehiclemor.symbolic.tape import Tape
-from vehiclemor_quarter_car import quarter_car
+from quarter_car.model import DEFINITION as CAR, PARAMETERS
 def derived(derivative, outputs):
     x = sp.symbols("z_s z_u v_s v_u", real=True)
-    u, p = sp.symbols("road", real=True), sp.symbols([f"p_{n}" for n in quarter_car.PARAMETERS])
+    u, p = sp.symbols("road", real=True), sp.symbols([f"p_{n}" for n in PARAMETERS])
     functions = {"derivative": (derivative(x), (4,)), "outputs": (outputs, (len(outputs),))}
     return lambda: assemble(Tape(), {"x": x, "u": [u]}, p, functions)
 def faulty(**changes):
-    return replace(quarter_car.DEFINITION, name="faulty", **changes)
+    return replace(CAR, name="faulty", **changes)
 """
 
 

@@ -16,6 +16,7 @@ from vehiclemor.cli.export import export
 from vehiclemor.cli.figures import figures
 from vehiclemor.cli.leaderboard import leaderboard
 from vehiclemor.cli.list import list_components
+from vehiclemor.cli.new_plugin import new_plugin
 from vehiclemor.cli.plot import plot
 from vehiclemor.cli.report import report
 from vehiclemor.cli.run import run
@@ -47,6 +48,7 @@ COMMANDS = {
     "report": report,
     "export": export,
     "convert": convert,
+    "new-plugin": new_plugin,
     "cite": cite,
 }
 for name, command in COMMANDS.items():

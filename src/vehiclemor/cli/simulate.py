@@ -61,8 +61,9 @@ def simulate(
     training
         matched, or nominal (trained on the unperturbed input).
     parameter
-        name=value: a parameter of the model in SI units, a point as x,y,z; may be given several
-        times.  `vehiclemor show MODEL` has names, units and bounds.
+        name=value: a parameter of the model in SI units, a point as x,y,z or one component as
+        name.z=value; may be given several times.  `vehiclemor show MODEL` has names, units and
+        bounds.
     parameters
         Parameter file; the model's own public data by default.
     out

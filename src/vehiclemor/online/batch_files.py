@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.errors import FileError, InputError, one_line
-from vehiclemor.files import not_written, temporary_path, write_whole
+from vehiclemor.files import write_folder, write_whole
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,17 +83,13 @@ def _blamed(path: Path) -> Iterator[None]:
 
 
 def _write_zarr(path: Path, parts: Iterator[xr.Dataset]) -> None:
-    temporary = temporary_path(path)
-    try:
+    def write(place: Path) -> None:
         for number, part in enumerate(parts):
             further = {"append_dim": "run"} if number else {"mode": "w"}
             # Texts of any length, as those of other chunks may be longer.
             texts = {
                 name: v.astype(object) for name, v in part.variables.items() if v.dtype.kind == "U"
             }
-            part.assign(texts).to_zarr(temporary, consolidated=False, **further)  # type: ignore[call-overload]
-        os.replace(temporary, path)
-    except OSError as error:
-        raise not_written(path, error) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+            part.assign(texts).to_zarr(place, consolidated=False, **further)  # type: ignore[call-overload]
+
+    write_folder(path, write)

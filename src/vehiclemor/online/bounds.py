@@ -21,10 +21,13 @@ from vehiclemor.codegen.vector_statements import NAMES
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
+from vehiclemor.reduction.projection.car_subspaces import Subspaces
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.reduced_system import FullStates, ReducedSystem
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.slow_cars import SlowVehicle
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
 
@@ -102,6 +105,11 @@ def _check_vehicle(part: ReducedVehicle) -> None:
     _shaped("lifting", (part.lifting, len(lifted.terms), n))
     _shaped("encoding", (part.encoding, k, n), (part.feedthrough, k, inputs))
     _shaped("error_scale", (part.error_scale, k + PLANAR))
+    if isinstance(part, SlowVehicle) and part.box is not None:
+        box, m = part.box, len(part.box.coefficients)
+        _shaped("box", (box.coefficients, m, *part.coefficients.shape))
+        _shaped("box", (box.lifting, m, *part.lifting.shape))
+        _require(box.table.features == own, "box")
     reach = part.reach
     _require(own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
     if len(reach.lasted):
@@ -138,6 +146,20 @@ def _check_reduced_system(part: ReducedSystem) -> None:
     else:
         _require(dim == states, "system")
     _check_windows(spaces, dim)
+    if isinstance(part, DynamicProjection) and part.subspaces is not None:
+        _check_subspaces(part.subspaces, dim)
+
+
+def _check_subspaces(part: Subspaces, dim: int) -> None:
+    width, windows = len(part.weight), len(part.local)
+    _require(width in (dim, dim // 2) and len(part.edges) == windows + 1, "subspaces")
+    _shaped("weight", (part.weight, width, width))
+    cars = len(part.local[0].means) if windows else 0
+    _require(cars in (1, len(part.cars.values)), "cars")
+    for local in part.local:
+        rank = local.origin.shape[-1]
+        _shaped("means", (local.means, cars, dim), (local.origin, width, rank))
+        _shaped("tangents", (local.tangents, cars, width, rank))
 
 
 def _check_windows(part: ProjectionWindows, dim: int) -> None:

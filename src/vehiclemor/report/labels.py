@@ -49,7 +49,7 @@ def label_of(output: str) -> Label:
 
 def unit_of(dataset: xr.Dataset, output: str) -> str:
     """SI unit of an output."""
-    return str(dataset["output_unit"].sel(output=output).item())
+    return str(dataset["output_unit"].sel(output=output).values)
 
 
 def method_text(label: str) -> str:

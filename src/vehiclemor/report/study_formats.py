@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
-import shutil
 from collections.abc import Iterator
 from functools import partial
 from importlib.util import find_spec
@@ -15,7 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.files import not_written, temporary_path, write_whole
+from vehiclemor.files import write_folder, write_whole
 from vehiclemor.registry import unknown
 from vehiclemor.report.result_selection import stored_result
 from vehiclemor.study.netcdf_file import PART, regions
@@ -169,11 +167,5 @@ def _write_parquet(parts: Iterator[pd.DataFrame], path: Path) -> None:
 def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
     # Texts of any length, as those of other chunks may be longer.
     texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
-    temporary = temporary_path(path)
-    try:
-        dataset.assign(texts).drop_encoding().to_zarr(temporary, mode="w", consolidated=False)  # type: ignore[call-overload]
-        os.replace(temporary, path)
-    except OSError as error:
-        raise not_written(path, error) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    written = dataset.assign(texts).drop_encoding()
+    write_folder(path, lambda place: written.to_zarr(place, mode="w", consolidated=False))  # type: ignore[call-overload]

@@ -255,7 +255,7 @@ def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
         if fit.shared:
             of_all = _kept_fit(fit._replace(car=()))
-            if hasattr(of_all, "for_car"):
+            if not isinstance(of_all, Failure) and hasattr(of_all, "for_car"):
                 return of_car(method, of_all, with_parameters(fit.model, fit.car), complete)
         return fitted(method, *_given(fit), complete, others)
 

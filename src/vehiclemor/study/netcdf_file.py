@@ -218,5 +218,5 @@ def _digest(file: netCDF4.Dataset) -> str:
             if kind.kind in "OUS":
                 digest.update(b"\n" * (number > 0) + "\n".join(map(str, values.ravel())).encode())
             else:
-                digest.update(np.ascontiguousarray(values))
+                digest.update(np.ascontiguousarray(values).data)
     return digest.hexdigest()

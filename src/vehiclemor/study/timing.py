@@ -255,7 +255,9 @@ def _warm_fits(
     cars: dict[object, tuple[ReducedModel | None, float]] = {}
     for scenario in experiment.test:
         if scenario.parameters not in cars:
-            cars[scenario.parameters] = _warm_fit(model, experiment, scenario, bool(wanted.any()))
+            # One car tells how long a fit takes.
+            needed = not cars and bool(wanted.any())
+            cars[scenario.parameters] = _warm_fit(model, experiment, scenario, needed)
     reduced = [cars[scenario.parameters][0] for scenario in experiment.test]
     return reduced, sum(seconds for _, seconds in cars.values())
 

@@ -213,3 +213,10 @@ def test_a_slow_manifold_of_a_box_knows_cars_between():
     assert run.status == "ok"
     assert error < 0.25 * np.abs(nominal.outputs - full.outputs)[:, column].max()
     assert box.for_parameters({"sprung_mass": 1200.0}).simulate().status == "untrusted"
+
+
+def test_a_loaded_model_of_a_box_gives_other_cars_too(tmp_path):
+    path = of_box("interpolated").save(tmp_path / "box.nc")
+    there, again = (rom.for_parameters(HEAVY) for rom in (of_box("interpolated"), vm.load(path)))
+    np.testing.assert_array_equal(again.simulate().outputs, there.simulate().outputs)
+    assert vm.load(path).for_parameters(HEAVIER).simulate().status == "untrusted"

@@ -15,6 +15,7 @@ of the full model: no faster than the best full-order integrator.
 """
 
 import time
+from typing import cast
 
 import numpy as np
 from pydantic import Field
@@ -70,7 +71,7 @@ def fit(model: DynamicModel, training: Training, settings: BalancedPodSettings) 
     shape, count = VehicleShape(model), settings.snapshots
     both = with_mirrored(training)
     runs = [run.snapshots(count) for run in both]
-    cars = {id(run.model): VehicleShape(run.model) for run in both}
+    cars = {id(run.model): VehicleShape(cast("DynamicModel", run.model)) for run in both}
     # Gramians are integrals in time: each snapshot is weighted by its time step.
     parts = [
         (shape.of(run.states) - cars[id(given.model)].reference) * np.sqrt(run.time[-1] / count)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -108,7 +108,7 @@ def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, l
 
 def member(training: Training, like: SlowModes) -> Member:
     """A car by its runs, in coordinates like those of the first one."""
-    model = training[0].model
+    model = cast("DynamicModel", training[0].model)
     shape = VehicleShape(model)
     modes, runs = as_of(shape, like), [run.recorded() for run in training]
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
@@ -160,7 +160,7 @@ class SlowVehicle(ReducedVehicle):
 
     box: Box | None = None
 
-    def for_car(self, model: DynamicModel) -> SlowVehicle:
+    def for_car(self, model: DynamicModel) -> ReducedVehicle:
         """The reduced vehicle of another car."""
         assert self.box is not None
         began = time.process_time()
@@ -275,13 +275,14 @@ def _by_rates(
 ) -> np.ndarray:
     """Change (monomials, free coefficients) with which the rates of all cars fit best."""
     m, terms = rows.shape[1], len(table.features.terms)
-    squares, products = np.zeros((m, terms, m, terms)), 0.0
+    squares = np.zeros((m, terms, m, terms))
+    products = np.zeros((m, *vehicles[0].coefficients.shape))
     for vehicle, car, row in zip(vehicles, members, rows, strict=True):
         columns = car.columns(table.features, vehicle.parameters)
         rest = car.rates - columns @ vehicle.coefficients
         part = columns.T @ columns / len(columns)
         squares += np.einsum("i,j,kl->ikjl", row, row, part)
-        products = products + np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
+        products += np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
     found = []
     for chosen, column in table.free:
         kept = np.ix_(range(m), chosen)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from vehiclemor.registry import component, names
+from vehiclemor.report.comparison.design import FINDS, SAVES, design_rows
 from vehiclemor.report.comparison.rows import (
     COLUMNS,
     Results,
@@ -71,6 +72,8 @@ def paper_rows(results: Results, costs: Mapping[str, pd.DataFrame]) -> pd.DataFr
             claims.append(slower_row(claim, costs["double_wishbone"], few=3, many=6))
         elif name == AGREE_AND_SAVE:
             claims += agreement_rows(claim, errors, times)
+        elif name in (FINDS, SAVES):
+            claims += design_rows(claim)
         elif claim.model is None or claim.model in costs:
             claims += claim_rows(claim, results)
     rows = pd.DataFrame([*errors, *times, *unknown, *claims], columns=list(COLUMNS))

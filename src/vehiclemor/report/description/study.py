@@ -1,17 +1,19 @@
 """A study: what it runs, and how many cells its grid has."""
 
 from vehiclemor.registry import component
-from vehiclemor.study.plans.protocol import SETS
+from vehiclemor.study.plans.protocol import SETS, protocol_path
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.study_file import (
     Sampling,
     load_studies,
-    named_file,
     read_study,
     study_path,
     values,
 )
 from vehiclemor.toml_files import read_toml
+
+# Values of an axis that are printed.
+SHOWN = 40
 
 
 def study_description(name: str) -> dict[str, object]:
@@ -40,9 +42,7 @@ def study_description(name: str) -> dict[str, object]:
         "parameters": ", ".join(f"{key}={value}" for key, value in study.parameters.items()),
         "grid points": study.points,
         "keeps": study.keep,
-        "grid": [
-            {"dimension": key, "values": ", ".join(map(str, entry))} for key, entry in grid.items()
-        ],
+        "grid": [{"dimension": key, "values": _shown(entry)} for key, entry in grid.items()],
         "sampling": _sampling(study.sampling),
         "methods": [
             {
@@ -55,6 +55,13 @@ def study_description(name: str) -> dict[str, object]:
             for label, entry in study.labelled.items()
         ],
     }
+
+
+def _shown(axis: list[int | float | str]) -> str:
+    """Values of an axis; of a long one both ends."""
+    if len(axis) <= SHOWN:
+        return ", ".join(map(str, axis))
+    return f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)"
 
 
 def _sampling(plan: Sampling | None) -> list[dict[str, object]]:
@@ -70,7 +77,7 @@ def _sampling(plan: Sampling | None) -> list[dict[str, object]]:
 
 def _protocol(name: str) -> dict[str, object]:
     """What a protocol trains, chooses by and tests; scenarios are counted."""
-    protocol = read_toml(named_file("protocol", "protocols", name), ProtocolFile)
+    protocol = read_toml(protocol_path(name), ProtocolFile)
     counted = {s: sum(g.scenarios for g in getattr(protocol, s)) for s in SETS}
     draws = {"drawn": protocol.drawn, "drawn outside": protocol.drawn_outside}
     counted |= {name: draw.runs for name, draw in draws.items() if draw}

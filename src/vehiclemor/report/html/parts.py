@@ -87,7 +87,7 @@ def quantity(value: float, anchor: str = "") -> Entry:
     """A number with three digits, linked; a dash for one that is missing."""
     if value != value:
         return MISSING._replace(anchor=anchor)
-    large = value != 0.0 and not 0.01 <= abs(value) < 1e4
+    large = value != 0.0 and not 0.01 <= abs(value) < 1e3
     text = f"{value:.2e}".replace("e-0", "e-").replace("e+0", "e") if large else f"{value:.3g}"
     return Entry(text, value, anchor)
 

@@ -47,6 +47,7 @@ def _paths(dataset: xr.Dataset) -> tuple[list[Any], str]:
     if not (set(PATH) <= set(dataset["output"].values) and dataset.sizes.get("time")):
         return [], ""
     point, words = drawn(dataset, "paths", {})
+    point = point[["outputs", "reference_outputs", "status"]].load()
     told = {"": "@name", "time": "@time{0.00} s", "X": "@x{0.000} m", "Y": "@y{0.0000} m"}
     made = new_figure("X (m)", "Y (m), not to the scale of X", told)
     methods = [str(m) for m in point["method"].values]
@@ -72,7 +73,7 @@ def _errors(dataset: xr.Dataset) -> tuple[list[Any], str]:
         return [], ""
     output = shown_outputs(dataset)[0]
     label = f"{label_of(output).words}, RMS error ({unit_of(dataset, output)})"
-    values = part["rms_error"].sel({"output": output, "method": methods})
+    values = part["rms_error"].sel({"output": output, "method": methods}).load()
     keys = part.get("cell_key")
     if values.size > POINTS:
         return [], ""

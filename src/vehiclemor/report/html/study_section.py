@@ -72,7 +72,11 @@ def _pictures(dataset: xr.Dataset, name: str) -> list[Picture]:
         for start in starts if kind != "errors" else [""]:
             chosen = {"start": start} if start else {}
             try:
-                figure = plot_result(drawn(dataset, kind, chosen)[0], None, kind)
+                part = drawn(dataset, kind, chosen)[0]
+                if kind == "errors":
+                    part = part.drop_dims([d for d in ("time", "input") if d in part.dims])
+                # Of a large study only this is read.
+                figure = plot_result(part.load(), None, kind)
             except InputError:
                 # The study has nothing of that kind.
                 break

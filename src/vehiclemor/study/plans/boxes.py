@@ -71,7 +71,10 @@ def _one(model: Model, box: Box, generator: np.random.Generator) -> Scenario:
     speed = own_speed(model) if box.speed is None else within(box.speed)
     starts = box.start or [model.starts[0]]
     start = starts[int(generator.integers(len(starts)))]
-    car = {name: significant(generator.uniform(*ends)) for name, ends in (box.cars or {}).items()}
+    car = {
+        name: significant(generator.uniform(low, high))
+        for name, (low, high) in (box.cars or {}).items()
+    }
     maneuver: Maneuver = component("maneuver", box.maneuver)
     return Scenario(maneuver.perturbed(frequency, amplitude), start, speed, overrides(car))
 

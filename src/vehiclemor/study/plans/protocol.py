@@ -85,6 +85,12 @@ class Protocol:
         return self.path.is_relative_to(data_folder())
 
 
+def protocol_path(protocol: str) -> Path:
+    """Path of a protocol: a name from the package's data, or a TOML file."""
+    folder = OF_CARS if protocol in data_names(OF_CARS) else "protocols"
+    return named_file("protocol", folder, protocol)
+
+
 def load_protocol(protocol: str) -> Protocol:
     """A protocol by the name of a file of the package's data, or by the path of a TOML file.
 
@@ -93,8 +99,7 @@ def load_protocol(protocol: str) -> Protocol:
     VehiclemorError
         If the file or anything that it names is wrong.
     """
-    folder = OF_CARS if protocol in data_names(OF_CARS) else "protocols"
-    path = named_file("protocol", folder, protocol)
+    path = protocol_path(protocol)
     definition = read_toml(path, ProtocolFile)
     try:
         return _resolved(path, definition)

@@ -1,8 +1,8 @@
-"""Modal basis of any model in ordinary differential equations, linearised at its first start."""
+"""A reduction method: the slow modes of a model that is linearised at its first start."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from time import process_time
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -13,14 +13,16 @@ from vehiclemor.reduction.settings import Settings
 
 
 class ModalSettings(Settings):
+    """What a user can set, with type, default, bounds and meaning."""
+
     fastest: float = Field(100.0, gt=0.0, description="modes up to this |lambda| in 1/s are kept")
 
 
 @dataclass(frozen=True)
 class Modal:
-    """Equations z' = a z + b u + c of x = centre + right z, with z = left (x - centre)."""
+    """A reduced model: x = centre + right z with z' = a z + b u + c, z = left (x - centre)."""
 
-    model: object
+    model: Any
     centre: np.ndarray
     left: np.ndarray
     right: np.ndarray
@@ -29,23 +31,29 @@ class Modal:
     effective_rank: int
 
     def simulate(self, maneuver, start):
+        """The run at the maneuver's output times, from a start's name or a full state."""
         (a, b, c), times, inputs = self.equations, maneuver.times, maneuver.at(maneuver.times)
         began, step, n = process_time(), times[1], len(a)
         # Exact where inputs are linear between the output times.
         held = np.kron([[0.0, step, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], np.eye(n))
         held[:n, :n] = step * a
         free, at_start, change = np.hsplit(expm(held)[:n], 3)
+        forces = inputs @ b.T + c
+        forces = forces[:-1] @ at_start.T + np.diff(forces, axis=0) @ change.T
         z = [self.left @ (self.model.start(start) - self.centre)]
-        for first, second in pairwise(inputs @ b.T + c):
-            z.append(free @ z[-1] + at_start @ first + change @ (second - first))
+        for force in forces:
+            z.append(free @ z[-1] + force)
         states, seconds = self.centre + np.array(z) @ self.right.T, process_time() - began
+        # Outputs follow from the states; what the full model counts hasn't been called.
         return self.model.trajectory(times, inputs, states, [0] * len(self.model.counts), seconds)
 
     def best_approximation(self, states):
+        """Full states (samples, n) projected on the subspace; None where there is no subspace."""
         return self.centre + (states - self.centre) @ self.left.T @ self.right.T
 
 
 def fit(model, training, settings):
+    """Reduce a model; `training` holds runs (time, inputs, states, outputs) to learn from."""
     began, x, none = process_time(), model.start(), np.zeros(len(model.inputs))
     a, rate = model.system.jacobian(x, none), model.derivative(x, none)
     steps = 1e-6 * np.eye(len(none))
@@ -57,4 +65,12 @@ def fit(model, training, settings):
     return Modal(model, x, left, right, (left @ a @ right, left @ b, left @ rate), cost, len(left))
 
 
-METHOD = Method("modal_basis", "modes of the linearised model", {"ode": ModalSettings}, fit)
+METHOD = Method(
+    name="quarter_car_modes",
+    summary="modes of the linearised model",
+    # Kinds of models that it reduces.
+    settings={"ode": ModalSettings},
+    fit=fit,
+    # Only what ReducedSystem integrates can be.
+    exported=False,
+)

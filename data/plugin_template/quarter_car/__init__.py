@@ -1,0 +1,1 @@
+"""A plug-in of vehiclemor: a model, a maneuver and a reduction method."""

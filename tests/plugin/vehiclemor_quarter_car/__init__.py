@@ -1,1 +1,0 @@
-"""A plug-in of vehiclemor: a quarter car."""
