@@ -20,6 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import faults
 import in_use
 import scaling
 from fragments import ROOT, manifest, printed_numbers, rendered, rewritten
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FACTS = ROOT / "paper" / "facts.json"
-# Kinds of sources that one file of the results folder holds.
-FILES = {"benchmark": "benchmark.json", "in_use": in_use.FILE, "scaling": scaling.FILE}
+# Kinds of sources that one file of the results folder holds; and those of a script each.
+SCRIPTS = {"faults": faults, "in_use": in_use, "scaling": scaling}
+FILES = {"benchmark": "benchmark.json"} | {kind: script.FILE for kind, script in SCRIPTS.items()}
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")
 # What an expression may call; everything else is arithmetic.
@@ -111,10 +113,8 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         rows = json.loads(path.read_text(encoding="utf-8"))["benchmarks"]
         values = {_benchmark(row["fullname"]): row["stats"] | row["extra_info"] for row in rows}
         return pd.DataFrame.from_dict(values, "index").rename_axis("name").to_xarray()
-    if kind == "in_use":
-        return in_use.measured(folder)
-    if kind == "scaling":
-        return scaling.measured(folder)
+    if kind in SCRIPTS:
+        return SCRIPTS[kind].measured(folder)
     if kind == "design":
         names, values = zip(*design_studies()["values"].items(), strict=True)
         plain, units = zip(*(name.rsplit(", ", 1) for name in names), strict=True)
@@ -164,9 +164,8 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
         "operations": "python paper/regenerate.py",
         "predictive": "vehiclemor compare predictive",
         "design": "python paper/design_studies.py",
-        "in_use": "python paper/in_use.py",
-        "scaling": "python paper/scaling.py",
     }
+    commands |= {kind: f"python paper/{kind}.py" for kind in SCRIPTS}
     written = max((path.stat().st_mtime for path in files), default=None)
     when = datetime.now(UTC) if written is None else datetime.fromtimestamp(written, UTC)
     return {

@@ -1,6 +1,6 @@
 """Kills, full disks and damaged files: whether studies resume to the identical dataset.
 
-Usage: python paper/faults.py [--results DIR] [--rounds 2] [--seed 16]
+Usage: python paper/faults.py [--results DIR] [--rounds 1] [--seed 16]
 
 Writes DIR/faults.nc, how often each was done and how often it held, which `paper/facts.py` writes
 into the texts, and prints each with its moment.  It holds if the run ends as the handbook says, in
@@ -26,16 +26,18 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import xarray as xr
+from disturbed_runs import Subject, finished, result, resumed, session, started
 from named_values import Values, measured_values
 
 from vehiclemor.files import TEMPORARY
 from vehiclemor.study import cell_file
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.status import status_of
 from vehiclemor.study.store import ASIDE
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FILE, TITLE = "faults.nc", "Kills, full disks and damaged files"
 STUDY = """
@@ -55,9 +57,8 @@ method = "full_order"
 [[methods]]
 method = "pod"
 """
-# Model -> frequencies and ranks: 400 and 100 cells.
-STUDIES = {"double_wishbone": (10, [2, 3, 4]), "independent_suspension_vehicle": (5, [3])}
-SECONDS = ("seconds", "offline_seconds")
+# Model -> frequencies and ranks: 200 and 60 cells.
+STUDIES = {"double_wishbone": (5, [2, 3, 4]), "independent_suspension_vehicle": (3, [3])}
 JOINED = {"joblib": ["--jobs", "2"], "dask local": ["--jobs", "2", "--scheduler", "local"]}
 # What is killed, how, under which engine; and the exit status of the driver.
 KILLS = [
@@ -74,17 +75,6 @@ KILLS = [
 ]
 # How command lines of processes of workers tell that they are some.
 WORKER = ("popen_loky_posix", "spawn_main")
-# Seconds that a run may take, and until all its processes have ended.
-PATIENCE, ENDED = 300.0, 15.0
-
-
-class Subject(NamedTuple):
-    """A study, the dataset that it always is to give, and a folder with its results."""
-
-    path: Path
-    expected: xr.Dataset
-    cells: int
-    done: Path
 
 
 class Fault(NamedTuple):
@@ -92,103 +82,6 @@ class Fault(NamedTuple):
 
     name: str
     do: Callable[[Subject, Path, random.Random], tuple[str, list[str]]]
-
-
-class Run(NamedTuple):
-    """A driver in a process of its own, with all that it has started in its session."""
-
-    process: subprocess.Popen
-    text: Path
-    known: tuple[str, ...]
-
-    def ended(self, expected: int) -> list[str]:
-        """What is wrong with how it ends."""
-        try:
-            status = self.process.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return ["it hangs"]
-        said = self.text.read_text()
-        wrong = [f"exit status {status}: {said}"] if status != expected else []
-        # Beside progress and what is tried again there is one line, if any.
-        others = [line for line in said.splitlines() if not line.startswith(self.known)]
-        if len(others) != (status > 0) or not all(o.startswith("vehiclemor: ") for o in others):
-            wrong.append(f"it says {others}")
-        deadline = time.monotonic() + ENDED
-        while left := session(self.process.pid):
-            if time.monotonic() > deadline:
-                wrong.append(f"processes are left: {left}")
-                break
-            time.sleep(0.1)
-        return wrong
-
-
-def session(leader: int) -> dict[int, str]:
-    """Processes of a session, and their command lines."""
-    found = {}
-    for place in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            command = (place / "cmdline").read_text().replace("\0", " ")
-            if os.getsid(int(place.name)) == leader and command:
-                found[int(place.name)] = command
-    return found
-
-
-def started(subject: Subject, out: Path, options: list[str]) -> Run:
-    """A run of a study on the command line."""
-    command = [sys.executable, "-m", "vehiclemor", "run", str(subject.path), "--out", str(out)]
-    text = subject.path.with_name(f"{time.monotonic_ns()}.txt")
-    with text.open("w") as file:
-        process = subprocess.Popen(  # noqa: S603 - this package
-            [*command, *options], stdout=subprocess.DEVNULL, stderr=file, start_new_session=True
-        )
-    return Run(process, text, (f"{subject.path.stem}: ", "scheduler ", str(out)))
-
-
-def finished(out: Path) -> dict[Path, int]:
-    """Files of finished cells, and when they were written."""
-    return {path: path.stat().st_mtime_ns for path in (out / "cells").glob("??/*")}
-
-
-def same(one: xr.Dataset, other: xr.Dataset) -> bool:
-    """Whether two datasets are the same bit by bit, but for seconds."""
-
-    def content(dataset: xr.Dataset) -> dict[str, object]:
-        values = {str(n): v for n, v in dataset.variables.items() if n not in SECONDS}
-        # Tables of text are text; numbers are what lies in memory.
-        return {
-            name: (
-                v.dims,
-                v.attrs,
-                v.values.tolist() if v.dtype.kind in "OU" else v.values.tobytes(),
-            )
-            for name, v in values.items()
-        }
-
-    return content(one) == content(other) and set(one.variables) == set(other.variables)
-
-
-def resumed(subject: Subject, out: Path) -> list[str]:
-    """What is wrong with what is stored, and with what the next run makes of it."""
-    before = finished(out)
-    (status,) = status_of(str(subject.path), out).values()
-    wrong = [] if status.done == len(before) else [f"{status.done} told, {len(before)} stored"]
-    (found,) = run_studies(str(subject.path), out).values()
-    after = finished(out)
-    if not before.items() <= after.items():
-        wrong.append("a finished cell was computed again")
-    return wrong + result(subject, out, found)
-
-
-def result(subject: Subject, out: Path, found: xr.Dataset | None = None) -> list[str]:
-    """What is wrong with the result of a run that was not disturbed any more."""
-    if found is None:
-        (found,) = run_studies(str(subject.path), out).values()
-    wrong = [] if same(subject.expected, found) else ["another dataset"]
-    if len(finished(out)) != subject.cells:
-        wrong.append(f"{len(finished(out))} cells, not {subject.cells}")
-    wrong += [f"left: {path}" for path in out.rglob(f"{TEMPORARY}*")]
-    return wrong
 
 
 # Kills
@@ -347,6 +240,8 @@ def other_version(path: Path, *_: object) -> None:
 
 def foreign(path: Path, *_: object) -> None:
     """A netCDF file of somebody else."""
+    import xarray as xr
+
     xr.Dataset({"mine": ("x", [1.0, 2.0])}).to_netcdf(path)
 
 
@@ -434,7 +329,7 @@ def all_faults(rounds: int, seed: int, only: str) -> Values:
 
 
 def measured(
-    folder: Path, anew: bool = False, rounds: int = 2, seed: int = 16, only: str = ""
+    folder: Path, anew: bool = False, rounds: int = 1, seed: int = 16, only: str = ""
 ) -> xr.Dataset:
     """What the results folder holds; done where it lacks it, or once more."""
     return measured_values(folder / FILE, TITLE, [partial(all_faults, rounds, seed, only)], anew)
@@ -444,7 +339,7 @@ def main() -> int:
     """Do all, write, print; exit status 1 if something does not hold."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
-    parser.add_argument("--rounds", type=int, default=2, help="of each fault and study")
+    parser.add_argument("--rounds", type=int, default=1, help="of each fault and study")
     parser.add_argument("--seed", type=int, default=16, help="of the moments and places")
     parser.add_argument("--only", default="", help="faults whose names begin so")
     chosen = parser.parse_args()

@@ -267,6 +267,14 @@ def test_no_scheduler_is_one_line(study, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "REACH", 0.2)
     with pytest.raises(InputError, match=r"can't be reached .*Timed out"):
         run_studies(str(study), tmp_path, scheduler="127.0.0.1:1")
+
+    async def connect(*_, **__):
+        raise LookupError("Non-websocket response")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("distributed.core.connect", connect)
+        with pytest.raises(InputError, match=r"can't be reached .Non-websocket response"):
+            run_studies(str(study), tmp_path, scheduler="ws://127.0.0.1:1")
     with pytest.raises(InputError, match="jobs: a scheduler at an address has its own workers"):
         run_studies(str(study), tmp_path, jobs=2, scheduler="127.0.0.1:1")
     monkeypatch.setitem(sys.modules, "distributed", None)

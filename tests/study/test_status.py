@@ -123,3 +123,8 @@ def test_many_cells_are_told_of_without_reading_their_arrays(study, tmp_path, mo
 
     monkeypatch.setattr(cell_file, "check", whole)
     assert vm.status(study, tmp_path)["small"].done == 12
+
+
+def test_a_file_in_the_place_of_the_results_is_one_line(study, capsys):
+    assert main(["status", str(study), "--out", str(study)]) == 2
+    assert capsys.readouterr().err == f"vehiclemor: {study}: not a folder\n"

@@ -61,6 +61,8 @@ def convert(
         raise InputError(f"{to} needs the package {engine}: pip install 'vehiclemor[convert]'")
     name = str(file_path("study", study))
     path = Path(f"{Path(name).stem}.{to}") if out is None else file_path("out", out)
+    if not path.name:
+        raise InputError(f"out: {path} is a folder, not a new file")
     columns = path.with_suffix(".columns.csv")
     for target in (path,) if to == "zarr" else (path, columns):
         if target.exists():

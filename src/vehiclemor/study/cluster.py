@@ -128,9 +128,10 @@ def _knock(address: str) -> None:
         # A notebook has a loop of its own in this thread.
         with ThreadPoolExecutor(1) as other:
             other.submit(lambda: asyncio.run(knock())).result()
-    except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
+    except Exception as error:
+        # Each kind of address has errors of its own.
         reason = " ".join(str(error).split()) or f"no answer in {REACH:g} s"
-        raise InputError(f"scheduler {address}: can't be reached ({reason})") from None
+        raise InputError(f"scheduler {address}: can't be reached ({reason})") from error
 
 
 def _places(client: Any) -> int:

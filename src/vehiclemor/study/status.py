@@ -75,7 +75,14 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
     dict
         Study name -> status; of a protocol, whose later cells follow from the first, that of its
         validation.
+
+    Raises
+    ------
+    FileError
+        If the results folder is a file.
     """
+    if folder.exists() and not folder.is_dir():
+        raise FileError(f"{folder}: not a folder")
     found: dict[str, StudyStatus] = {}
     for name, (path, definition) in studies_and_files(study).items():
         for protocol in map(load_protocol, definition.protocols):

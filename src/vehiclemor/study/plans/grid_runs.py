@@ -58,6 +58,8 @@ def run_at(study: StudyFile, point: Mapping[str, Any], trained: Mapping[str, Car
         if name.startswith(PARAMETER)
     }
     cars = entry.cars or point.get("cars", study.cars)
+    # What the study lists has no name, and a grid can't ask for it.
+    named = isinstance(cars, str) or "cars" in point
     training = entry.training or point.get("training", study.training)
     return Run(
         point["maneuver"],
@@ -66,12 +68,12 @@ def run_at(study: StudyFile, point: Mapping[str, Any], trained: Mapping[str, Car
         overrides(car),
         training,
         tuple((pair[0], pair[1]) for pair in study.training_set),
-        _known(cars if isinstance(cars, str) else "", trained),
+        _known(cars if named else "", trained),
     )
 
 
-def _known(cars: str, trained: Mapping[str, Cars]) -> Cars:
-    if cars not in trained:
+def _known(cars: object, trained: Mapping[str, Cars]) -> Cars:
+    if not isinstance(cars, str) or cars not in trained:
         raise unknown("cars", cars, [name for name in trained if name])
     return trained[cars]
 

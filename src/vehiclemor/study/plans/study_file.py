@@ -54,7 +54,8 @@ class Sampling(FileSchema):
         if not self.ranges:
             raise ValueError("ranges is empty")
         for name, limits in self.ranges.items():
-            if len(limits) != 2 or not -math.inf < limits[0] < limits[1] < math.inf:
+            # Of a range that overflows no point could be taken.
+            if len(limits) != 2 or not 0.0 < limits[1] - limits[0] < math.inf:
                 raise ValueError(f"ranges: {name} is not [from, to]")
             if name not in FACTORS and not name.startswith(PARAMETER):
                 raise ValueError(f"ranges: {name} is neither parameters.NAME nor a factor")
