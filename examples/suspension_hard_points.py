@@ -1,6 +1,6 @@
 """Hard points of a suspension for toe and camber over wheel travel.
 
-The sedan's suspension steers its wheels by 4 degrees between 80 mm of bump and of rebound.  Six
+The sedan's suspension steers its wheels by 6 degrees between 80 mm of bump and of rebound.  Six
 coordinates of its joints may move by 10 mm: the wheel shall keep its direction, so that a rough
 road does not steer the car, and lean by 0.35 rad for a metre of travel, so that the outer wheel
 stands more upright when the body rolls.  Nonlinear least squares by SciPy.
@@ -71,7 +71,7 @@ class Designer:
             return np.transpose(sides) / (2.0 * STEP)
         run = vm.sensitivities(self.made(change), self.signal, parameters=DESIGN)
         moved = run["d_output"].sel(output=["toe", "camber"])
-        return np.vstack(moved.transpose("output", "time", "parameter").values)
+        return moved.transpose("output", "time", "parameter").values.reshape(-1, len(DESIGN))
 
 
 def designed(designer: Designer) -> OptimizeResult:

@@ -7,6 +7,9 @@ import pytest
 
 import vehiclemor as vm
 from tests.texts.markdown import ROOT
+from vehiclemor.report.comparison.design import FINDS, SAVES, design_rows
+from vehiclemor.report.design_studies import design_studies
+from vehiclemor.report.published import load_published
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +43,7 @@ def test_springs_and_dampers_of_the_front_are_optimal(springs, stiff):
 
 def test_a_reduced_car_finds_the_same_springs_and_dampers(springs, stiff):
     point, fine = stiff
-    soft = springs["Designer"](vm.reduce(springs["MODEL"], "softened_slip", tolerance=1e-6), True)
+    soft = springs["Designer"](vm.reduce(springs["MODEL"], "softened_slip", tolerance=1e-6))
     (found,) = springs["front"](soft, [0.101])
     assert np.abs(found.design - point.design).max() < 0.01
     np.testing.assert_allclose(fine.values(found.design), fine.values(point.design), rtol=0.005)
@@ -83,3 +86,24 @@ def test_hard_points_are_optimal_within_their_bounds_and_the_path_map_finds_them
     assert (slope[at != 0] * at[at != 0] < 0.0).all()
     mapped = joints["designed"](designers["path map, differences"])
     np.testing.assert_allclose(mapped.x, found.x, atol=1e-7)
+
+
+def test_stored_designs_have_the_objectives_that_are_stored(springs, stiff):
+    _, fine = stiff
+    for name, points in design_studies()["fronts"].items():
+        for point in points[::4]:
+            found = fine.values(np.array(point["design"]))
+            np.testing.assert_allclose(found, point["real"], rtol=1e-4, err_msg=name)
+
+
+def test_claims_about_design_have_a_row_for_each_study_and_reduced_model():
+    claims = load_published().claims
+    finds, saves = (design_rows(claims[name]) for name in (FINDS, SAVES))
+    assert [row.variant for row in finds] == [row.variant for row in saves]
+    assert len(finds) == 5
+    verdicts = {row.variant: row.verdict for row in finds}
+    assert verdicts["hard points: path map"] == "met"
+    assert verdicts["springs and dampers: POD, r = 3"] == "missed"
+    for row in (*finds, *saves):
+        assert row.verdict == ("met" if row.reproduced <= row.bound else "missed")
+        assert "design_studies.py" in row.reason

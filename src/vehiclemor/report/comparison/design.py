@@ -1,12 +1,9 @@
 """The paper's claims about design, judged by two design studies that were measured beforehand."""
 
-from typing import Any
-
 from vehiclemor.report.comparison.rows import Row, claim_row
 from vehiclemor.report.criteria.finding import IN_WORDS, OWN, Finding
 from vehiclemor.report.design_studies import design_studies
 from vehiclemor.report.published import Claim
-from vehiclemor.simulation.build import kept_build
 
 FINDS, SAVES = "all_intended_for_full_vehicle_models", "all_essential_for_design"
 # Part by which an objective may be worse than at the full order's optimum: designs are the same.
@@ -24,12 +21,12 @@ STUDIES = {
 
 def design_rows(claim: Claim) -> list[Row]:
     """A row of one of the two claims for each reduced model of each study."""
-    stored, rows = design_studies(), []
+    values, rows = design_studies()["values"], []
     for study, (label, full, contestants) in STUDIES.items():
         for name in contestants:
-            finding = (_found if claim.id == FINDS else _saved)(stored["values"], study, name, full)
+            finding = (_found if claim.id == FINDS else _saved)(values, study, name, full)
             row = claim_row(claim, f"{label}: {name.removesuffix(', differences')}", finding)
-            rows.append(row._replace(reason=f"{row.reason}; {_origin(stored)}"))
+            rows.append(row._replace(reason=f"{row.reason}; stored by paper/design_studies.py"))
     return rows
 
 
@@ -49,9 +46,3 @@ def _saved(values: dict[str, float], study: str, name: str, full: str) -> Findin
     ratio = (spent + offline) / values[f"{study} {full} search, s"]
     seen = f"{offline:.2g} s of training, {spent:.2g} s of search"
     return Finding(ratio, 1.0, ratio < 1.0, text, seen, IN_WORDS)
-
-
-def _origin(stored: dict[str, Any]) -> str:
-    kernels = stored["kernels"].items()
-    other = any(kept_build(model).kernel_hash != kept for model, kept in kernels)
-    return f"stored, paper/design_studies.py{' (of other equations)' if other else ''}"

@@ -34,7 +34,7 @@ def figure_front() -> Figure:
         axis.set_title(f"{letter(k)} {title}")
         axis.set_xlabel("peak roll (mrad)")
     axes[0, 0].set_ylabel("yaw rate left (mrad/s)")
-    legend_outside(figure, [axes[0, 0]], columns=0)
+    legend_outside(figure, [axes[0, 0]], columns=3)
     return figure
 
 
