@@ -17,6 +17,7 @@ from vehiclemor.report.comparison.study import grid_rows
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
+from vehiclemor.report.html.study_table import error_table, places
 from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
@@ -135,6 +136,17 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "a run has failed" in labels
     check_texts_of(figure)
+    # What a protocol would not trust has the status ok, and a remark.
+    data["remark"] = data["remark"].astype(object)
+    data["remark"].loc[there | {"frequency_factor": 1.0}] = "not driven; not to be trusted on Mars"
+    data["remark"].loc[there | {"frequency_factor": 0.8}] = "not driven"
+    now = {(r["method"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
+    more = {key[:2] for key, count in now.items() if count != before[key]["warned"]}
+    assert more == {("mine", "dropped")}
+    told = [row for row in places(data) if row["warned"] and row["remark"].endswith("Mars")]
+    last = [line[-1] for line in error_table(data, told).rows]
+    assert [c.kind for c in last] == ["missed"]
+    assert last[0].text == "ok: not driven; not to be trusted on Mars"
     data["status"][:] = "diverged"
     assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
     assert plot_result(data, None, "errors").axes

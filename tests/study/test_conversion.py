@@ -87,6 +87,18 @@ def test_wrong_conversions_leave_nothing(study, tmp_path, monkeypatch, name, arg
     assert (tmp_path / "there.csv").read_text() == "kept"
 
 
+def test_formats_of_one_result_share_their_columns(study, tmp_path):
+    pytest.importorskip("pyarrow")
+    _, folder = study
+    for to in ("csv", "parquet"):
+        vm.convert(folder / "mine.toml", to, tmp_path / f"a.{to}", results=folder / "results")
+    (tmp_path / "b.columns.csv").write_text("kept")
+    with pytest.raises(VehiclemorError, match=r"b\.columns\.csv: exists already"):
+        vm.convert(folder / "mine.toml", "csv", tmp_path / "b.csv", results=folder / "results")
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"a.csv", "a.parquet", "a.columns.csv", "b.columns.csv"}
+
+
 def test_a_missing_engine_is_one_line(study, tmp_path, monkeypatch):
     _, folder = study
     monkeypatch.setattr(study_formats, "find_spec", lambda _: None)

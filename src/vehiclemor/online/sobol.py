@@ -68,7 +68,8 @@ def sobol_indices(
     xarray.Dataset
         `first_order` and `total_order` (objective, parameter) with the ends `_low` and `_high` of
         their 95 % intervals, `mean` and `standard_deviation` (objective,) of the objectives, and
-        the CPU seconds of all in the attributes.
+        the CPU seconds of all in the attributes; `untrusted` counts the runs that the reduced model
+        doesn't trust, and `remark` says why the first of them isn't.
 
     Raises
     ------
@@ -81,6 +82,8 @@ def sobol_indices(
     reduced = model_behind(model)
     chosen = [objective(objectives)] if isinstance(objectives, str) else _all(objectives)
     names, ranges = list(box), _ranges(box)
+    if len(names) == 1:
+        raise InputError(f"box has {names[0]} alone: all of the spread is its doing")
     if count("samples", samples) & (samples - 1):
         raise InputError(f"samples is {samples}, not a power of two")
     runs = _Runs(reduced, chosen, names, maneuver, start, jobs)
@@ -110,6 +113,7 @@ class _Runs:
         self.reduced, self.objectives, self.names = reduced, objectives, names
         self.maneuver, self.start, self.jobs = checked_maneuver(chosen, definition), start, jobs
         self.values: list[np.ndarray] = []
+        self.untrusted: list[str] = []
         known = {*reduced.output_names, *reduced.inputs}
         for own in objectives:
             if missing := [name for name in own.histories if name not in known]:
@@ -137,6 +141,8 @@ class _Runs:
             told = found.isel(run=int(bad[0]))
             reason = str(told["message"].item()) or "an objective has no value"
             raise InputError(f"{len(bad)} of {places.shape[1]} cars in the box fail: {reason}")
+        untrusted = found["status"].values == "untrusted"
+        self.untrusted += found["message"].values[untrusted].tolist()
         # They are centred in place by who asked.
         self.values.append(values.copy())
         return values
@@ -194,6 +200,7 @@ def _dataset(
     }
     count = sum(part.shape[1] for part in runs.values)
     about = {"runs": count, "seconds": seconds, "method": runs.reduced.method} | how
+    about |= {"untrusted": len(runs.untrusted), "remark": next(iter(runs.untrusted), "")}
     title = f"Sobol indices of {model.name}, {runs.reduced.method}"
     made = attributes(title, model.kernel_hash, model=model.name, maneuver=runs.maneuver.name)
     return xr.Dataset(variables, coordinates, made | about)

@@ -13,6 +13,9 @@ from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
 
+# Of a remark, see study/evaluate.py.
+UNTRUSTED = "not to be trusted"
+
 
 def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
     """Every run of a model in the paper's studies; of another model, of every method.
@@ -78,6 +81,14 @@ def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
                 entry = {"group": group, "unit": unit, "quantity": worst, "rms": part.max()}
                 rows.append(place | entry)
     return pd.DataFrame(rows)
+
+
+def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
+    """Which runs of a study aren't trusted: by the method (status), or as a protocol would judge.
+
+    A study leaves the second to its remarks, so that errors of such runs are still shown.
+    """
+    return (dataset["status"] == "untrusted") | dataset["remark"].str.contains(UNTRUSTED)
 
 
 def flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:

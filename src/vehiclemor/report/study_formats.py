@@ -13,7 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.files import write_folder, write_whole
+from vehiclemor.files import write_folder, write_text, write_whole
 from vehiclemor.registry import unknown
 from vehiclemor.report.result_selection import stored_result
 from vehiclemor.study.netcdf_file import PART, regions
@@ -64,9 +64,8 @@ def convert(
     if not path.name:
         raise InputError(f"out: {path} is a folder, not a new file")
     columns = path.with_suffix(".columns.csv")
-    for target in (path,) if to == "zarr" else (path, columns):
-        if target.exists():
-            raise FileError(f"{target}: exists already; move it away")
+    if path.exists():
+        raise FileError(f"{path}: exists already; move it away")
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no such folder")
     dataset = stored_result(name, file_path("results", results))
@@ -75,8 +74,11 @@ def convert(
     if to == "zarr":
         _write_zarr(dataset, path)
         return path
-    described = _columns(dataset)
-    write_whole(columns, lambda file: described.to_csv(file, index=False))
+    described = _columns(dataset).to_csv(index=False)
+    # Those of another format of the same result are the same.
+    if columns.exists() and columns.read_bytes() != described.encode():
+        raise FileError(f"{columns}: exists already; move it away")
+    write_text(columns, described)
     write = _write_csv if to == "csv" else _write_parquet
     return write_whole(path, partial(write, tables(dataset)))
 

@@ -45,6 +45,18 @@ def test_indices_of_a_small_box_are_those_of_the_gradient(travel, box):
     np.testing.assert_array_equal(again["total_order"], found["total_order"])
 
 
+def test_runs_beyond_the_cars_of_a_reduced_model_are_counted(travel, box):
+    given = {"maneuver": travel, "samples": 8, "jobs": 1}
+    known = vm.reduce(WISHBONE, "pod", training="nominal", cars=box)
+    inside = vm.sobol_indices(known, "bump_steer", box, **given)
+    assert (inside.attrs["untrusted"], inside.attrs["remark"]) == (0, "")
+    wide = {name: (low - 3.0 * (high - low), high) for name, (low, high) in box.items()}
+    beyond = vm.sobol_indices(known, "bump_steer", wide, **given)
+    # A quarter of each range is known.
+    assert 0.8 * beyond.attrs["runs"] < beyond.attrs["untrusted"] <= beyond.attrs["runs"]
+    assert "the cars of the training have" in beyond.attrs["remark"]
+
+
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
@@ -52,8 +64,9 @@ def test_indices_of_a_small_box_are_those_of_the_gradient(travel, box):
         ({"box": {}}, "box is {}"),
         ({"box": {POINTS[0]: 3.0}}, "not the two ends of a range"),
         ({"box": {POINTS[0]: (0.2, 0.1)}}, "not the two ends of a range"),
-        ({"box": {"tie_rod.z": (0.1, 0.2)}}, "is not a parameter"),
-        ({"box": {POINTS[0]: (0.1, 0.9)}}, "cars in the box fail"),
+        ({"box": {"tie_rod.z": (0.1, 0.2), POINTS[0]: (0.1, 0.2)}}, "is not a parameter"),
+        ({"box": {POINTS[0]: (0.1, 0.2)}}, "tie_rod_inner.z alone"),
+        ({"box": {POINTS[0]: (0.1, 0.9), POINTS[1]: (0.1, 0.2)}}, "cars in the box fail"),
         ({"objectives": []}, "objectives is []"),
         ({"objectives": "roll"}, "unknown objective"),
         ({"objectives": "peak_roll"}, "peak_roll needs roll"),

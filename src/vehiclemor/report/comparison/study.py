@@ -10,6 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.registry import component
+from vehiclemor.report.errors import warned_runs
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.rows import protocol_rows
 from vehiclemor.report.predictive.text import predictive_text
@@ -37,7 +38,7 @@ LEGEND = {
     "floor": "RMS error of the best approximation of the coordinates in the same subspaces, at "
     "that place; -: exactly zero, or none",
     "failed": "of all runs; what is repeated in the grid, since it does not depend on a setting, "
-    "counts once",
+    "counts once; warned: runs that the method, or a protocol, would not trust",
     "us": "CPU time of the compiled loop by its own account, median of the runs, each measured "
     "once beside whatever else ran: it orders methods, and costs are in vehiclemor compare MODEL; "
     "off.: offline, s, training and fit",
@@ -62,7 +63,8 @@ def study_comparison(study: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
 def grid_rows(dataset: xr.Dataset) -> list[Row]:
     """A row for each method, start and output of a combined dataset.
 
-    `runs` are different ones, `failures` says how those that have `failed` ended; of the others
+    `runs` are different ones, `failures` says how those that have `failed` ended, `warned` counts
+    those that aren't trusted (`warned_runs`); of those that have ended
     `median` and `largest` are RMS errors over the grid, `largest_deviation` is at one time;
     `largest_at` is the place of the largest RMS error, `floor` that of the best approximation
     there.  `seconds` (of the compiled loop), `offline_seconds` and `evaluations` are medians.
@@ -77,7 +79,8 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     }
     count = EVALUATIONS[component("model", head["model"]).kind]
     errors = ["rms_error", "max_error", "floor_rms_error"]
-    small = dataset[[*errors, "cell_key", "status", "seconds", "offline_seconds", count]].load()
+    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count]
+    small = dataset[kept].assign(warned=warned_runs(dataset)).load()
     rows: list[Row] = []
     for start in dataset["start"].values:
         for method in dataset["method"].values:
@@ -119,7 +122,7 @@ def _rows_of_method(part: xr.Dataset, count: str) -> list[Row]:
         "runs": status.size,
         "failed": failures.total(),
         "failures": ", ".join(f"{n} {name}" for name, n in failures.most_common()),
-        "untrusted": int((status == "untrusted").sum()),
+        "warned": int(part["warned"].sum()),
         **{name: _median(part[name].values[ended]) for name in ("seconds", "offline_seconds")},
         "evaluations": _median(part[count].values[ended]),
     }
@@ -187,7 +190,7 @@ def _grid_text(rows: list[Row]) -> str:
         ]
     tables = [
         table_text(["", "median", "largest", "floor", "at"], errors, (0, 4)),
-        table_text(["", "runs", "failed", "evaluations", "us", "off."], costs),
+        table_text(["", "runs", "failed", "warned", "evaluations", "us", "off."], costs),
     ]
     parts = [wrapped(head), wrapped(about, 2, 2), tables[0], notes.text(), tables[1]]
     return "\n".join(filter(None, parts))
@@ -203,5 +206,5 @@ def _error_cells(row: Row, notes: Footnotes) -> list[str]:
 
 def _cost_cells(row: Row) -> list[str]:
     cells = [f"  {row['method']}", f"{row['runs']:.0f}", row["failures"] or "0"]
-    cells += [fixed(row["evaluations"], 0), fixed(1e6 * row["seconds"], 1)]
+    cells += [f"{row['warned']:.0f}", fixed(row["evaluations"], 0), fixed(1e6 * row["seconds"], 1)]
     return [*cells, short(row["offline_seconds"]) if row["offline_seconds"] else "-"]

@@ -34,7 +34,7 @@ from vehiclemor.report.figures.lines import (
 from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
-from vehiclemor.report.labels import method_text, unit_of
+from vehiclemor.report.labels import label_of, method_text, unit_of
 from vehiclemor.report.result_selection import drawn
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
         look = {"color": style["color"], "marker": marker, "linestyle": "none", "markersize": 5}
         axis.semilogx(share, places, label=method_text(label), **look)
     tick_decades(axis.xaxis, *axis.get_xlim())
-    axis.set_yticks(places, [name.replace("_", " ") for name in names], fontsize=7)
+    axis.set_yticks(places, [label_of(name).words for name in names], fontsize=7)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlabel("RMS error (% of the output's range)")
     legend_outside(figure, [axis], 0, place="lower")

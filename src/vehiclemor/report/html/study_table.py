@@ -5,11 +5,12 @@ from typing import Any
 
 import xarray as xr
 
-from vehiclemor.report.errors import flat
+from vehiclemor.report.errors import flat, warned_runs
 from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.parts import MISSING, Entry, Table, count, quantity
 from vehiclemor.report.html.provenance import name_of
 from vehiclemor.report.labels import label_of, method_text, unit_of
+from vehiclemor.study.plans.study_file import PARAMETER
 
 # A table with more rows is summed up.
 MOST_ROWS = 200
@@ -26,8 +27,11 @@ Place = dict[str, Any]
 def places(dataset: xr.Dataset) -> list[Place]:
     """Every place of the grid: values, errors, counts, status, and the anchor of its cell."""
     table = flat(dataset, tuple(shown_outputs(dataset)))
+    dims = dataset["status"].dims
+    for name, values in {"remark": dataset["remark"], "warned": warned_runs(dataset)}.items():
+        table[name] = values.transpose(*dims).values.ravel()
     if "cell_key" in dataset:
-        keys = dataset["cell_key"].transpose(*dataset["status"].dims).values.ravel()
+        keys = dataset["cell_key"].transpose(*dims).values.ravel()
         table["anchor"] = [f"cell-{key}" for key in keys]
     else:
         # Stored before cells were named.
@@ -69,8 +73,9 @@ def _every(rows: Sequence[Place], outputs: dict[str, str], grid: list[str]) -> T
         line += [quantity(row[f"rms_{output}"], anchor) for output in outputs]
         line += [count(int(row[name]), anchor) for name in counts]
         status = str(row["status"])
-        told = status if status == "ok" else f"{status}: {row['message']}"
-        entries.append([*line, Entry(told, None, anchor, "met" if status == "ok" else "missed")])
+        said = row["message"] if status != "ok" else row["remark"] if row["warned"] else ""
+        told = f"{status}: {said}" if said else status
+        entries.append([*line, Entry(told, None, anchor, "missed" if said else "met")])
     return Table("Every place of the grid", _words(heads), entries, NOTE)
 
 
@@ -96,7 +101,7 @@ def _summary(rows: Sequence[Place], outputs: dict[str, str], grid: list[str]) ->
 
 
 def _words(heads: Sequence[str]) -> tuple[str, ...]:
-    return tuple(head.replace("_", " ") for head in heads)
+    return tuple(head.removeprefix(PARAMETER).replace("_", " ") for head in heads)
 
 
 def _coordinate(value: Any) -> Entry:
