@@ -377,8 +377,8 @@ def test_table_of_settings_records_what_does_not_fit(tmp_path):
 def test_only_what_is_missed_counts_for_the_exit_status(monkeypatch, what, verdicts, status):
     import pandas as pd
 
-    from vehiclemor import api
+    from vehiclemor.report.comparison import kinds
 
     rows = pd.DataFrame({"verdict": verdicts})
-    monkeypatch.setattr(api, "compare", lambda *_: rows)
+    monkeypatch.setattr(kinds, "compare", lambda *_: rows)
     assert main(["compare", what, "--json"]) == status
