@@ -116,7 +116,7 @@ def doubt(errors: np.ndarray, first: np.ndarray) -> str:
     worst = float(np.max(errors / np.maximum(first, 1.0), initial=0.0))
     if worst <= TRUSTED:
         return ""
-    return f"on runs of this car that check it, it errs {worst:.2g} times as much as on the first"
+    return f"errors in runs that check this car, {worst:.2g} times those of the first car"
 
 
 def _start(model: DynamicModel, faster: float) -> Start:
