@@ -390,6 +390,8 @@ def reduce(
         raise InputError(reason)
     complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
     definition.check(ready, complete)
+    if isinstance(cars, Mapping) and not cars:
+        raise InputError("cars: a box without parameters")
     scenarios = of_cars(ready, training_set(ready, method, training), cars)
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]

@@ -73,6 +73,8 @@ def sensitivities(
     chosen = full.definition.maneuver if maneuver is None else maneuver
     if isinstance(chosen, str):
         chosen = component("maneuver", chosen)
+    if isinstance(parameters, list) and any(parameters.count(name) > 1 for name in parameters):
+        raise InputError("parameters has the same name twice")
     how = parameters, start, None if tolerance is None else number("tolerance", tolerance)
     if isinstance(ready, ReducedOrderModel) and ready.method != "full_order":
         found = reduced_sensitivities(ready, chosen, *how)

@@ -104,6 +104,7 @@ def test_the_full_order_is_the_model_itself(step, found):
     [
         ({"parameters": "mass"}, "'mass' is not a parameter"),
         ({"parameters": []}, "parameters are none"),
+        ({"parameters": ["PKY1", "PKY1"]}, "the same name twice"),
         ({"model": 3}, "model is 3"),
         ({"maneuver": "step_stear"}, "did you mean step_steer"),
         ({"start": "droped"}, "unknown start"),

@@ -160,6 +160,7 @@ WRONG = {
     "no-parameter": ({"mass": [1.0, 2.0]}, "is not a parameter"),
     "ends": ({"sprung_mass": [1100.0, 900.0]}, "not the two ends of a range"),
     "number": ({"sprung_mass": 900.0}, "not the two ends of a range"),
+    "empty-box": ({}, "a box without parameters"),
     "no-cars": ("heavy", "neither ranges of parameters nor a list of cars"),
     "no-car": ([900.0], "neither ranges of parameters nor a list of cars"),
     "impossible": ({"whole_car_yaw_inertia": [300.0, 2000.0]}, "no body has"),
