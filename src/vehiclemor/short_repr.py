@@ -40,8 +40,9 @@ def _short(value: Any) -> str:
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple):
         return f"{type(value).__name__}{shape}"
-    if isinstance(value, ShortRepr) and (name := getattr(value, "name", "")):
-        return f"{type(value).__name__} {name!r}"
+    if isinstance(value, ShortRepr):
+        name = getattr(value, "name", "")
+        return f"{type(value).__name__} {name!r}" if name else f"{type(value).__name__}(...)"
     if isinstance(value, Mapping):
         return f"{{{', '.join(map(str, [*value][:4]))}{', ...' if len(value) > 4 else ''}}}"
     if callable(value):

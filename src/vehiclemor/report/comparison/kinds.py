@@ -55,7 +55,7 @@ def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> 
         from vehiclemor.report.comparison.model import model_comparison
 
         return model_comparison(what, folder, jobs)
-    if what in data_names("studies") or what.endswith(".toml"):
+    if isinstance(what, str) and (what in data_names("studies") or what.endswith(".toml")):
         from vehiclemor.report.comparison.study import study_comparison
 
         return study_comparison(what, folder, jobs)
