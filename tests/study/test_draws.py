@@ -1,5 +1,7 @@
 """Sealed draws: what they depend on, what they hold, what is kept of them."""
 
+import hashlib
+import json
 import math
 from dataclasses import replace
 
@@ -16,12 +18,13 @@ from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.resources import data_names
 from vehiclemor.study.plans.boxes import drawn
 from vehiclemor.study.plans.choice import Row, outcomes
-from vehiclemor.study.plans.ledger import Drawn, Ledger, Shown, pooled
+from vehiclemor.study.plans.ledger import Drawn, Ledger, Shown, pooled, same_rules
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_file import Bound, Box, Draw
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.seal import seal, sealed_sets
+from vehiclemor.study.plans.seal import rules, seal, sealed_sets
 from vehiclemor.study.plans.sensitive import _lifted, reasons
+from vehiclemor.study.scenario import parameters_of
 
 BOX = Box(maneuver="sine_travel", frequency=[0.7, 1.8], amplitude=[0.5, 1.1], start=["equilibrium"])
 
@@ -268,3 +271,19 @@ def test_the_ledger_of_the_package_can_be_read(name, tmp_path):
     for draw in Ledger(name, tmp_path, own=True).entries():
         assert len(draw.digest) == len(draw.rules) == 64
         assert draw.model == name
+
+
+@pytest.mark.parametrize("name", sorted(data_names("protocols")))
+def test_rules_that_are_called_the_same_differ_by_a_null_key_alone(name):
+    def without(content):
+        if isinstance(content, dict):
+            items = content.items()
+            return {k: without(v) for k, v in items if not (k == "cars" and v is None)}
+        return [without(entry) for entry in content] if isinstance(content, list) else content
+
+    own = load_protocol(name)
+    content = own.definition.model_dump(include={"sensitive", "drawn", "drawn_outside"})
+    content["bounds"] = {o: [b.measure, b.bound] for o, b in own.definition.bounds.items()}
+    text = json.dumps([without(content), parameters_of(own.model)], sort_keys=True)
+    before = hashlib.sha256(text.encode()).hexdigest()
+    assert same_rules().get(before, rules(own)) == rules(own)

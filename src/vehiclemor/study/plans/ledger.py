@@ -18,6 +18,7 @@ from vehiclemor.codegen.process_lock import locked
 from vehiclemor.errors import FileError
 from vehiclemor.files import write_text
 from vehiclemor.resources import checkout_data, data_folder
+from vehiclemor.toml_files import FileSchema, read_toml
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -94,6 +95,8 @@ class Ledger:
         for path in self._read:
             known = [entry.result for entry in found]
             found += [entry for entry in _entries(path) if entry.result not in known]
+        same = same_rules()
+        found = [replace(entry, rules=same.get(entry.rules, entry.rules)) for entry in found]
         return sorted(found, key=lambda entry: entry.date)
 
     def open(self, entry: Drawn) -> None:
@@ -115,6 +118,18 @@ class Ledger:
                 kept = [other for other in known if other not in same or other.rows]
                 lines = [_adapter().dump_json(e).decode() for e in (*kept, entry)]
                 write_text(path, "\n".join(lines) + "\n")
+
+
+class RulesFile(FileSchema):
+    """Schema of `data/draws/same_rules.toml`."""
+
+    rules: dict[str, str]
+
+
+@cache
+def same_rules() -> dict[str, str]:
+    """Hash of the rules of earlier draws -> hash that the same rules have now."""
+    return read_toml(data_folder() / FOLDER / "same_rules.toml", RulesFile).rules
 
 
 def pooled(entries: Iterable[Drawn], rules: str, row: str | None = None) -> tuple[int, int, int]:
