@@ -363,7 +363,7 @@ FRAMES = """<!DOCTYPE html><body><p id="told">nothing</p>
 <iframe src="{name}" width="1400" height="3000"></iframe>
 <script>
 const pages = () => [...document.querySelectorAll("iframe")].map((f) => f.contentDocument);
-let left = 60;
+let left = 700;
 function tell() {{
   const found = pages().map((page) => [
     page.documentElement.scrollWidth - page.documentElement.clientWidth,
@@ -383,7 +383,8 @@ def test_a_browser_shows_it_without_errors_at_both_widths(made, tmp_path):
     flags = "headless no-sandbox disable-gpu no-first-run disable-background-networking"
     flags += " disable-component-update disable-sync allow-file-access-from-files dump-dom"
     options = [f"--{flag}" for flag in flags.split()]
-    options += ["--enable-logging=stderr", "--virtual-time-budget=20000", "--window-size=1900,3000"]
+    options += ["--enable-logging=stderr", "--virtual-time-budget=200000"]
+    options += ["--window-size=1900,3000"]
     done = subprocess.run(
         [CHROMIUM, *options, f"--user-data-dir={tmp_path}", frames.as_uri()],
         capture_output=True,
