@@ -70,26 +70,28 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
     """
     temporary = temporary_path((folder or path.parent) / path.name)
     try:
-        write(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise not_written(path, error) from None
+        return _moved(temporary, path, write)
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
-    return path
 
 
 def write_folder(path: Path, write: Callable[[Path], object]) -> Path:
     """As `write_whole`, of a folder that is not there yet."""
     temporary = temporary_path(path.absolute())
     try:
+        return _moved(temporary, path, write)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _moved(temporary: Path, path: Path, write: Callable[[Path], object]) -> Path:
+    """Fill a temporary file or folder, and move it into place."""
+    try:
         write(temporary)
         os.replace(temporary, path)
     except OSError as error:
         raise not_written(path, error) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
     return path
 
 
