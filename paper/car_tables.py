@@ -38,7 +38,7 @@ def latin_hypercube(folder: Path) -> str:
         title = _title(load_protocol(f"cars-{model}").definition.title)
         rows = pd.DataFrame(kept["rows"])
         numbers = rows.select_dtypes("number").columns
-        rows[numbers] = rows[numbers].map(short)
+        rows[numbers] = rows[numbers].map(lambda v: f"{v:.0f}" if v >= 100.0 else short(v))
         parts.append(f"{title}, {kept['cars']} cars:\n\n{markdown(rows)}")
         name = f"design-space-{model}.png"
         if (FIGURES / name).exists():
