@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.reduction.car_checks import CHECKING, Input, registered
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import (
@@ -23,24 +25,53 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     spread,
     targets,
 )
+from vehiclemor.registry import component
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start
 
-# Runs that correct a car's model, beside those that check it; steps of the correction.
-CORRECTING, STEPS = 26, 2
+# Runs that correct a car's model, and further ones that check it; steps of the correction.
+CORRECTING, CHECKING, STEPS = 26, 4, 2
 # Their speeds lie apart by this part of how far training runs do.
 APART = 0.8
 # Weight of the prior, of one run of the training each.
 PRIOR = 0.3
+# How many times the first car's error on the same run, or 1 in the units of `trajectory_fit`, that
+# of another car may be.
+TRUSTED = 2.0
+
+
 SPEED = "initial_speed"
+
+
+class Input(NamedTuple):
+    """A registered maneuver with its factors."""
+
+    maneuver: str
+    frequency: float
+    amplitude: float
+
+    @property
+    def made(self) -> Maneuver:
+        """The maneuver itself."""
+        return component("maneuver", self.maneuver).perturbed(self.frequency, self.amplitude)
 
 
 def chosen_inputs(training: Training) -> tuple[Input, ...]:
     """Some inputs of the training, that are registered maneuvers."""
-    given = [registered(run.maneuver) for run in training]
-    known = [entry for entry in dict.fromkeys(given) if entry]
+    given = [
+        Input(m.name, m.frequency_factor, m.amplitude_factor)
+        for m in (run.maneuver for run in training)
+    ]
+    known = [entry for entry in dict.fromkeys(given) if _registered(entry)]
     return tuple(spread(known, (CORRECTING + CHECKING) / max(len(known), 1)))
+
+
+def _registered(entry: Input) -> bool:
+    try:
+        return bool(entry.made.samples)
+    except InputError:
+        return False
 
 
 def corrected(
@@ -78,6 +109,14 @@ def corrected(
     for _ in range(STEPS):
         fine = _stepped(fine, correcting, free, prior)
     return replace(fine, **online), run_errors(fine, checking)
+
+
+def doubt(errors: np.ndarray, first: np.ndarray) -> str:
+    """Why a car is not trusted, by its errors on the checking runs and those of the first car."""
+    worst = float(np.max(errors / np.maximum(first, 1.0), initial=0.0))
+    if worst <= TRUSTED:
+        return ""
+    return f"errors in runs that check this car, {worst:.2g} times those of the first car"
 
 
 def _start(model: DynamicModel, faster: float) -> Start:

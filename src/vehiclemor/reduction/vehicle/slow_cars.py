@@ -10,19 +10,19 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from typing import NamedTuple, cast
 
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.car_checks import Input, doubt
-from vehiclemor.reduction.cars import Cars, cars_of, difference, monomials
+from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.own_runs import chosen_inputs, corrected
+from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected, doubt
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_features import (
@@ -151,7 +151,7 @@ class Box(ShortRepr):
 
     def monomials(self, model: DynamicModel) -> np.ndarray:
         """Monomials (m,) of the place of a car."""
-        return monomials(self.cars.place(model), self.degree)
+        return _monomials(self.cars.place(model), self.degree)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +184,7 @@ class SlowVehicle(ReducedVehicle):
         found = replace(found, offline=offline_cost(began, model))
         if not len(box.errors):
             return replace(found, box=replace(box, errors=errors))
-        return replace(found, doubt=doubt(errors, np.maximum(box.errors, 1.0)))
+        return replace(found, doubt=doubt(errors, box.errors))
 
 
 def of_car(
@@ -240,7 +240,7 @@ def fitted_box(
     cars = cars_of(m.model for m in members)
     places = cars.places(cars.values)
     degree = _degree(*places.shape)
-    rows = monomials(places, degree)
+    rows = np.array([_monomials(place, degree) for place in places])
     turning = table.turning(members[0].shape, members[0].modes)
     vehicles, goals = [], []
     for m in members:
@@ -312,3 +312,11 @@ def _degree(cars: int, varied: int) -> int:
     if cars >= (varied + 1) * (varied + 2) // 2:
         return 2
     return 1 if cars > varied else 0
+
+
+def _monomials(place: np.ndarray, degree: int) -> np.ndarray:
+    """1, x_i, and products x_i x_j up to a degree."""
+    found = [1.0]
+    for power in range(1, degree + 1):
+        found += [float(np.prod(part)) for part in combinations_with_replacement(place, power)]
+    return np.array(found)
