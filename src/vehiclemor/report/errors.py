@@ -91,16 +91,14 @@ def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
     return (dataset["status"] == "untrusted") | dataset["remark"].str.contains(UNTRUSTED)
 
 
-def by_cars(dataset: xr.Dataset) -> xr.Dataset:
-    """A study whose axis `cars` has become part of its methods: what was trained on makes another.
+def by_cars(dataset: xr.Dataset, kept: Sequence[str]) -> xr.Dataset:
+    """Variables of cells of a study whose axis `cars` has become a part of its methods.
 
-    Variables are those with a value for each cell; a method that learns from no car stays one.
+    What a method was trained on makes another of it; one that learns from no car stays one.
     """
-    import xarray as xr
-
     if dataset.sizes.get("cars", 1) == 1:
-        return dataset
-    parts = []
+        return dataset[kept]
+    dataset, parts = dataset[[*kept, "cell_key"]], []
     for method in dataset["method"].values:
         part = dataset.sel({"method": [method]})
         learns = bool((part["cell_key"] != part["cell_key"].isel(cars=0)).any())

@@ -79,8 +79,8 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     }
     count = EVALUATIONS[component("model", head["model"]).kind]
     errors = ["rms_error", "max_error", "floor_rms_error"]
-    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count]
-    small = by_cars(dataset[kept].assign(warned=warned_runs(dataset)).load())
+    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count, "warned"]
+    small = by_cars(dataset.assign(warned=warned_runs(dataset)), kept).load()
     rows: list[Row] = []
     for start in dataset["start"].values:
         for method in small["method"].values:
