@@ -1,16 +1,19 @@
 """Measures reduced models of a box of cars on a Latin hypercube of its cars.
 
-Usage: python paper/design_space.py [--cars N] [--results DIR] [--figures DIR] [MODEL ...]
+Usage: python paper/design_space.py [--cars N] [--results DIR] [--figures DIR] [--kept FILE]
+[MODEL ...]
 
 Each vehicle is fitted once for the box of its protocol over cars; then every car drives the nominal
 lane change, on which all bases are trained, and another one.  Writes DIR/design_space-MODEL.nc and
-a figure, and prints a table: errors in parts of the protocol's bounds, misses, silent misses (those
-of which the model says nothing), warnings, and what a car and its run take.
+a figure, and a table, which it prints and keeps in data/design_space.json, for the handbook and
+`vehiclemor compare`: errors in parts of the protocol's bounds, misses, silent misses (those of
+which the model says nothing), warnings, and the CPU time of a car and its run.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,11 +25,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import vehiclemor as vm
-from vehiclemor.files import make_folder
+from vehiclemor.files import make_folder, write_text
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
+from vehiclemor.report.design_studies import FULL, KEPT, design_space
 from vehiclemor.report.figures.lines import legend_outside, panels, styles
 from vehiclemor.report.figures.saving import save_figure, styled
+from vehiclemor.resources import data_folder
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
 from vehiclemor.study.plans.protocol_file import Bound
@@ -36,10 +41,21 @@ SEED = 1000
 # Frequency and amplitude factors of the runs; bases are trained on the first.
 RUNS = {"trained input": (1.0, 1.0), "other input": (1.3, -1.2)}
 FITS: dict[str, dict[str, Any]] = {
+    FULL: {"method": "full_order", "solver": "ros34pw2", "tolerance": 3e-4, "cars": ()},
     "replay": {"method": "replay"},
     "POD, nominal basis": {"method": "pod", "cars": ()},
     "POD, concatenated basis": {"method": "pod"},
     "POD, interpolated bases": {"method": "pod", "bases": "interpolated"},
+}
+# As many modes of all cars together as keep the bounds: those that the vehicles have themselves.
+WHOLE: dict[str, dict[str, Any]] = {
+    "independent_suspension_vehicle": {"method": "pod", "rank": 13, "snapshots": 20},
+    "high_fidelity_vehicle": {
+        "method": "pod",
+        "formulation": "coordinates",
+        "rank": 14,
+        "snapshots": 14,
+    },
 }
 REFITTED = "POD, refitted"
 MANIFOLD = "nonlinearity = 'rich', terms = 32"
@@ -66,8 +82,10 @@ BEST: dict[str, dict[str, Any]] = {
 def fits(protocol: Protocol) -> dict[str, ReducedOrderModel]:
     """One reduced model for all cars by each method."""
     found, model, box = {}, protocol.model, protocol.definition.cars
-    best = BEST[model.name]
-    for label, given in (FITS | {best["method"]: best}).items():
+    best, whole = BEST[model.name], WHOLE[model.name]
+    label = f"POD, concatenated basis, r = {whole['rank']}"
+    further: dict[str, dict[str, Any]] = {label: whole, best["method"]: best}
+    for label, given in (FITS | further).items():
         began = time.perf_counter()
         found[label] = vm.reduce(model, **{"training": "nominal", "cars": box} | given)
         print(f"{label}: fitted in {time.perf_counter() - began:.1f} s", flush=True)
@@ -109,6 +127,8 @@ def measured(protocol: Protocol, count: int) -> xr.Dataset:
                 own = vm.reduce(car, "pod", training="nominal")
             else:
                 own = reduced[label].for_parameters(changed)
+            # Some of a car is made by its first run.
+            own.simulate(maneuvers[0])
             made[place, number] = time.thread_time() - began
             for k, (maneuver, true) in enumerate(zip(maneuvers, full, strict=True)):
                 began = time.thread_time()
@@ -119,6 +139,7 @@ def measured(protocol: Protocol, count: int) -> xr.Dataset:
                 if run.finished:
                     error = run.outputs - true.outputs
                     scores[place, number, k] = score(error, list(car.outputs), definition.bounds)
+            made[place, number] -= run_times[place, number, 0]
         if (number + 1) % 100 == 0:
             print(f"{number + 1} of {count} cars", flush=True)
     found = {
@@ -158,6 +179,15 @@ def table(data: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame(lines).set_index(["run", "method"])
 
 
+def keep(data: xr.Dataset, path: Path) -> None:
+    """Put the table of a model into the file of all."""
+    made = {name: str(data.attrs[name]) for name in ("kernel_hash", "versions", "machine")}
+    rows = table(data).reset_index().to_dict("records")
+    found = {"made": made, "cars": data.sizes["car"], "rows": rows}
+    content = design_space(path) | {str(data.attrs["model"]): found}
+    write_text(path, json.dumps(content, indent=1) + "\n")
+
+
 def figure(data: xr.Dataset) -> Figure:
     """Share of the cars whose largest error, in parts of its bound, is above a value."""
     drawn, axes = panels(1, len(data["run"]), (6.7, 3.4), sharey=True, sharex=True)
@@ -183,12 +213,15 @@ def main() -> None:
     parser.add_argument("--cars", type=int, default=1000, help="cars of the Latin hypercube")
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
     parser.add_argument("--figures", type=Path, default=Path("paper/figures"), help="of figures")
+    kept = data_folder() / KEPT
+    parser.add_argument("--kept", type=Path, default=kept, metavar="FILE", help="of tables")
     given = parser.parse_args()
     make_folder(given.results)
     make_folder(given.figures)
     for model in given.models:
         data = measured(load_protocol(f"cars-{model}"), given.cars)
         write_dataset(data, given.results / f"design_space-{model}.nc")
+        keep(data, given.kept)
         with styled():
             save_figure(figure(data), given.figures / f"design-space-{model}.png")
         print(f"\n{data.attrs['title']}\n{table(data).round(3).to_string()}\n", flush=True)

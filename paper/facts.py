@@ -23,7 +23,16 @@ from typing import TYPE_CHECKING, Any
 import faults
 import in_use
 import scaling
-from fragments import ROOT, manifest, printed_numbers, rendered, rewritten
+from car_tables import TABLES
+from fragments import (
+    ROOT,
+    manifest,
+    printed_numbers,
+    rendered,
+    rewritten,
+    tables_in,
+    with_tables,
+)
 
 from vehiclemor import VehiclemorError
 from vehiclemor.files import write_text
@@ -194,9 +203,9 @@ def _commit() -> str:
 
 
 def stored_facts() -> dict[str, dict[str, dict[str, Any]]]:
-    """What `facts.json` holds: `sources` and `facts`."""
+    """What `facts.json` holds: `sources`, `facts` and `tables`."""
     if not FACTS.exists():
-        return {"sources": {}, "facts": {}}
+        return {"sources": {}, "facts": {}, "tables": {}}
     return json.loads(FACTS.read_text(encoding="utf-8"))
 
 
@@ -232,7 +241,17 @@ def measure(folder: Path, jobs: int, stored_only: bool) -> list[str]:
         ]
         text = (ROOT / file).read_text(encoding="utf-8")
         write_text(ROOT / file, rewritten(text, new))
-    write_text(FACTS, _lines({"sources": origins, "facts": facts}))
+    tables, today = known.get("tables", {}), datetime.now(UTC).date().isoformat()
+    for file in declared.tables:
+        text = (ROOT / file).read_text(encoding="utf-8")
+        for name in tables_in(text):
+            if new := TABLES[name](folder):
+                tables[name] = {"date": today, "commit": _commit(), "text": new}
+            else:
+                stale.append(f"table {name}: nothing is stored in {folder}")
+        new = with_tables(text, {name: str(table["text"]) for name, table in tables.items()})
+        write_text(ROOT / file, new)
+    write_text(FACTS, _lines({"sources": origins, "facts": facts, "tables": tables}))
     return stale
 
 

@@ -10,8 +10,8 @@ from vehiclemor.study.run import run_studies
 def few_rounds():
     """Times are measured, but no test asks how well."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(timing, "CASE_ROUNDS", 3)
-        patch.setattr(timing, "FITS", 2)
+        patch.setattr(timing, "CASE_ROUNDS", 2)
+        patch.setattr(timing, "FITS", 1)
         yield
 
 

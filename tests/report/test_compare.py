@@ -7,6 +7,7 @@ import pytest
 
 from vehiclemor.cli import main
 from vehiclemor.report import errors, tables
+from vehiclemor.report.comparison import kinds
 from vehiclemor.report.comparison.paper import paper_comparison
 from vehiclemor.report.comparison.rows import ALL_MODELS, COLUMNS, Row
 from vehiclemor.report.comparison.times import agreement_rows, slower_row, time_rows
@@ -297,7 +298,8 @@ def test_command_prints_json_and_says_that_bounds_are_missed(results_folder, cap
     assert set(printed[0]) == set(COLUMNS)
 
 
-def test_command_prints_a_summary_and_tables_that_fit(results_folder, capsys, monkeypatch):
+def test_command_prints_a_summary_and_tables_that_fit(results_folder, capsys, monkeypatch, rows):
+    monkeypatch.setattr(kinds, "compare", lambda *_: rows)
     monkeypatch.setenv("COLUMNS", "80")
     main(["compare", "--out", str(results_folder)])
     printed = capsys.readouterr().out
@@ -376,8 +378,6 @@ def test_table_of_settings_records_what_does_not_fit(tmp_path):
 )
 def test_only_what_is_missed_counts_for_the_exit_status(monkeypatch, what, verdicts, status):
     import pandas as pd
-
-    from vehiclemor.report.comparison import kinds
 
     rows = pd.DataFrame({"verdict": verdicts})
     monkeypatch.setattr(kinds, "compare", lambda *_: rows)

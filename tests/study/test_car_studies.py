@@ -8,6 +8,7 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.errors import FileError
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.report.figures.sampled_errors import figure_samples
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.sampling import sampled
 from vehiclemor.study.plans.study_file import Sampling, StudyFile
@@ -112,6 +113,37 @@ ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], amplitude_factor = [0.5
         )
         expected = float(alone["signal_range"].sel(output="toe"))
         assert float(ranges[index]) == expected
+
+
+def test_cars_that_are_trained_on_are_told_apart_by_what_learns_from_them(study, tmp_path):
+    found = study(
+        SUSPENSION
+        + """
+methods = [{ method = "pod" }, { method = "full_order" }, { method = "path_map" }]
+[car_sets]
+ends = [{ "tie_rod_inner.z" = -0.1 }, { "tie_rod_inner.z" = -0.09 }]
+[grid]
+cars = ["own", "ends"]
+[sampling]
+plan = "latin_hypercube"
+count = 3
+seed = 1
+ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09] }
+"""
+    )
+    keys = found["cell_key"].squeeze().transpose("method", "cars", "sample").values
+    assert [len(set(own.ravel())) for own in keys] == [6, 3, 3]
+    rows = vm.compare(str(tmp_path / "mine.toml"), out=tmp_path / "results")
+    errors = rows[rows["output"] == "toe"].set_index("method")
+    labels = ["pod, cars own", "pod, cars ends", "full_order", "path_map"]
+    assert list(errors.index) == labels
+    assert (errors["runs"] == 3).all()
+    for cars in ("own", "ends"):
+        own = found["rms_error"].sel({"method": "pod", "cars": cars, "output": "toe"})
+        assert errors.loc[f"pod, cars {cars}", "largest"] == float(own.max())
+    figure = figure_samples(found, ["toe"])
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[:3] == ["POD, cars own", "POD, cars ends", "path map"]
 
 
 @pytest.mark.parametrize("plan", ["latin_hypercube", "sobol"])

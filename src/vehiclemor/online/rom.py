@@ -14,6 +14,7 @@ from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.training import training_set
+from vehiclemor.reduction.car_checks import doubted
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -145,8 +146,9 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def outside(self) -> Trust | None:
-        """What is told of the car, if it lies beyond those of the training."""
-        return self.input_range.outside(component("method", self.method), self.model)
+        """What is told of the car, if it lies beyond those of the training or is doubted."""
+        told = self.input_range.outside(component("method", self.method), self.model)
+        return told or doubted(self.reduced)
 
     @cached_property
     def _range(self) -> InputRange | None:
@@ -271,7 +273,7 @@ class ReducedOrderModel(ShortRepr):
         not in a state.
         """
         states, u, _ = self._samples(state, inputs)
-        found = self.state_space.trust(states, u)
+        found = self.outside or self.state_space.trust(states, u)
         if found is None and self._range is not None:
             found = self._range.trust_of_inputs(self.inputs, u)
         left = self._left_validity(states, u)

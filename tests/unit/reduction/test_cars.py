@@ -98,6 +98,9 @@ def test_replay_gives_the_run_of_the_nearest_car_as_that_car_had_it():
     replay = vm.reduce(car(), "replay", training="nominal", cars=[HEAVY, HEAVIER])
     run = replay.for_parameters({"sprung_mass": 1040.0, "PKY1": -21.0}).simulate()
     np.testing.assert_array_equal(run.outputs, heavy().simulate(LANE).outputs)
+    assert run.status == "untrusted"
+    assert "run of a car with another sprung_mass" in run.message
+    assert replay.for_parameters(HEAVY).simulate().status == "ok"
 
 
 @pytest.mark.parametrize("bases", ["concatenated", "interpolated"])
@@ -124,17 +127,50 @@ def test_interpolated_bases_predict_cars_between_that_other_bases_do_not():
 
 
 def test_cars_beyond_the_box_are_not_trusted():
-    inside, beyond = (of_box().for_parameters(p).simulate() for p in (HEAVY, HEAVIER))
+    box = of_box("interpolated")
+    inside, beyond = (box.for_parameters(p).simulate() for p in (HEAVY, HEAVIER))
     assert inside.status == "ok"
     assert beyond.status == "untrusted"
     assert "sprung_mass is 1300; the cars of the training have 800 to 1100" in beyond.message
     alone = vm.reduce(car(), "pod", training="nominal").for_parameters(HEAVY).simulate()
     assert alone.status == "untrusted"
     # How a run starts is not which car it is.
-    dropped = of_box().for_parameters({"drop_height": 0.02, "initial_speed": 19.9})
+    dropped = box.for_parameters({"drop_height": 0.02})
     assert dropped.simulate().status == "ok"
-    batch = vm.simulate_many(of_box().for_parameters(HEAVIER), [LANE, LANE.perturbed(1.0, 0.9)])
+    # But POD of one run drives at its speed, whatever that of another is.
+    slower = box.for_parameters({"initial_speed": 19.9})
+    assert not slower.input_range.outside(component("method", "pod"), slower.model)
+    assert "runs that check this car" in slower.simulate().message
+    batch = vm.simulate_many(box.for_parameters(HEAVIER), [LANE, LANE.perturbed(1.0, 0.9)])
     assert set(batch["status"].values.tolist()) == {"untrusted"}
+
+
+def test_a_car_is_doubted_where_the_basis_of_the_box_is_far_worse_than_its_own():
+    joined, between = of_box(), of_box("interpolated")
+    for parameters in ({}, HEAVY):
+        model = reparametrised(car(), parameters)
+        own = roll_errors(model, vm.reduce(model, "pod", training="nominal").simulate())
+        bad, good = (rom.for_parameters(parameters) for rom in (joined, between))
+        assert bad.reduced.doubt
+        assert bad.simulate().status == "untrusted"
+        assert "times those of a model of the first car alone" in bad.simulate().message
+        assert roll_errors(model, bad.simulate()) > 3.0 * own
+        assert not good.reduced.doubt
+        assert good.simulate().status == "ok"
+        assert roll_errors(model, good.simulate()) < 3.0 * own
+    assert joined.simulate().status == "untrusted"
+    batch = vm.simulate_many(joined.for_parameters(HEAVY), [LANE])
+    assert batch["status"].item() == "untrusted"
+    state = joined.state()
+    assert joined.trust(state, np.zeros(1)).reason
+
+
+def test_cars_are_checked_by_inputs_that_have_no_name_too(tmp_path):
+    times = np.linspace(0.0, 5.0, 51)
+    own = vm.Signal.from_samples(times, LANE.at(times))
+    box = vm.reduce(car(), "pod", training=[own], cars=[HEAVY, HEAVIER])
+    for rom in (box, vm.load(box.save(tmp_path / "box.nc"))):
+        assert rom.for_parameters(HEAVY).simulate(own).status == "untrusted"
 
 
 def test_a_method_that_is_exact_for_every_car_has_none_beyond():

@@ -67,23 +67,28 @@ def test_parameters_are_those_of_models_made_anew(runs, name, parameters):
     model, run = runs[name]
     sample = np.abs(run.inputs[:, 0]).argmax()
     x, u = run.states[sample], run.inputs[sample]
+    # Both models on either side of each number, which both functions are taken of.
+    pairs = []
+    for parameter in parameters:
+        value = np.atleast_1d(model.parameters[parameter])
+        for k in range(len(value)):
+            step = np.zeros_like(value)
+            step[k] = 1e-5 * max(abs(value[k]), 1.0)
+            sides = []
+            for moved in (value + step, value - step):
+                given = moved.tolist() if len(value) > 1 else moved.item()
+                try:
+                    sides.append(build(name, None, {parameter: given}))
+                except InputError:
+                    break
+            if len(sides) == 2:
+                pairs.append((*sides, 2.0 * step[k]))
     for of, function in (("rhs", "derivative"), ("outputs", "outputs")):
-        found, columns = model.jacobian(x, u, parameters, of), []
-        for parameter in parameters:
-            value = np.atleast_1d(model.parameters[parameter])
-            for k in range(len(value)):
-                step = np.zeros_like(value)
-                step[k] = 1e-5 * max(abs(value[k]), 1.0)
-                sides = []
-                for moved in (value + step, value - step):
-                    given = moved.tolist() if len(value) > 1 else moved.item()
-                    try:
-                        other = build(name, None, {parameter: given})
-                    except InputError:
-                        break
-                    sides.append(other.evaluated(function, x, u))
-                if len(sides) == 2:
-                    columns.append((sides[0] - sides[1]) / (2.0 * step[k]))
+        found = model.jacobian(x, u, parameters, of)
+        columns = [
+            (above.evaluated(function, x, u) - below.evaluated(function, x, u)) / width
+            for above, below, width in pairs
+        ]
         expected = np.column_stack(columns)
         assert found.shape == expected.shape
         scale = np.maximum(np.abs(expected).max(axis=0), 1e-3)

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.registry import component
-from vehiclemor.report.errors import warned_runs
+from vehiclemor.report.errors import by_cars, warned_runs
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.rows import protocol_rows
 from vehiclemor.report.predictive.text import predictive_text
@@ -79,11 +79,11 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     }
     count = EVALUATIONS[component("model", head["model"]).kind]
     errors = ["rms_error", "max_error", "floor_rms_error"]
-    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count]
-    small = dataset[kept].assign(warned=warned_runs(dataset)).load()
+    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count, "warned"]
+    small = by_cars(dataset.assign(warned=warned_runs(dataset)), kept).load()
     rows: list[Row] = []
     for start in dataset["start"].values:
-        for method in dataset["method"].values:
+        for method in small["method"].values:
             part = _different(small.sel({"start": start, "method": method}))
             place = {**head, "start": str(start), "method": str(method)}
             rows += [place | row for row in _rows_of_method(part, count)]

@@ -60,6 +60,9 @@ def run_at(study: StudyFile, point: Mapping[str, Any], trained: Mapping[str, Car
     cars = entry.cars or point.get("cars", study.cars)
     # What the study lists has no name, and a grid can't ask for it.
     named = isinstance(cars, str) or "cars" in point
+    trained_on = _known(cars if named else "", trained)
+    # To what learns from no car all are the same.
+    learns = component("method", entry.method).learns_from != "inputs"
     training = entry.training or point.get("training", study.training)
     return Run(
         point["maneuver"],
@@ -68,7 +71,7 @@ def run_at(study: StudyFile, point: Mapping[str, Any], trained: Mapping[str, Car
         overrides(car),
         training,
         tuple((pair[0], pair[1]) for pair in study.training_set),
-        _known(cars if named else "", trained),
+        trained_on if learns else None,
     )
 
 

@@ -1,0 +1,74 @@
+"""Tables of the handbook over many cars: a line for whatever was measured.
+
+Each is Markdown, and empty where nothing is stored.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from fragments import ROOT
+
+from vehiclemor.errors import InputError
+from vehiclemor.report.design_studies import design_space
+from vehiclemor.report.leaderboard import leaderboard
+from vehiclemor.report.printing import fixed, short
+from vehiclemor.report.tables import markdown
+from vehiclemor.study.plans.protocol import load_protocol
+
+OF_CARS = "predictive-cars-"
+FIGURES = ROOT / "paper" / "figures"
+# Column of a contestant -> heading, and how its numbers are printed.
+DRAWN: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "method": ("", str),
+    "misses": ("missed", str),
+    "silent": ("silent", str),
+    "flagged": ("warned", str),
+    "score": ("worst score", short),
+    "ratio_equal": ("x whole calls", fixed),
+}
+
+
+def latin_hypercube(folder: Path) -> str:
+    """What `design_space.py` has kept of each model, with its figure."""
+    del folder
+    parts = []
+    for model, kept in design_space().items():
+        title = _title(load_protocol(f"cars-{model}").definition.title)
+        rows = pd.DataFrame(kept["rows"])
+        numbers = rows.select_dtypes("number").columns
+        rows[numbers] = rows[numbers].map(lambda v: f"{v:.0f}" if v >= 100.0 else short(v))
+        parts.append(f"{title}, {kept['cars']} cars:\n\n{markdown(rows)}")
+        name = f"design-space-{model}.png"
+        if (FIGURES / name).exists():
+            text = f"{title}: share of the cars whose largest error is above a part of its bound"
+            parts.append(f"![{text}](../figures/{name})\n")
+    return "\n".join(parts)
+
+
+def drawn(folder: Path) -> str:
+    """Draws over cars and inputs whose results are stored."""
+    try:
+        rows = leaderboard(folder)
+    except InputError:
+        return ""
+    parts = []
+    for _, part in rows[rows["study"].str.startswith(OF_CARS) & rows["sealed"]].groupby("study"):
+        first = part.iloc[0]
+        text = part[list(DRAWN)].copy()
+        for name, (_, printed) in DRAWN.items():
+            text[name] = [printed(value) for value in part[name]]
+        text["method"] += ["*" if winner else "" for winner in part["winner"]]
+        table = markdown(text.set_axis([heading for heading, _ in DRAWN.values()], axis=1))
+        when = first["drawn_on"][:10]
+        parts.append(f"{_title(first['title'])}, {first['runs']} runs drawn on {when}:\n\n{table}")
+    return "\n".join(parts)
+
+
+def _title(protocol: str) -> str:
+    return protocol.partition(":")[0]
+
+
+# Name of a table in a page -> what makes it.
+TABLES = {"latin-hypercube": latin_hypercube, "drawn-cars": drawn}
