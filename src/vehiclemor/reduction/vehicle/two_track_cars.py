@@ -124,9 +124,10 @@ class TwoTrackVehicle(ReducedVehicle):
         began, box = time.process_time(), self.box
         assert box is not None
         found = box.driven(model)
-        checking = found[EVERY // 2 :: EVERY]
-        fitting = [entry for i, entry in enumerate(found) if i % EVERY != EVERY // 2]
-        if not checking:
+        first = min(EVERY, len(found)) // 2
+        checking = found[first::EVERY]
+        fitting = [entry for i, entry in enumerate(found) if i % EVERY != first]
+        if not fitting:
             raise InputError(f"{NAME}: this car slides in too many of the runs that it drives")
         training, runs = ([getattr(entry, n) for entry in fitting] for n in ("run", "true"))
         reduced, samples = fitted_to(model, runs, box.sizes, dict(box.chosen), STRIDE)
@@ -143,8 +144,8 @@ class TwoTrackVehicle(ReducedVehicle):
             solver=self.solver,
             tolerance=self.tolerance,
         )
-        first = np.array([entry.error for entry in checking])
-        return in_box(replace(reduced, doubt=doubt(errors_of(reduced, checking), first)), box)
+        known = np.array([entry.error for entry in checking])
+        return in_box(replace(reduced, doubt=doubt(errors_of(reduced, checking), known)), box)
 
 
 def near(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:

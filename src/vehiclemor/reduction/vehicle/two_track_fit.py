@@ -35,7 +35,9 @@ SEEN = ("theta", "z_dot")
 RIDGE = 1e-12
 
 
-# What terms are for -> those that are chosen.
+# What terms are for -> those that are chosen: of the equations and the lifting, and by their lines
+# of slips and loads.
+FEATURES = ("odd", "even", "lifted")
 Chosen = dict[str, list[str]]
 
 
