@@ -108,9 +108,9 @@ def _check_vehicle(part: ReducedVehicle) -> None:
     _shaped("encoding", (part.encoding, k, n), (part.feedthrough, k, inputs))
     _shaped("error_scale", (part.error_scale, k + PLANAR))
     if isinstance(part, SlowVehicle) and part.box is not None:
-        box, m = part.box, len(part.box.coefficients)
-        _shaped("box", (box.coefficients, m, *part.coefficients.shape))
-        _shaped("box", (box.lifting, m, *part.lifting.shape))
+        box, free = part.box, sum(len(terms) for terms, _ in part.box.table.free)
+        _shaped("box", (box.coefficients, *part.coefficients.shape))
+        _shaped("box", (box.changes, 1 + len(box.cars.varied), free))
         _require(box.table.features == own, "box")
     if isinstance(part, TwoTrackVehicle) and part.box is not None:
         # Of these another car's features are made.
