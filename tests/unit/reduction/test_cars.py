@@ -139,7 +139,7 @@ def test_cars_beyond_the_box_are_not_trusted():
     assert dropped.simulate().status == "ok"
     # But POD of one run drives at its speed, whatever that of another is.
     slower = box.for_parameters({"initial_speed": 19.9})
-    assert not slower.input_range.outside(component("method", "pod"), slower.model)
+    assert not slower.input_range.cars.trust(slower.model).reason
     assert "runs that check this car" in slower.simulate().message
     batch = vm.simulate_many(box.for_parameters(HEAVIER), [LANE, LANE.perturbed(1.0, 0.9)])
     assert set(batch["status"].values.tolist()) == {"untrusted"}
