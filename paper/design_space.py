@@ -68,7 +68,14 @@ BEST: dict[str, dict[str, Any]] = {
         "safe_solver": "exponential_adams",
         "safe_tolerance": 1e-7,
     },
-    "high_fidelity_vehicle": {"method": "frozen_inertia", "tolerance": 1e-4, "cars": ()},
+    "high_fidelity_vehicle": {
+        "method": "guarded",
+        "training": "protocol",
+        "fast": "two_track",
+        "tolerance": 1e-3,
+        "safe_solver": "exponential_adams",
+        "safe_tolerance": 1e-7,
+    },
 }
 
 

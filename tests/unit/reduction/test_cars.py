@@ -239,9 +239,9 @@ def test_slow_modes_of_another_car_span_the_same_in_coordinates_near_the_first()
 def test_a_slow_manifold_of_a_box_knows_cars_between():
     runs = [LANE.perturbed(1.0, a) for a in (0.5, 0.8, 1.0)]
     quick = {"sweeps": 1, "terms": 12, "training": runs}
-    ends = [{"sprung_mass": m} for m in (850.0, 900.0, 1020.0, 1080.0)]
+    ends = [{"PKY1": stiffness} for stiffness in (-25.0, -23.5, -20.5, -19.0)]
     box = vm.reduce(car(), "slow_manifold", cars=ends, **quick)
-    between, lane = {"sprung_mass": 880.0}, LANE.perturbed(1.0, 0.7)
+    between, lane = {"PKY1": -24.3}, LANE.perturbed(1.0, 0.7)
     model = reparametrised(car(), between)
     run = box.for_parameters(between).simulate(lane)
     full, nominal = model.simulate(lane), car().simulate(lane)
@@ -249,7 +249,7 @@ def test_a_slow_manifold_of_a_box_knows_cars_between():
     error = np.abs(run.outputs - full.outputs)[:, column].max()
     assert run.status == "ok"
     assert error < 0.25 * np.abs(nominal.outputs - full.outputs)[:, column].max()
-    assert box.for_parameters({"sprung_mass": 1200.0}).simulate().status == "untrusted"
+    assert box.for_parameters({"PKY1": -27.0}).simulate().status == "untrusted"
 
 
 def test_a_loaded_model_of_a_box_gives_other_cars_too(tmp_path):

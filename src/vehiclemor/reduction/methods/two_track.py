@@ -14,7 +14,6 @@ from dataclasses import replace
 
 from pydantic import Field
 
-from vehiclemor.errors import InputError
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import Method, offline_cost
@@ -32,6 +31,7 @@ from vehiclemor.reduction.vehicle.two_track_fit import (
     fitted_to,
     free_coefficients,
     lifted_anew,
+    straight,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -82,9 +82,7 @@ def refusal(model: Model) -> str:
 def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> ReducedVehicle:
     """Fit slips, loads, accelerations and the other states to the training runs."""
     began = time.process_time()
-    own = [run for run in training if not difference(model, run.model)]
-    if not own:
-        raise InputError("a box of cars is learnt around one of them: no training run is of it")
+    own = straight(model, training)
     runs = [run.recorded() for run in own]
     sizes = Sizes(*(getattr(settings, name) for name in Sizes._fields))
     chosen: Chosen = {}
@@ -102,7 +100,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         solver=settings.solver,
         tolerance=settings.tolerance,
     )
-    if len(own) == len(training):
+    if not any(difference(model, run.model) for run in training):
         return reduced
     return in_box(reduced, box_of(reduced, training, own, runs, (sizes, chosen)))
 

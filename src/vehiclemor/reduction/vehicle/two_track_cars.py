@@ -23,7 +23,7 @@ from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.own_runs import SPEED, Input, doubt
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.trajectory_fit import improved, run_errors, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, run_errors, targets
 from vehiclemor.reduction.vehicle.two_track_fit import (
     Chosen,
     Sizes,
@@ -38,21 +38,41 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # How a car's own runs are solved.
 SOLVER, FINE = "exponential_adams", 1e-7
-# Every so many samples of them are fitted to; Gauss-Newton steps on whole runs.
-STRIDE, SWEEPS = 4, 4
+# Every so many samples of them are fitted to; Gauss-Newton steps on whole runs, once and again.
+STRIDE, SWEEPS = 4, 3
 # Every so many runs one checks instead.
 EVERY = 12
 # Runs that slide sideways so many times as fast as any of the first car are left out, and those of
 # which the first guess is so far off, in the units of `trajectory_fit`.
 SLIDING, LOST = 1.2, 200.0
 SLIDES = "lateral_speed"
+NAME = "two_track"
 
 
 class Drive(NamedTuple):
-    """An input of the training, and how much faster (m/s) than straight running it is driven."""
+    """What each car drives.
+
+    Attributes
+    ----------
+    input
+        Of the training.
+    faster
+        How much faster (m/s) than straight running it is driven.
+    error
+        Of the first car's model, in the units of `trajectory_fit`.
+    """
 
     input: Input
     faster: float
+    error: float
+
+
+class Driven(NamedTuple):
+    """A run of a car, and the first car's error in it."""
+
+    run: TrainingRun
+    true: Trajectory
+    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +86,7 @@ class Box(ShortRepr):
     sizes, chosen
         Settings of the fit, and terms of the first car's.
     drives
-        What each car drives.
+        Some of the training.
     sliding
         Lateral speed (m/s) beyond which a run is left out.
     """
@@ -77,7 +97,7 @@ class Box(ShortRepr):
     drives: tuple[Drive, ...]
     sliding: float
 
-    def driven(self, model: DynamicModel) -> list[tuple[TrainingRun, Trajectory]]:
+    def driven(self, model: DynamicModel) -> list[Driven]:
         """The runs of a car, but for those in which it slides."""
         starts, found = {}, []
         for drive in self.drives:
@@ -87,7 +107,7 @@ class Box(ShortRepr):
             with suppress(ConvergenceError):
                 true = model.simulate(run.maneuver, run.start, solver=SOLVER, tolerance=FINE)
                 if sideways(model, [true]) <= self.sliding:
-                    found.append((run, true))
+                    found.append(Driven(run, true, drive.error))
         return found
 
 
@@ -108,32 +128,36 @@ class TwoTrackVehicle(ReducedVehicle):
         checking = found[first::EVERY]
         fitting = [entry for i, entry in enumerate(found) if i % EVERY != first]
         if not fitting:
-            raise InputError(f"this {model.name} slides in the runs that it would be learnt from")
-        training, runs = zip(*fitting, strict=True)
+            raise InputError(f"{NAME}: this car slides in too many of the runs that it drives")
+        training, runs = ([getattr(entry, n) for entry in fitting] for n in ("run", "true"))
         reduced, samples = fitted_to(model, runs, box.sizes, dict(box.chosen), STRIDE)
-        free = free_coefficients(reduced)
         goals = targets(reduced, training, runs)
-        some = list(compress(goals, run_errors(reduced, goals) < LOST))
-        reduced = improved(reduced, some, free, SWEEPS, power=1.0)
+        some, free = near(reduced, goals), free_coefficients(reduced)
+        for power in (1.0, 2.0):
+            reduced = improved(reduced, list(compress(goals, some)), free, SWEEPS, power)
         reduced = lifted_anew(reduced, training, samples, STRIDE)
-        near = run_errors(reduced, goals) < LOST
+        some = near(reduced, goals)
         reduced = replace(
             reduced,
-            reach=training_reach(reduced, *(list(compress(of, near)) for of in (training, runs))),
+            reach=training_reach(reduced, *(list(compress(of, some)) for of in (training, runs))),
             offline=offline_cost(began, model, runs, len(samples.inputs)),
             solver=self.solver,
             tolerance=self.tolerance,
         )
-        errors = errors_where_trusted(reduced, *zip(*checking, strict=True))
-        return in_box(replace(reduced, doubt=doubt(errors, np.ones(len(errors)))), box)
+        known = np.array([entry.error for entry in checking])
+        return in_box(replace(reduced, doubt=doubt(errors_of(reduced, checking), known)), box)
 
 
-def errors_where_trusted(
-    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
-) -> np.ndarray:
-    """Errors of runs, in the units of `trajectory_fit`; zero where the model warns itself."""
-    told = [reduced.simulate(run.maneuver, run.start).status == "ok" for run in training]
-    return np.where(told, run_errors(reduced, targets(reduced, training, runs)), 0.0)
+def near(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
+    """Which runs the reduced ones are not lost from."""
+    return run_errors(reduced, goals) < LOST
+
+
+def errors_of(reduced: ReducedVehicle, driven: Sequence[Driven]) -> np.ndarray:
+    """Errors in runs, in the units of `trajectory_fit`; zero where the model warns itself."""
+    told = [reduced.simulate(run.maneuver, run.start).status == "ok" for run, *_ in driven]
+    goals = targets(reduced, [entry.run for entry in driven], [entry.true for entry in driven])
+    return np.where(told, run_errors(reduced, goals), 0.0)
 
 
 def start_of(model: DynamicModel, faster: float) -> Start:
@@ -163,13 +187,13 @@ def box_of(
     fit: tuple[Sizes, Chosen],
 ) -> Box:
     """What other cars need of the first one's fit to its own runs, among the training."""
-    drives = []
-    for run, true in zip(own, runs, strict=True):
+    drives, errors = [], run_errors(reduced, targets(reduced, own, runs))
+    for run, true, error in zip(own, runs, errors, strict=True):
         m = run.maneuver
         entry = Input(m.name, m.frequency_factor, m.amplitude_factor)
         with suppress(InputError):
             if entry.made.samples:
                 faster = float(reduced.encoded(true.states[0], true.inputs[0])[tf.SPEED])
-                drives.append(Drive(entry, round(faster, 6)))
-    cars = cars_of(run.model for run in training)
-    return Box(cars, *fit, tuple(dict.fromkeys(drives)), SLIDING * sideways(reduced.model, runs))
+                drives.append(Drive(entry, round(faster, 6), float(error)))
+    cars, sliding = cars_of(run.model for run in training), sideways(reduced.model, runs)
+    return Box(cars, *fit, tuple(drives), SLIDING * sliding)

@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.errors import InputError
 from vehiclemor.multibody.components.tire_coefficients import FIALA
+from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
@@ -33,7 +35,9 @@ SEEN = ("theta", "z_dot")
 RIDGE = 1e-12
 
 
-# What terms are for -> those that are chosen.
+# What terms are for -> those that are chosen: of the equations and the lifting, and by their lines
+# of slips and loads.
+FEATURES = ("odd", "even", "lifted")
 Chosen = dict[str, list[str]]
 
 
@@ -69,6 +73,27 @@ class Samples(NamedTuple):
     rates: np.ndarray
     shape: ShapeSamples
     outputs: np.ndarray
+
+
+def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
+    """Training runs of a car that begin in straight running, at any speed.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    shape = VehicleShape(model)
+    dropped = slow_modes(shape, np.inf).symmetric
+    found = []
+    for run in training:
+        if not difference(model, run.model):
+            deviation = shape.of(model.start(run.start)[None])[0] - shape.reference
+            if not len(dropped.amplitudes(deviation)):
+                found.append(run)
+    if not found:
+        raise InputError(f"no training run is of this {model.name} and begins in straight running")
+    return found
 
 
 def fitted_to(
