@@ -122,7 +122,7 @@ class ReducedOrderModel(ShortRepr):
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The reduced model of another car: what follows from its parameters is made anew.
 
-        Nothing is fitted.  Runs of a car beyond the `cars` of the training are not trusted.
+        No fit.  Cars beyond the `cars` of the training, or doubted by own runs, are not trusted.
 
         Parameters
         ----------

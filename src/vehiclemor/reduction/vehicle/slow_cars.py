@@ -16,12 +16,13 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.reduction.car_checks import Input
 from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected, own_runs
+from vehiclemor.reduction.vehicle.own_runs import chosen_inputs, corrected, own_runs
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import ridge_fit
