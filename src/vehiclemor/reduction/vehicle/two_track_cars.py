@@ -20,10 +20,10 @@ from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
-from vehiclemor.reduction.vehicle.own_runs import SPEED, Input, doubt
+from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED, Input
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, run_errors, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, planar_errors, targets
 from vehiclemor.reduction.vehicle.two_track_fit import (
     Chosen,
     Sizes,
@@ -42,11 +42,15 @@ SOLVER, FINE = "exponential_adams", 1e-7
 STRIDE, SWEEPS = 4, 3
 # Every so many runs one checks instead.
 EVERY = 12
+# How many times the error of the first car in the same run, or 1 in the units of `trajectory_fit`,
+# that of another car may be.
+TRUSTED = 3.0
 # Runs that slide sideways so many times as fast as any of the first car are left out, and those of
 # which the first guess is so far off, in the units of `trajectory_fit`.
 SLIDING, LOST = 1.2, 200.0
 SLIDES = "lateral_speed"
 NAME = "two_track"
+NOTHING = 1e-6
 
 
 class Drive(NamedTuple):
@@ -59,7 +63,7 @@ class Drive(NamedTuple):
     faster
         How much faster (m/s) than straight running it is driven.
     error
-        Of the first car's model, in the units of `trajectory_fit`.
+        Of heading and place by the first car's model, in the units of `trajectory_fit`.
     """
 
     input: Input
@@ -123,10 +127,9 @@ class TwoTrackVehicle(ReducedVehicle):
             return self
         began, box = time.process_time(), self.box
         assert box is not None
-        found = box.driven(model)
-        first = min(EVERY, len(found)) // 2
-        checking = found[first::EVERY]
-        fitting = [entry for i, entry in enumerate(found) if i % EVERY != first]
+        driven = box.driven(model)
+        first = min(EVERY, len(driven)) // 2
+        fitting = [entry for i, entry in enumerate(driven) if i % EVERY != first]
         if not fitting:
             raise InputError(f"{NAME}: this car slides in too many of the runs that it drives")
         training, runs = ([getattr(entry, n) for entry in fitting] for n in ("run", "true"))
@@ -144,20 +147,24 @@ class TwoTrackVehicle(ReducedVehicle):
             solver=self.solver,
             tolerance=self.tolerance,
         )
-        known = np.array([entry.error for entry in checking])
-        return in_box(replace(reduced, doubt=doubt(errors_of(reduced, checking), known)), box)
+        reduced.parameters[0] = 1.0 / right(reduced, driven)
+        return in_box(reduced, box)
 
 
 def near(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
     """Which runs the reduced ones are not lost from."""
-    return run_errors(reduced, goals) < LOST
+    return planar_errors(reduced, goals) < LOST
 
 
-def errors_of(reduced: ReducedVehicle, driven: Sequence[Driven]) -> np.ndarray:
-    """Errors in runs, in the units of `trajectory_fit`; zero where the model warns itself."""
-    told = [reduced.simulate(run.maneuver, run.start).status == "ok" for run, *_ in driven]
+def right(reduced: ReducedVehicle, driven: Sequence[Driven]) -> float:
+    """Part of what a model knows up to which no run of its car is wrong, at most 1."""
     goals = targets(reduced, [entry.run for entry in driven], [entry.true for entry in driven])
-    return np.where(told, run_errors(reduced, goals), 0.0)
+    found = 1.0
+    for entry, error in zip(driven, planar_errors(reduced, goals), strict=True):
+        if error > TRUSTED * max(entry.error, 1.0):
+            trust = reduced.simulate(entry.run.maneuver, entry.run.start).trust
+            found = min(found, BELOW * trust.indicator) if trust else NOTHING
+    return max(found, NOTHING)
 
 
 def start_of(model: DynamicModel, faster: float) -> Start:
@@ -187,7 +194,7 @@ def box_of(
     fit: tuple[Sizes, Chosen],
 ) -> Box:
     """What other cars need of the first one's fit to its own runs, among the training."""
-    drives, errors = [], run_errors(reduced, targets(reduced, own, runs))
+    drives, errors = [], planar_errors(reduced, targets(reduced, own, runs))
     for run, true, error in zip(own, runs, errors, strict=True):
         m = run.maneuver
         entry = Input(m.name, m.frequency_factor, m.amplitude_factor)
