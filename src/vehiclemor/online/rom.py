@@ -122,7 +122,8 @@ class ReducedOrderModel(ShortRepr):
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The reduced model of another car: what follows from its parameters is made anew.
 
-        Nothing is fitted.  Runs of a car beyond the `cars` of the training are not trusted.
+        Nothing is fitted but a slow manifold, to some runs of the car itself.  Runs of a car beyond
+        the `cars` of the training are not trusted.
 
         Parameters
         ----------
