@@ -13,6 +13,7 @@ from vehiclemor.report.comparison.rows import ALL_MODELS, COLUMNS, Row
 from vehiclemor.report.comparison.times import agreement_rows, slower_row, time_rows
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.predictive import paper_terms
 from vehiclemor.report.published import load_published
 from vehiclemor.report.regenerate import regenerate_figures
 from vehiclemor.report.tables import latex, markdown, regenerate_tables
@@ -317,12 +318,19 @@ def test_command_prints_a_summary_and_tables_that_fit(results_folder, capsys, mo
     assert 80 < max(map(len, capsys.readouterr().out.splitlines())) <= 110
 
 
-def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeypatch):
+def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeypatch, rows):
     # The whole study of settings has hundreds of cells: a few stand in for them.
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
     monkeypatch.setattr(tables, "settings_studies", lambda: {str(path): ("pitch", "yaw")})
-    names = ["5", "8", "10"]
+    # Of the paper's terms too: the baselines and every eighth variant.
+    cases = paper_terms.paper_cases
+    few = lambda shown: [*(every := list(cases(shown)))[:2], *every[2::8]]  # noqa: E731
+    monkeypatch.setattr(paper_terms, "paper_cases", few)
+    # The first comparison is the one of the other tests.
+    comparisons = iter([lambda *_: rows, tables.paper_comparison])
+    monkeypatch.setattr(tables, "paper_comparison", lambda *given: next(comparisons)(*given))
+    names = ["10"]
     contents = []
     for turn in ("first", "second"):
         out = tmp_path / turn
