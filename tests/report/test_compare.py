@@ -327,12 +327,12 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
     cases = paper_terms.paper_cases
     few = lambda shown: [*(every := list(cases(shown)))[:2], *every[2::8]]  # noqa: E731
     monkeypatch.setattr(paper_terms, "paper_cases", few)
-    # The first comparison is the one of the other tests.
-    comparisons = iter([lambda *_: rows, tables.paper_comparison])
-    monkeypatch.setattr(tables, "paper_comparison", lambda *given: next(comparisons)(*given))
     names = ["10"]
     contents = []
-    for turn in ("first", "second"):
+    # The first comparison is the one of the other tests.
+    comparisons = {"first": lambda *_: rows, "second": tables.paper_comparison}
+    for turn, comparison in comparisons.items():
+        monkeypatch.setattr(tables, "paper_comparison", comparison)
         out = tmp_path / turn
         paths = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)
