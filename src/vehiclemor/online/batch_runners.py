@@ -47,7 +47,7 @@ def _in_one_loop(fitted: Any) -> bool:
     """Whether one compiled loop does all runs; a reduced vehicle must judge itself."""
     if isinstance(fitted, FullOrderModel):
         return isinstance(fitted.model, DynamicModel)
-    if not isinstance(fitted, ReducedVehicle) or fitted.doubt:
+    if not isinstance(fitted, ReducedVehicle):
         return False
     return bool(fitted.lift.features.watched)
 

@@ -28,6 +28,8 @@ from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.slow_cars import SlowVehicle
+from vehiclemor.reduction.vehicle.two_track_cars import TwoTrackVehicle
+from vehiclemor.reduction.vehicle.two_track_fit import FEATURES
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
 
@@ -106,10 +108,14 @@ def _check_vehicle(part: ReducedVehicle) -> None:
     _shaped("encoding", (part.encoding, k, n), (part.feedthrough, k, inputs))
     _shaped("error_scale", (part.error_scale, k + PLANAR))
     if isinstance(part, SlowVehicle) and part.box is not None:
-        box, m = part.box, len(part.box.coefficients)
-        _shaped("box", (box.coefficients, m, *part.coefficients.shape))
-        _shaped("box", (box.lifting, m, *part.lifting.shape))
+        box, free = part.box, sum(len(terms) for terms, _ in part.box.table.free)
+        _shaped("box", (box.coefficients, *part.coefficients.shape))
+        _shaped("box", (box.changes, 1 + len(box.cars.varied), free))
         _require(box.table.features == own, "box")
+    if isinstance(part, TwoTrackVehicle) and part.box is not None:
+        # Of these another car's features are made.
+        texts = {*own.terms, *lifted.terms}
+        _require(all(set(part.box.chosen[kind]) <= texts for kind in FEATURES), "box")
     reach = part.reach
     _require(own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
     if len(reach.lasted):

@@ -122,7 +122,7 @@ class ReducedOrderModel(ShortRepr):
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The reduced model of another car: what follows from its parameters is made anew.
 
-        Nothing is fitted.  Runs of a car beyond the `cars` of the training are not trusted.
+        No fit.  Cars beyond the `cars` of the training, or doubted by own runs, are not trusted.
 
         Parameters
         ----------
@@ -145,8 +145,9 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def outside(self) -> Trust | None:
-        """What is told of the car, if it lies beyond those of the training."""
-        return self.input_range.outside(component("method", self.method), self.model)
+        """What is told of the car, if it lies beyond those of the training or is doubted."""
+        method = component("method", self.method)
+        return self.input_range.outside(method, self.model, self.reduced)
 
     @cached_property
     def _range(self) -> InputRange | None:
@@ -271,7 +272,7 @@ class ReducedOrderModel(ShortRepr):
         not in a state.
         """
         states, u, _ = self._samples(state, inputs)
-        found = self.state_space.trust(states, u)
+        found = self.outside or self.state_space.trust(states, u)
         if found is None and self._range is not None:
             found = self._range.trust_of_inputs(self.inputs, u)
         left = self._left_validity(states, u)

@@ -306,14 +306,14 @@ def _tested(
         car, start = car_of(model, scenario), start_of(model, scenario)
         if experiment.keep == "errors":
             trajectory = _sound(car, reduced, scenario, start)
-            trajectory = warned(model, experiment, scenario, trajectory)
+            trajectory = warned(model, experiment, scenario, trajectory, reduced)
             return Outcome(trajectory, reference, estimate=_estimate(car, trajectory))
         # The first run loads machine code and warms caches, another is timed where it is compared.
         if not fitted.warm and reference is not None:
             reduced.simulate(scenario.maneuver, start)
             fitted.warm = True
         trajectory = _sound(car, reduced, scenario, start)
-        trajectory = _remarked(model, experiment, scenario, trajectory)
+        trajectory = _remarked(model, experiment, scenario, trajectory, reduced)
         if reference is None:
             return Outcome(trajectory, None)
         nearest = reduced.best_approximation(reference.states)
@@ -329,7 +329,9 @@ def _tested(
     return attempt(run)
 
 
-def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
+def warned(
+    model: Model, experiment: Experiment, test: Scenario, run: Trajectory, reduced: Any
+) -> Trajectory:
     """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
     # What has learned from nothing is the full order of a protocol's second runs.
     if (run.trust and run.trust.reason) or not experiment.training:
@@ -339,14 +341,16 @@ def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory
     if judges_itself and method.learns_from == "inputs":
         return run
     known = input_range(model, trained_for(experiment.training, test))
-    if outside := known.outside(method, car_of(model, test)):
+    if outside := known.outside(method, car_of(model, test), reduced):
         return run.judged(outside)
     return run if judges_itself else run.judged(known.trust(model, test))
 
 
-def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
+def _remarked(
+    model: Model, experiment: Experiment, test: Scenario, run: Trajectory, reduced: Any
+) -> Trajectory:
     """A run with a remark where a protocol would not trust it; its status is the method's own."""
-    judged = warned(model, experiment, test, run)
+    judged = warned(model, experiment, test, run, reduced)
     if judged.status == run.status:
         return run
     told = f"not to be trusted {judged.message}"

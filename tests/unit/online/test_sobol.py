@@ -67,7 +67,8 @@ def test_what_has_no_effect_has_the_index_zero_and_no_warning(recwarn):
 
 def test_runs_beyond_the_cars_of_a_reduced_model_are_counted(travel, box):
     given = {"maneuver": travel, "samples": 8, "jobs": 1}
-    known = vm.reduce(WISHBONE, "pod", training="nominal", cars=box)
+    # With fewer modes the runs that check each car doubt it.
+    known = vm.reduce(WISHBONE, "pod", training="nominal", cars=box, rank=7)
     inside = vm.sobol_indices(known, "bump_steer", box, **given)
     assert (inside.attrs["untrusted"], inside.attrs["remark"]) == (0, "")
     wide = {name: (low - 3.0 * (high - low), high) for name, (low, high) in box.items()}

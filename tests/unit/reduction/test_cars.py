@@ -98,6 +98,9 @@ def test_replay_gives_the_run_of_the_nearest_car_as_that_car_had_it():
     replay = vm.reduce(car(), "replay", training="nominal", cars=[HEAVY, HEAVIER])
     run = replay.for_parameters({"sprung_mass": 1040.0, "PKY1": -21.0}).simulate()
     np.testing.assert_array_equal(run.outputs, heavy().simulate(LANE).outputs)
+    assert run.status == "untrusted"
+    assert "run of a car with another sprung_mass" in run.message
+    assert replay.for_parameters(HEAVY).simulate().status == "ok"
 
 
 @pytest.mark.parametrize("bases", ["concatenated", "interpolated"])
@@ -124,17 +127,50 @@ def test_interpolated_bases_predict_cars_between_that_other_bases_do_not():
 
 
 def test_cars_beyond_the_box_are_not_trusted():
-    inside, beyond = (of_box().for_parameters(p).simulate() for p in (HEAVY, HEAVIER))
+    box = of_box("interpolated")
+    inside, beyond = (box.for_parameters(p).simulate() for p in (HEAVY, HEAVIER))
     assert inside.status == "ok"
     assert beyond.status == "untrusted"
     assert "sprung_mass is 1300; the cars of the training have 800 to 1100" in beyond.message
     alone = vm.reduce(car(), "pod", training="nominal").for_parameters(HEAVY).simulate()
     assert alone.status == "untrusted"
     # How a run starts is not which car it is.
-    dropped = of_box().for_parameters({"drop_height": 0.02, "initial_speed": 19.9})
+    dropped = box.for_parameters({"drop_height": 0.02})
     assert dropped.simulate().status == "ok"
-    batch = vm.simulate_many(of_box().for_parameters(HEAVIER), [LANE, LANE.perturbed(1.0, 0.9)])
+    # But POD of one run drives at its speed, whatever that of another is.
+    slower = box.for_parameters({"initial_speed": 19.9})
+    assert not slower.input_range.cars.trust(slower.model).reason
+    assert "runs that check this car" in slower.simulate().message
+    batch = vm.simulate_many(box.for_parameters(HEAVIER), [LANE, LANE.perturbed(1.0, 0.9)])
     assert set(batch["status"].values.tolist()) == {"untrusted"}
+
+
+def test_a_car_is_doubted_where_the_basis_of_the_box_is_far_worse_than_its_own():
+    joined, between = of_box(), of_box("interpolated")
+    for parameters in ({}, HEAVY):
+        model = reparametrised(car(), parameters)
+        own = roll_errors(model, vm.reduce(model, "pod", training="nominal").simulate())
+        bad, good = (rom.for_parameters(parameters) for rom in (joined, between))
+        assert bad.reduced.doubt
+        assert bad.simulate().status == "untrusted"
+        assert "times those of a model of the first car alone" in bad.simulate().message
+        assert roll_errors(model, bad.simulate()) > 3.0 * own
+        assert not good.reduced.doubt
+        assert good.simulate().status == "ok"
+        assert roll_errors(model, good.simulate()) < 3.0 * own
+    assert joined.simulate().status == "untrusted"
+    batch = vm.simulate_many(joined.for_parameters(HEAVY), [LANE])
+    assert batch["status"].item() == "untrusted"
+    state = joined.state()
+    assert joined.trust(state, np.zeros(1)).reason
+
+
+def test_cars_are_checked_by_inputs_that_have_no_name_too(tmp_path):
+    times = np.linspace(0.0, 5.0, 51)
+    own = vm.Signal.from_samples(times, LANE.at(times))
+    box = vm.reduce(car(), "pod", training=[own], cars=[HEAVY, HEAVIER])
+    for rom in (box, vm.load(box.save(tmp_path / "box.nc"))):
+        assert rom.for_parameters(HEAVY).simulate(own).status == "untrusted"
 
 
 def test_a_method_that_is_exact_for_every_car_has_none_beyond():
@@ -203,9 +239,9 @@ def test_slow_modes_of_another_car_span_the_same_in_coordinates_near_the_first()
 def test_a_slow_manifold_of_a_box_knows_cars_between():
     runs = [LANE.perturbed(1.0, a) for a in (0.5, 0.8, 1.0)]
     quick = {"sweeps": 1, "terms": 12, "training": runs}
-    ends = [{"sprung_mass": m} for m in (850.0, 900.0, 1020.0, 1080.0)]
+    ends = [{"PKY1": stiffness} for stiffness in (-25.0, -23.5, -20.5, -19.0)]
     box = vm.reduce(car(), "slow_manifold", cars=ends, **quick)
-    between, lane = {"sprung_mass": 880.0}, LANE.perturbed(1.0, 0.7)
+    between, lane = {"PKY1": -24.3}, LANE.perturbed(1.0, 0.7)
     model = reparametrised(car(), between)
     run = box.for_parameters(between).simulate(lane)
     full, nominal = model.simulate(lane), car().simulate(lane)
@@ -213,7 +249,7 @@ def test_a_slow_manifold_of_a_box_knows_cars_between():
     error = np.abs(run.outputs - full.outputs)[:, column].max()
     assert run.status == "ok"
     assert error < 0.25 * np.abs(nominal.outputs - full.outputs)[:, column].max()
-    assert box.for_parameters({"sprung_mass": 1200.0}).simulate().status == "untrusted"
+    assert box.for_parameters({"PKY1": -27.0}).simulate().status == "untrusted"
 
 
 def test_a_loaded_model_of_a_box_gives_other_cars_too(tmp_path):

@@ -5,6 +5,7 @@ L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Ma
 
 import numpy as np
 
+from vehiclemor.reduction.car_checks import fitted_and_checked
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.projection.pod_settings import (
     PRESETS,
@@ -44,7 +45,9 @@ def fit(
 ) -> ReducedModel:
     """One POD subspace for the whole of the training runs."""
     edges = np.array([0.0, training[0].maneuver.duration])
-    return fit_subspaces(model, training, edges, settings)
+    return fitted_and_checked(
+        lambda car, runs: fit_subspaces(car, runs, edges, settings), model, training
+    )
 
 
 METHOD = Method(

@@ -11,13 +11,13 @@ import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
-from vehiclemor.reduction.cars import cars_of
+from vehiclemor.reduction.cars import cars_of, difference
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,8 @@ class ReplayModel(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The training trajectory whose input is nearest (root mean square) to the maneuver's.
 
-        Of several cars with the same input that of the nearest car.
+        Of several cars with the same input that of the nearest car, and it says so if this is
+        another one.
 
         Runs of the maneuver's own output times come first.  If there are none, inputs are compared
         over the time that a run and the maneuver share, and the run is read at the maneuver's
@@ -63,7 +64,10 @@ class ReplayModel(ShortRepr):
                 coordinates=_resampled(nearest.time, nearest.coordinates, times),
                 speeds=_resampled(nearest.time, nearest.speeds, times),
             )
-        return replace(
+        # Another car may do anything else.
+        other = difference(self.model, model)
+        told = Trust(np.inf, 0.0, f"it is the run of a car with another {other}") if other else None
+        run = replace(
             nearest,
             time=times,
             inputs=inputs,
@@ -71,6 +75,7 @@ class ReplayModel(ShortRepr):
             counts=dict.fromkeys(self.model.counts, 0),
             seconds=0.0,
         )
+        return run.judged(told)
 
     def for_car(self, model: Model) -> "ReplayModel":
         """The same trajectories; another car may be nearer."""

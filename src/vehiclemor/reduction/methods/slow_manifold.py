@@ -132,7 +132,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     if members:
         (odd, _), (even, _) = reduced.features.groups
         table = replace(table, features=reduced.features, odd=list(odd), even=list(even))
-        reduced = fitted_box(reduced, table, members, settings.hull).for_car(model)
+        reduced = fitted_box(reduced, table, training, members).for_car(model)
     reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,

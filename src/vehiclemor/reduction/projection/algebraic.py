@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.car_checks import CarChecks, checked
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
@@ -37,6 +38,8 @@ class AlgebraicProjection(SolvedAnywhere):
         Test bases (n, r) of the windows; None for least squares.
     tolerance
         Largest step of the last iteration (reduced coordinates).
+    checks, doubt
+        As of `DynamicProjection`.
     """
 
     model: AlgebraicModel
@@ -45,6 +48,8 @@ class AlgebraicProjection(SolvedAnywhere):
     tests: tuple[np.ndarray, ...] | None
     offline: Offline
     tolerance: float
+    checks: CarChecks | None = None
+    doubt: str = ""
 
     @property
     def effective_rank(self) -> int:
@@ -76,7 +81,7 @@ class AlgebraicProjection(SolvedAnywhere):
 
     def for_car(self, model: AlgebraicModel) -> "AlgebraicProjection":
         """The equations of another mechanism in the same subspaces."""
-        return replace(self, model=model, offline=Offline())
+        return checked(replace(self, model=model), self.checks, time.process_time())
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""

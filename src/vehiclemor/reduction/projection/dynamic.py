@@ -15,6 +15,7 @@ from typing import Self
 import numpy as np
 
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.car_checks import CarChecks, checked
 from vehiclemor.reduction.cars import cars_of
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
@@ -42,10 +43,14 @@ class DynamicProjection(ReducedSystem):
         one before has ended.
     subspaces
         What they follow from, for other cars.
+    checks, doubt
+        Runs that check a car, if it was learnt from several; why no run is trusted.
     """
 
     bases: tuple[Basis, ...] = ()
     subspaces: Subspaces | None = None
+    checks: CarChecks | None = None
+    doubt: str = ""
 
     def for_car(self, model: DynamicModel) -> Self:
         """The equations of another car in its subspaces."""
@@ -53,15 +58,15 @@ class DynamicProjection(ReducedSystem):
             raise InputError(f"the subspaces belong to one car of {model.name}")
         began = time.process_time()
         spaces, bases = self.subspaces.of(model)
-        return replace(
+        found = replace(
             self,
             model=model,
             system=model.system,
             spaces=spaces,
             bases=bases,
             effective_rank=max(basis.rank for basis in bases),
-            offline=offline_cost(began, model),
         )
+        return checked(found, self.checks, began)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""

@@ -48,6 +48,14 @@ class Transient:
     left: np.ndarray
     right: np.ndarray
 
+    def amplitudes(self, deviation: np.ndarray) -> np.ndarray:
+        """Amplitudes (m,) that a deviation (n,) of a start's shape excites; empty if it is none."""
+        if not len(self.rates):
+            return self.rates
+        found = self.left @ deviation
+        least = ROUNDING * (abs(self.left) @ abs(deviation))
+        return found[: None if (abs(found) > least).any() else 0]
+
 
 NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
 
@@ -136,13 +144,8 @@ class Lifting(ShortRepr):
             Of the start's shape from straight running (n,); m is zero if it excites none, as
             straight running at another speed.
         """
-        rates = amplitudes = self.transient.rates
-        if len(rates):
-            left = self.transient.left
-            amplitudes = left @ deviation
-            if (abs(amplitudes) <= ROUNDING * (abs(left) @ abs(deviation))).all():
-                rates = amplitudes = rates[:0]
-        found = np.array([rates, amplitudes], dtype=complex)
+        amplitudes = self.transient.amplitudes(deviation)
+        found = np.array([self.transient.rates[: len(amplitudes)], amplitudes], dtype=complex)
         return np.stack([np.real(found), np.imag(found)], axis=2)
 
     def states(

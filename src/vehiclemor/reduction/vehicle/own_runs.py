@@ -1,139 +1,83 @@
-"""A few runs of a car itself: they settle what a fit for many cars leaves open, and check it.
-
-The coefficients that a box of cars predicts are a prior, as sure as runs of the training have made
-them; Gauss-Newton on the car's own runs corrects them where these say otherwise.
-"""
+"""A few runs of a car itself: they settle what a fit for many cars leaves open, and check it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.car_checks import Input, registered
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import (
     Free,
     Target,
-    changed,
-    normal_equations,
-    run_errors,
+    finished,
+    improved,
+    planar_errors,
     spread,
-    targets,
 )
-from vehiclemor.registry import component
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start
 
-# Runs that correct a car's model, and further ones that check it; steps of the correction.
-CORRECTING, CHECKING, STEPS = 26, 4, 2
-# Their speeds lie apart by this part of how far training runs do.
-APART = 0.8
-# Weight of the prior, of one run of the training each.
-PRIOR = 0.3
-# How many times the first car's error on the same run, or 1 in the units of `trajectory_fit`, that
-# of another car may be.
-TRUSTED = 2.0
+# Runs of a car; one of so many checks, the others correct; Gauss-Newton steps of the correction.
+RUNS, CHECKED, STEPS = 64, 4, 3
+# Their speeds, in parts of how far those of training runs lie from the car's own; the last of them
+# goes with the other starts.
+SPEEDS = (-0.8, 0.0, 0.8, -0.4, 0.4)
+# Error of heading and place from which on a run is wrong, in the units of `trajectory_fit`.
+TRUSTED = 1.0
+# Part of what a wrong run uses that is right.
+BELOW = 0.95
 
 
 SPEED = "initial_speed"
 
 
-class Input(NamedTuple):
-    """A registered maneuver with its factors."""
-
-    maneuver: str
-    frequency: float
-    amplitude: float
-
-    @property
-    def made(self) -> Maneuver:
-        """The maneuver itself."""
-        return component("maneuver", self.maneuver).perturbed(self.frequency, self.amplitude)
-
-
 def chosen_inputs(training: Training) -> tuple[Input, ...]:
     """Some inputs of the training, that are registered maneuvers."""
-    given = [
-        Input(m.name, m.frequency_factor, m.amplitude_factor)
-        for m in (run.maneuver for run in training)
-    ]
-    known = [entry for entry in dict.fromkeys(given) if _registered(entry)]
-    return tuple(spread(known, (CORRECTING + CHECKING) / max(len(known), 1)))
+    known = list(dict.fromkeys(filter(None, (registered(run.maneuver) for run in training))))
+    return tuple(spread(known, RUNS / max(len(known), 1)))
 
 
-def _registered(entry: Input) -> bool:
-    try:
-        return bool(entry.made.samples)
-    except InputError:
-        return False
-
-
-def corrected(
-    reduced: ReducedVehicle,
-    plain: ReducedVehicle,
-    inputs: Sequence[Input],
-    free: Free,
-    prior: np.ndarray,
-    speeds: float,
-) -> tuple[ReducedVehicle, np.ndarray]:
-    """A reduced vehicle corrected by its car's own runs, and its errors on others.
+def own_runs(model: DynamicModel, inputs: Sequence[Input], speeds: float) -> list[TrainingRun]:
+    """Runs of a car by these inputs, at several speeds and from all starts.
 
     Parameters
     ----------
-    plain
-        The same, as states are encoded that are no starts.
-    prior
-        Normal matrix of a run of the training.
     speeds
         How far speeds of the training lie from the car's own in m/s.
     """
-    model = reduced.model
-    starts = [_start(model, APART * speeds * k) for k in (-1, 0, 1)]
-    runs = [
-        TrainingRun(model, entry.made, starts[i % len(starts)]) for i, entry in enumerate(inputs)
-    ]
-    if len(runs) <= CHECKING:
-        return reduced, np.zeros(0)
-    goals = targets(plain, runs, [run.recorded() for run in runs])
-    every = len(goals) // CHECKING
-    checking = goals[::every][:CHECKING]
-    correcting = [goal for goal in goals if not any(goal is other for other in checking)]
-    online = {"solver": reduced.solver, "tolerance": reduced.tolerance}
-    fine = replace(reduced, solver=plain.solver, tolerance=plain.tolerance)
-    for _ in range(STEPS):
-        fine = _stepped(fine, correcting, free, prior)
-    return replace(fine, **online), run_errors(fine, checking)
+    others, last, found = model.starts[1:] or model.starts, len(SPEEDS) - 1, []
+    for number, entry in enumerate(inputs):
+        turn, kind = divmod(number, len(SPEEDS))
+        name = others[turn % len(others)] if kind == last else model.starts[0]
+        start = _start(model, name, SPEEDS[kind] * speeds)
+        found.append(TrainingRun(model, entry.made, start))
+    return found
 
 
-def doubt(errors: np.ndarray, first: np.ndarray) -> str:
-    """Why a car is not trusted, by its errors on the checking runs and those of the first car."""
-    worst = float(np.max(errors / np.maximum(first, 1.0), initial=0.0))
-    if worst <= TRUSTED:
-        return ""
-    return f"errors in runs that check this car, {worst:.2g} times those of the first car"
+def corrected(
+    reduced: ReducedVehicle, goals: Sequence[Target], shares: np.ndarray, free: Free
+) -> tuple[ReducedVehicle, float]:
+    """A reduced vehicle corrected by its car's own runs, and how far it is right.
+
+    Parameters
+    ----------
+    shares
+        Largest part of the ranges of the training that each run uses (goals,).  It is right up to
+        what the wrong ones use; infinite if none is.
+    """
+    others = [goal for number, goal in enumerate(goals) if (number + 1) % CHECKED]
+    if correcting := finished(reduced, others):
+        reduced = improved(reduced, correcting, free, STEPS, 1.0)
+    wrong = planar_errors(reduced, goals) > TRUSTED
+    return reduced, BELOW * float(shares[wrong].min(initial=np.inf))
 
 
-def _start(model: DynamicModel, faster: float) -> Start:
-    """The first start, so much faster, of a model that has an initial speed."""
-    if SPEED not in model.parameters.entries or not faster:
-        return model.starts[0]
-    return reparametrised(model, {SPEED: float(model.parameters[SPEED]) + faster}).start()
-
-
-def _stepped(
-    reduced: ReducedVehicle, goals: Sequence[Target], free: Free, prior: np.ndarray
-) -> ReducedVehicle:
-    paths = [reduced.path(goal.run.maneuver, goal.run.start) for goal in goals]
-    if any(path is None for path in paths):
-        return reduced
-    normal, gradient = normal_equations(reduced, goals, [p for p in paths if p is not None], free)
-    step = np.linalg.solve(normal + PRIOR * len(goals) * prior, gradient)
-    found = changed(reduced, free, -step)
-    before, after = (np.sum(run_errors(car, goals) ** 2) for car in (reduced, found))
-    return found if after < before else reduced
+def _start(model: DynamicModel, name: str, faster: float) -> Start:
+    """A start, so much faster, of a model that has an initial speed."""
+    if SPEED not in model.parameters.entries:
+        return model.start(name)
+    return reparametrised(model, {SPEED: float(model.parameters[SPEED]) + faster}).start(name)

@@ -71,8 +71,6 @@ class ReducedVehicle(ShortRepr):
         Features of the lifting, with the same parameters, if not those of the equations.
     reach
         What the training runs have shown of durations and starts.
-    doubt
-        Why no run is trusted; nothing by default.
     """
 
     model: DynamicModel
@@ -90,7 +88,6 @@ class ReducedVehicle(ShortRepr):
     transient: Transient = NO_TRANSIENT
     lifted_features: Features | None = None
     reach: TrainingReach = NOTHING_KNOWN
-    doubt: str = ""
 
     @property
     def effective_rank(self) -> int:
@@ -147,8 +144,6 @@ class ReducedVehicle(ShortRepr):
 
     def _judged(self, run: Run, inputs: np.ndarray) -> Trust | None:
         """Of states one by one: they tell neither how long a run has lasted nor of its start."""
-        if self.doubt:
-            return Trust(np.inf, 0.0, self.doubt)
         watched = self.lift.features.watched
         used = self._lifted(run, inputs)[:, self.lift.layout.size :]
         return trust_of(run.times, used, [name for _, name in watched]) if watched else None
@@ -193,7 +188,6 @@ class ReducedVehicle(ShortRepr):
         known = self.known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
         states, trust = self.lift.of_run(run, inputs, known.excited, known.told)
-        trust = Trust(np.inf, 0.0, self.doubt) if self.doubt else trust
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state

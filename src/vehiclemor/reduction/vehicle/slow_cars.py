@@ -1,42 +1,45 @@
-"""Slow manifolds of a box of cars: one fit, and the model of each car in milliseconds.
+"""Slow manifolds of a box of cars: terms chosen once, and each car fitted to runs of its own.
 
 What is exact at straight running is that of each car: its slow modes, how they are steered, slips
-and roll by them, what a start excites.  What is fitted, the nonlinear coefficients and those of the
-full states, are polynomials of the place in the box, found from runs of all cars together.
+and roll by them, what a start excites.  Nonlinear coefficients begin as linear functions of the
+place in the box, found from runs of all cars together; a few runs of the car itself correct them.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 from typing import NamedTuple, cast
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.reduction.car_checks import Input
 from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected, doubt
+from vehiclemor.reduction.vehicle.own_runs import chosen_inputs, corrected, own_runs
+from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
+from vehiclemor.reduction.vehicle.regression import ridge_fit
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_features import (
     FeatureTable,
     Ranges,
+    arguments_of,
     feature_parameters,
     ranges_of,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, as_of
 from vehiclemor.reduction.vehicle.trajectory_fit import (
+    Target,
     changed,
+    finished,
     improved_together,
-    normal_matrix,
-    spread,
     targets,
 )
 from vehiclemor.registry import component
@@ -45,44 +48,65 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Gauss-Newton steps of the common fit.
-SWEEPS = 6
-# Share of the cars that tell how sure the coefficients are; tolerance of runs that correct them.
-PRIOR_CARS, FINE = 0.15, 1e-6
+SWEEPS = 4
+# Part of the ranges up to which a car is trusted of which nothing is known.
+NOTHING = 1e-6
+# Solver and tolerance of runs of a car, and of their reduced ones; weight of its lifting's size.
+ACCURATE = "exponential_adams", 1e-6
+FINE, RIDGE = 1e-6, 1e-10
 # Time (s) before a car is steered, in which its starts are seen, and samples in it.
 STILL, SAMPLES = 1.0, 101
-RIDGE = 1e-10
 
 
 class Member(NamedTuple):
-    """A car of the training with some of its runs."""
+    """A car with some of its runs."""
 
-    model: DynamicModel
     training: Sequence[TrainingRun]
     runs: Sequence[Trajectory]
     shape: VehicleShape
     modes: SlowModes
 
-    samples: ShapeSamples
+    @property
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Deviations of the shape (samples, n) and inputs, after landing."""
+        shape, runs = self.shape, self.runs
+        later = [after_landing(self.modes.symmetric, shape, run) for run in runs]
+        deviations = [shape.of(run.states) - shape.reference for run in later]
+        return np.vstack(deviations), np.vstack([run.inputs for run in later])
 
     @property
     def ranges(self) -> Ranges:
         """Ranges of its runs."""
-        return ranges_of(self.shape, self.modes, self.samples.deviations, self.samples.inputs)
+        return ranges_of(self.shape, self.modes, *self.samples)
 
-    def columns(self, features: Features, parameters: np.ndarray) -> np.ndarray:
-        """Features (samples, terms) of its samples."""
-        u = self.samples.inputs
-        z = np.column_stack(self.modes.coordinates(self.samples.deviations, u))
-        return feature_columns(features, z, u, parameters)
+    def within(self, table: FeatureTable) -> tuple[Member, np.ndarray]:
+        """The car with its runs that stay within ranges, and the part of these that each uses.
 
-    @property
-    def rates(self) -> np.ndarray:
-        """Rates of the slow coordinates and the speed, then psi', U and V (samples, states + 3)."""
-        samples, modes = self.samples, self.modes
-        slow = samples.rates @ modes.left.T
-        further = samples.inputs.shape[1] - 1
-        slow -= samples.inputs[:, 1:] @ modes.feedthrough[:, :further].T
-        return np.column_stack([slow, samples.rates @ modes.speed_left, samples.motion])
+        With the same steering a car may be near its limit where others are not.
+        """
+        training, runs, used = [], [], []
+        for given, run in zip(self.training, self.runs, strict=True):
+            deviations = self.shape.of(run.states) - self.shape.reference
+            arguments = arguments_of(self.shape, self.modes, deviations, run.inputs)
+            parts = np.abs(arguments).max(axis=0) / table.ranges.arguments
+            if parts[:-1].max() <= 1.0:
+                training.append(given)
+                runs.append(run)
+                used.append(parts.max())
+        return self._replace(training=training, runs=runs), np.array(used)
+
+    def goals(self, vehicle: ReducedVehicle) -> list[Target]:
+        """Its runs as those of a reduced vehicle of it should be."""
+        # States on the way are no starts.
+        plain = replace(vehicle, encoding=np.vstack([self.modes.left, self.modes.speed_left]))
+        return targets(plain, self.training, self.runs)
+
+    def lifting(self, vehicle: ReducedVehicle) -> np.ndarray:
+        """Coefficients (terms, n) with which the shape follows its runs best."""
+        deviations, u = self.samples
+        z = np.column_stack(self.modes.coordinates(deviations, u))
+        features = vehicle.lifted_features or vehicle.features
+        return ridge_fit(feature_columns(features, z, u, vehicle.parameters), deviations, RIDGE)
 
 
 def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, list[Training]]:
@@ -107,12 +131,14 @@ def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, l
 
 
 def member(training: Training, like: SlowModes) -> Member:
-    """A car by its runs, in coordinates like those of the first one."""
+    """A car by its runs, but those that fail, in coordinates like those of the first one."""
     model = cast("DynamicModel", training[0].model)
-    shape = VehicleShape(model)
-    modes, runs = as_of(shape, like), [run.recorded() for run in training]
-    samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
-    return Member(model, training, runs, shape, modes, samples)
+    shape, finished, runs = VehicleShape(model), [], []
+    for run in training:
+        with suppress(ConvergenceError):
+            runs.append(model.simulate(run.maneuver, run.start, run.maneuver.times, *ACCURATE))
+            finished.append(run)
+    return Member(finished, runs, shape, as_of(shape, like))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,35 +149,23 @@ class Box(ShortRepr):
     ----------
     cars
         Those of the training.
-    table, modes, turning, hull
+    table, modes, turning
         Features and slow modes of the first one, how it turns without lag, see
-        `FeatureTable.turning`; part of the ranges at which arguments are held.
-    degree
-        Of the polynomials.
-    coefficients
-        Changes (monomials, terms, states + 3) of the coefficients.
-    lifting
-        Coefficients (monomials, terms, n) of the lifting.
-    inputs, prior, errors
-        Inputs of runs of each car itself, normal matrix of a run of the training, and errors of the
-        first car on runs that check; see `own_runs`.
+        `FeatureTable.turning`.
+    coefficients, changes
+        Coefficients (terms, states + 3) of the first car, and their changes (1 + varied, free
+        coefficients): for all cars, and for each unit of a car's place in the box.
+    inputs
+        Of runs of each car itself, see `own_runs`.
     """
 
     cars: Cars
     table: FeatureTable
     modes: SlowModes
     turning: np.ndarray
-    hull: float
-    degree: int
     coefficients: np.ndarray
-    lifting: np.ndarray
+    changes: np.ndarray
     inputs: tuple[Input, ...]
-    prior: np.ndarray
-    errors: np.ndarray
-
-    def monomials(self, model: DynamicModel) -> np.ndarray:
-        """Monomials (m,) of the place of a car."""
-        return _monomials(self.cars.place(model), self.degree)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,39 +177,32 @@ class SlowVehicle(ReducedVehicle):
     def for_car(self, model: DynamicModel) -> ReducedVehicle:
         """The reduced vehicle of another car."""
         assert self.box is not None
-        began = time.process_time()
-        box, shape = self.box, VehicleShape(model)
-        modes, monomials = as_of(shape, box.modes), box.monomials(model)
-        fitted = replace(
-            self,
-            coefficients=np.tensordot(monomials, box.coefficients, 1),
-            lifting=np.tensordot(monomials, box.lifting, 1),
+        began, box = time.process_time(), self.box
+        table = box.table
+        own = member(own_runs(model, box.inputs, table.ranges.speed), box.modes)
+        known, shares = own.within(table)
+        fitted = replace(self, coefficients=box.coefficients, solver="dopri5", tolerance=FINE)
+        found = of_car(fitted, table, box.turning, own)
+        found = changed(found, table.free, _row(box.cars.place(model)) @ box.changes)
+        right = 0.0
+        if known.runs:
+            found, right = corrected(found, known.goals(found), shares, table.free)
+            found = replace(found, lifting=known.lifting(found))
+            found = replace(found, reach=training_reach(found, known.training, known.runs))
+        found.parameters[-1] = table.hull / np.clip(right, NOTHING, table.trusted)
+        return replace(
+            found,
+            solver=self.solver,
+            tolerance=self.tolerance,
+            offline=offline_cost(began, model, own.runs),
         )
-        found = of_car(fitted, box.table, box.hull, box.turning, shape, modes)
-        no_input = np.zeros((1, len(model.inputs)))
-        left = []
-        for name in model.starts:
-            state = model.start(name)
-            left.append(found.remainder(state[None], no_input, found.excited(state))[0])
-        found = replace(found, reach=self.reach.with_starts(np.array(left)))
-        plain = replace(_plain(found, modes), solver="dopri5", tolerance=FINE)
-        known = box.table.ranges.speed
-        found, errors = corrected(found, plain, box.inputs, box.table.free, box.prior, known)
-        found = replace(found, offline=offline_cost(began, model))
-        if not len(box.errors):
-            return replace(found, box=replace(box, errors=errors))
-        return replace(found, doubt=doubt(errors, box.errors))
 
 
 def of_car(
-    fitted: ReducedVehicle,
-    table: FeatureTable,
-    hull: float,
-    turning: np.ndarray,
-    shape: VehicleShape,
-    modes: SlowModes,
+    fitted: ReducedVehicle, table: FeatureTable, turning: np.ndarray, car: Member
 ) -> ReducedVehicle:
     """A fitted vehicle with all that is exact for another car."""
+    shape, modes = car.shape, car.modes
     c, k, n = fitted.coefficients.copy(), modes.lateral, len(modes.rates)
     table.set_linear(c, shape, modes)
     c[np.ix_(table.odd[: k + 1], [n + 1, n + 3])] += table.turning(shape, modes) - turning
@@ -204,18 +211,13 @@ def of_car(
         fitted,
         model=shape.model,
         shape=shape,
-        parameters=feature_parameters(shape, modes, table.ranges, hull),
+        parameters=feature_parameters(shape, modes, table.ranges, table.hull, table.trusted),
         coefficients=c,
         encoding=np.vstack([modes.left, modes.speed_left]),
         feedthrough=np.vstack([modes.feedthrough, inputs]),
         transient=modes.symmetric,
     )
     return landed(found, modes, _before_steering(shape.model))
-
-
-def _plain(vehicle: ReducedVehicle, modes: SlowModes) -> ReducedVehicle:
-    """The vehicle as it encodes states that are no starts."""
-    return replace(vehicle, encoding=np.vstack([modes.left, modes.speed_left]))
 
 
 def _before_steering(model: DynamicModel) -> list[Trajectory]:
@@ -226,9 +228,12 @@ def _before_steering(model: DynamicModel) -> list[Trajectory]:
 
 
 def fitted_box(
-    first: ReducedVehicle, table: FeatureTable, members: Sequence[Member], hull: float
+    first: ReducedVehicle,
+    table: FeatureTable,
+    training: Training,
+    members: Sequence[Member],
 ) -> SlowVehicle:
-    """The first car's reduced vehicle with what those of the others follow from.
+    """The first car's reduced vehicle with what those of the others begin from.
 
     Parameters
     ----------
@@ -236,87 +241,26 @@ def fitted_box(
         Fitted to the first car, which is the first of the members.
     table
         Its features.
+    training
+        All runs of the first car.
     """
-    cars = cars_of(m.model for m in members)
-    places = cars.places(cars.values)
-    degree = _degree(*places.shape)
-    rows = np.array([_monomials(place, degree) for place in places])
+    cars = cars_of(m.shape.model for m in members)
+    rows = np.array([_row(place) for place in cars.places(cars.values)])
     turning = table.turning(members[0].shape, members[0].modes)
     vehicles, goals = [], []
     for m in members:
-        vehicle = of_car(first, table, hull, turning, m.shape, m.modes)
-        goals.append(targets(_plain(vehicle, m.modes), m.training, m.runs))
+        vehicle = of_car(first, table, turning, m)
+        goals.append(finished(vehicle, m.within(table)[0].goals(vehicle)))
         vehicles.append(vehicle)
-    change = _by_rates(vehicles, members, rows, table)
-    change = improved_together(vehicles, goals, rows, table.free, SWEEPS, change=change)
-    coefficients = np.zeros((rows.shape[1], *first.coefficients.shape))
-    coefficients[0] = first.coefficients
-    place = 0
-    for terms, column in table.free:
-        coefficients[:, list(terms), column] += change[:, place : place + len(terms)]
-        place += len(terms)
-    lifting = _lifting(vehicles, members, rows)
-    some = spread(list(zip(vehicles, goals, rows @ change, strict=True)), PRIOR_CARS)
-    normals = [normal_matrix(changed(v, table.free, c), own, table.free) for v, own, c in some]
-    prior = np.sum(normals, axis=0) / sum(len(own) for _, own, _ in some)
-    inputs = chosen_inputs(members[0].training)
-    common = table, members[0].modes, turning, hull, degree, coefficients, lifting
-    box = Box(cars, *common, inputs, prior, np.zeros(0))
-    return SlowVehicle(
-        **{name: getattr(first, name) for name in first.__dataclass_fields__}, box=box
-    )
+    some = [number for number, own in enumerate(goals) if own]
+    vehicles, goals = ([part[i] for i in some] for part in (vehicles, goals))
+    changes = improved_together(vehicles, goals, rows[some], table.free, SWEEPS, 1.0)
+    inputs = chosen_inputs(training)
+    common = table, members[0].modes, turning, first.coefficients, changes, inputs
+    parts = {name: getattr(first, name) for name in first.__dataclass_fields__}
+    return SlowVehicle(**parts, box=Box(cars, *common))
 
 
-def _by_rates(
-    vehicles: Sequence[ReducedVehicle],
-    members: Sequence[Member],
-    rows: np.ndarray,
-    table: FeatureTable,
-) -> np.ndarray:
-    """Change (monomials, free coefficients) with which the rates of all cars fit best."""
-    m, terms = rows.shape[1], len(table.features.terms)
-    squares = np.zeros((m, terms, m, terms))
-    products = np.zeros((m, *vehicles[0].coefficients.shape))
-    for vehicle, car, row in zip(vehicles, members, rows, strict=True):
-        columns = car.columns(table.features, vehicle.parameters)
-        rest = car.rates - columns @ vehicle.coefficients
-        part = columns.T @ columns / len(columns)
-        squares += np.einsum("i,j,kl->ikjl", row, row, part)
-        products += np.einsum("i,kl->ikl", row, columns.T @ rest / len(columns))
-    found = []
-    for chosen, column in table.free:
-        kept = np.ix_(range(m), chosen)
-        square = squares[kept][:, :, :, chosen].reshape(m * len(chosen), -1)
-        square = square + RIDGE * len(members) * np.eye(len(square))
-        found.append(np.linalg.solve(square, products[kept][:, :, column].ravel()).reshape(m, -1))
-    return np.hstack(found)
-
-
-def _lifting(
-    vehicles: Sequence[ReducedVehicle], members: Sequence[Member], rows: np.ndarray
-) -> np.ndarray:
-    """Coefficients (monomials, terms, n) of the lifting, by the runs of all cars."""
-    features = vehicles[0].lifted_features or vehicles[0].features
-    terms, m, n = len(features.terms), rows.shape[1], len(vehicles[0].shape.kept)
-    normal, values = np.zeros((m * terms, m * terms)), np.zeros((m * terms, n))
-    for vehicle, car, row in zip(vehicles, members, rows, strict=True):
-        columns, deviations = car.columns(features, vehicle.parameters), car.samples.deviations
-        normal += np.kron(np.outer(row, row), columns.T @ columns) / len(columns)
-        values += np.kron(row[:, None], columns.T @ deviations) / len(columns)
-    normal += RIDGE * len(members) * np.eye(len(normal))
-    return np.linalg.solve(normal, values).reshape(m, terms, n)
-
-
-def _degree(cars: int, varied: int) -> int:
-    """Highest degree (2, 1 or 0) of a polynomial that so many cars determine."""
-    if cars >= (varied + 1) * (varied + 2) // 2:
-        return 2
-    return 1 if cars > varied else 0
-
-
-def _monomials(place: np.ndarray, degree: int) -> np.ndarray:
-    """1, x_i, and products x_i x_j up to a degree."""
-    found = [1.0]
-    for power in range(1, degree + 1):
-        found += [float(np.prod(part)) for part in combinations_with_replacement(place, power)]
-    return np.array(found)
+def _row(place: np.ndarray) -> np.ndarray:
+    """Row (1 + varied,) of a linear function of a place."""
+    return np.append(1.0, place)

@@ -50,7 +50,8 @@ class FeatureTable:
     """Features with the numbers of those that are odd and even in the lateral quantities.
 
     The first odd ones, `linear_count` of them, are lateral coordinates and the inputs, the first
-    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.
+    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.  Of `hull`
+    and `trusted` see the settings of the slow manifold.
     """
 
     features: Features
@@ -60,6 +61,8 @@ class FeatureTable:
     linear_count: int
     straight_count: int
     ranges: Ranges
+    hull: float
+    trusted: float
 
     def set_linear(self, c: np.ndarray, shape: VehicleShape, modes: SlowModes) -> None:
         """Write what is exact at straight running into coefficients (terms, states + 3)."""
@@ -119,13 +122,21 @@ def ranges_of(
 ) -> Ranges:
     """Ranges of deviations of the shape (samples, n) of one car, at inputs (samples, inputs)."""
     z, speed = modes.coordinates(deviations, u)
+    values = arguments_of(shape, modes, deviations, u)
+    return Ranges(largest(values), largest(z), largest(u), float(largest(speed[:, None])[0]))
+
+
+def arguments_of(
+    shape: VehicleShape, modes: SlowModes, deviations: np.ndarray, u: np.ndarray
+) -> np.ndarray:
+    """Arguments (samples, 5) of the nonlinear terms, of deviations and inputs alike."""
+    z, speed = modes.coordinates(deviations, u)
     k, rows = modes.lateral, _variables(shape, modes)
     # The axles' slips go as one over the speed where they come from motion, not from steering.
     at_speed = shape.speed / (shape.speed + speed)
     values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
     values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    moved = float(largest(speed[:, None])[0] or 1.0)
-    return Ranges(largest(values), largest(z), largest(u), moved)
+    return values
 
 
 def widest(ranges: Sequence[Ranges]) -> Ranges:
@@ -135,12 +146,13 @@ def widest(ranges: Sequence[Ranges]) -> Ranges:
 
 
 def feature_parameters(
-    shape: VehicleShape, modes: SlowModes, ranges: Ranges, hull: float
+    shape: VehicleShape, modes: SlowModes, ranges: Ranges, hull: float, trusted: float
 ) -> np.ndarray:
-    """Parameters in the text of the features."""
+    """Parameters in the text of the features; the last one tells how far lateral ones may go."""
     rows = _variables(shape, modes) * (1.0 / (hull * ranges.arguments))[:, None]
     own = [1.0 / ranges.states, 1.0 / ranges.inputs]
-    return np.concatenate([rows.ravel(), *own, [shape.speed, 1.0 / (hull * ranges.speed)]])
+    last = [shape.speed, 1.0 / (hull * ranges.speed), hull / trusted]
+    return np.concatenate([rows.ravel(), *own, last])
 
 
 def feature_table(
@@ -153,7 +165,7 @@ def feature_table(
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     k, n, inputs = modes.lateral, len(ranges.states), len(ranges.inputs)
-    parameters = feature_parameters(shape, modes, ranges, hull)
+    parameters = feature_parameters(shape, modes, ranges, hull, trusted)
     width = k + 2
 
     def held(text: str) -> str:
@@ -193,10 +205,9 @@ def feature_table(
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    edge = f"{hull / trusted!r} * raw"
     steered = held(f"{1.0 / MOVING!r} * ({' + '.join(f'abs({x})' for x in v)})")
-    watched = [(f"{edge}{i}", meaning) for i, meaning in enumerate(MEANINGS)]
-    watched += [(edge, "change of speed")]
+    watched = [(f"p[{last + 2}] * raw{i}", meaning) for i, meaning in enumerate(MEANINGS)]
+    watched += [(f"{hull / trusted!r} * raw", "change of speed")]
     # More of it than corners make is known only where the car runs straight.
     alive = f"({AFTER_LANDING!r} + {(1.0 / STEERED - AFTER_LANDING)!r} * ({steered}))"
     watched += [(f"{alive} * {e}", "heave and pitch") for e in own[k:]]
@@ -205,7 +216,8 @@ def feature_table(
         n + 1, inputs, tuple(lines), terms, groups, modes.blocks, tuple(watched), len(MEANINGS)
     )
     counts = k + inputs, 2 + n - k
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
+    known = *counts, ranges, hull, trusted
+    return FeatureTable(features, parameters, list(lateral), list(symmetric), *known)
 
 
 def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:

@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
+from vehiclemor.reduction.vehicle.sensitivity_loops import AlongRun
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
@@ -29,6 +31,7 @@ STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
 DIFFERENCE = 1e-6
+LOOPS = ("simulation.integrators.dense_solves", "reduction.vehicle.sensitivity_loops")
 # Least sum of squares that a weight is made of.
 NOTHING = 1e-12
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
@@ -189,6 +192,11 @@ def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
     return bool(np.isfinite(_compared(reduced, goals)[1]))
 
 
+def finished(reduced: ReducedVehicle, goals: Sequence[Target]) -> list[Target]:
+    """Those that the reduced vehicle comes to the end of."""
+    return [g for g in goals if reduced.path(g.run.maneuver, g.run.start) is not None]
+
+
 def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
     """Normal matrix of the free coefficients, column by column; all runs must finish."""
     paths, _ = _compared(reduced, goals)
@@ -219,9 +227,10 @@ def _compared(
     return paths, total
 
 
-def run_errors(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
-    """Error of each run (goals,); infinite if it has failed."""
+def planar_errors(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
+    """Errors of heading and place of each run (goals,); infinite if it has failed."""
     scale, found = _scale(goals), []
+    scale[:-PLANAR] = 0.0
     for goal in goals:
         path = reduced.path(goal.run.maneuver, goal.run.start)
         found.append(np.inf if path is None else np.linalg.norm(_errors(goal, path, scale)))
@@ -252,9 +261,8 @@ def normal_equations(
     size = sum(len(terms) for terms, _ in free)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for goal, path in zip(goals, paths, strict=True):
-        sensitivity = _sensitivities(reduced, goal, path, free)
-        sensitivity *= scale[:, None] * goal.shares[:, None, None]
-        rows = sensitivity.reshape(-1, size)
+        rows = _sensitivities(reduced, goal, path, free, goal.shares[:, None] * scale)
+        rows = rows.reshape(-1, size)
         error = _errors(goal, path, scale).ravel()
         weight = max(error @ error, NOTHING) ** (0.5 * power - 1.0)
         normal += weight * (rows.T @ rows)
@@ -263,44 +271,41 @@ def normal_equations(
 
 
 def _sensitivities(
-    reduced: ReducedVehicle, goal: Target, path: np.ndarray, free: Free
+    reduced: ReducedVehicle, goal: Target, path: np.ndarray, free: Free, weights: np.ndarray
 ) -> np.ndarray:
-    """Derivatives (compared times, states + 3, free coefficients) of a reduced run."""
+    """Derivatives (compared times, states + 3, free coefficients) of a reduced run.
+
+    Those of each state at each time come times its weight (compared times, states + 3).
+    """
     k, c = reduced.features.states, reduced.coefficients
-    path, inputs = path[goal.steps], goal.inputs[goal.steps]
-    z, heading = np.ascontiguousarray(path[:, :k]), path[:, k]
-    columns = feature_columns(reduced.features, z, inputs, reduced.parameters)
-    values = columns @ c
-    dim, samples = k + PLANAR, len(path)
-    cosine, sine = np.cos(heading), np.sin(heading)
-    # Derivatives of the states' rates by the columns z', psi', U and V of C phi.
-    spread = np.zeros((samples, dim, dim))
-    spread[:, range(k + 1), range(k + 1)] = 1.0
-    spread[:, k + 1, k + 1], spread[:, k + 1, k + 2] = cosine, -sine
-    spread[:, k + 2, k + 1], spread[:, k + 2, k + 2] = sine, cosine
-    jacobian = np.zeros((samples, dim, dim))
-    for j in range(k):
-        width = DIFFERENCE * max(1.0, float(np.abs(z[:, j]).max()))
-        shifted = z.copy()
-        shifted[:, j] += width
-        change = feature_columns(reduced.features, shifted, inputs, reduced.parameters) @ c - values
-        jacobian[:, :, j] = np.einsum("nij,nj->ni", spread, change / width)
-    forward, sideward = values[:, k + 1], values[:, k + 2]
-    jacobian[:, k + 1, k] = -forward * sine - sideward * cosine
-    jacobian[:, k + 2, k] = forward * cosine - sideward * sine
-    forcing = np.concatenate(
-        [spread[:, :, [column]] * columns[:, None, list(terms)] for terms, column in free], axis=2
+    path, inputs, times = path[goal.steps], goal.inputs[goal.steps], goal.times[goal.steps]
+    z, samples = path[:, :k], len(times)
+    # One copy as it is, then one with each coordinate moved.
+    widths = DIFFERENCE * np.maximum(1.0, np.abs(z).max(axis=0))
+    shifts = np.vstack([np.zeros(k), np.diag(widths)])
+    moved = (z + shifts[:, None]).reshape(-1, k)
+    columns = feature_columns(
+        reduced.features, moved, np.tile(inputs, (k + 1, 1)), reduced.parameters
     )
-    # The trapezoidal rule, for all coefficients at once.
-    half = 0.5 * np.diff(goal.times[goal.steps])[:, None, None]
-    identity = np.eye(dim)
-    inverse = np.linalg.inv(identity - half * jacobian[1:])
-    advance = inverse @ (identity + half * jacobian[:-1])
-    pushed = (inverse * half) @ (forcing[1:] + forcing[:-1])
-    current = np.zeros(forcing.shape[1:])
-    kept, first = [current], (samples - 1) % COMPARED
-    for n in range(1, samples):
-        current = advance[n - 1] @ current + pushed[n - 1]
-        if (n - first) % COMPARED == 0:
-            kept.append(current)
-    return np.array(kept[-len(goal.compared) :])
+    values, *others = (columns @ c).reshape(k + 1, samples, -1)
+    slopes = np.stack(
+        [(other - values) / width for other, width in zip(others, widths, strict=True)], axis=2
+    )
+    cosine, sine = np.cos(path[:, k]), np.sin(path[:, k])
+    forward, sideward = values[:, k + 1], values[:, k + 2]
+    by_heading = -forward * sine - sideward * cosine, forward * cosine - sideward * sine
+    motion = np.column_stack([cosine, sine, *by_heading])
+    terms, targets = np.array([(i, column) for some, column in free for i in some]).T.copy()
+    dim, m = k + PLANAR, len(terms)
+    result = np.empty((len(goal.compared), dim, m))
+    scratch = np.empty((2 * dim + PLANAR) * m + 3 * k * k)
+    run = AlongRun(times, columns[:samples], slopes, motion)
+    pivots = np.empty(k, dtype=np.int64)
+    if not _loop()(run, terms, targets, COMPARED, weights, result, scratch, pivots):
+        raise np.linalg.LinAlgError("a step of the variational equations is singular")
+    return result
+
+
+def _loop() -> Loop:
+    name = "sensitivities"
+    return loops(LOOPS, (name,))[name]

@@ -38,12 +38,12 @@ def rhs(problem, t, y, dy):
     rate = dy[turning[0]]
     for part in range(count):
         own, tangent = rates[part], vector(y, n * (1 + part), n)
-        turned, turned_rate = tangent[turning[0]], own[turning[0]]
+        change, change_rate = tangent[turning[0]], own[turning[0]]
         rotate(own, turning, cosine, -sine)
         for k in range(1, len(turning), 2):
             a, b = turning[k], turning[k + 1]
-            own[a] += turned * dy[b] + turned_rate * y[b] + rate * tangent[b]
-            own[b] -= turned * dy[a] + turned_rate * y[a] + rate * tangent[a]
+            own[a] += change * dy[b] + change_rate * y[b] + rate * tangent[b]
+            own[b] -= change * dy[a] + change_rate * y[a] + rate * tangent[a]
     for k in range(1, len(turning), 2):
         dy[turning[k]] += rate * y[turning[k + 1]]
         dy[turning[k + 1]] -= rate * y[turning[k]]
@@ -51,39 +51,29 @@ def rhs(problem, t, y, dy):
 
 def lift(problem, y, x):
     """State and tangents x (n (1 + count),) of the transformed ones."""
-    turning, count = problem.equations.turning, len(problem.equations.directions)
-    n = len(y) // (1 + count)
-    for i in range(len(x)):
-        x[i] = y[i]
-    if len(turning) == 0:
-        return
-    cosine, sine = heading_of(turning, y)
-    rotate(x, turning, cosine, sine)
-    for part in range(count):
-        own = vector(x, n * (1 + part), n)
-        turned = own[turning[0]]
-        for k in range(1, len(turning), 2):
-            a, b = turning[k], turning[k + 1]
-            own[a] -= turned * y[b]
-            own[b] += turned * y[a]
-        rotate(own, turning, cosine, sine)
+    turned(problem, y, x, 1.0)
 
 
 def project(problem, t, x, y, counts):
     """Transformed state and tangents y (dim,) of those of a system x (n (1 + count),)."""
+    turned(problem, x, y, -1.0)
+
+
+def turned(problem, given, found, sign):
+    """Turned with the heading or back: b = R(s psi) a, b_p = R(s psi) (a_p + s psi_p J a)."""
     turning, count = problem.equations.turning, len(problem.equations.directions)
-    n = len(y) // (1 + count)
-    for i in range(len(y)):
-        y[i] = x[i]
+    n = len(given) // (1 + count)
+    for i in range(len(given)):
+        found[i] = given[i]
     if len(turning) == 0:
         return
-    cosine, sine = heading_of(turning, x)
-    rotate(y, turning, cosine, -sine)
+    cosine, sine = heading_of(turning, given)
+    rotate(found, turning, cosine, sign * sine)
     for part in range(count):
-        own = vector(y, n * (1 + part), n)
-        rotate(own, turning, cosine, -sine)
-        turned = own[turning[0]]
+        own = vector(found, n * (1 + part), n)
+        change = sign * own[turning[0]]
         for k in range(1, len(turning), 2):
             a, b = turning[k], turning[k + 1]
-            own[a] += turned * y[b]
-            own[b] -= turned * y[a]
+            own[a] -= change * given[b]
+            own[b] += change * given[a]
+        rotate(own, turning, cosine, sign * sine)

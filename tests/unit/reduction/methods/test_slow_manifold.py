@@ -258,7 +258,8 @@ def test_sensitivities_are_the_differences_of_runs(vehicle: Any) -> None:
     term, k = 16, reduced.features.states
     free = [([term], 0), ([term], k)]
     path = reduced.path(lane_change, "equilibrium")
-    found = _sensitivities(reduced, goal, path, free)
+    weights = np.ones((len(goal.compared), k + 3))
+    found = _sensitivities(reduced, goal, path, free, weights)
     for place, (_, column) in enumerate(free):
         changed = reduced.coefficients.copy()
         width = 1e-3 * np.abs(changed[:, column]).max()

@@ -1,0 +1,268 @@
+"""Fits of the two-track model to runs of one car, see `methods/two_track.py`.
+
+Which terms there are is chosen once; with the same terms another car's coefficients are ridge fits.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vehiclemor.errors import InputError
+from vehiclemor.multibody.components.tire_coefficients import FIALA
+from vehiclemor.reduction.cars import difference
+from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.vehicle import tire_features as tf
+from vehiclemor.reduction.vehicle.feature_system import feature_columns
+from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.landing import PATHS
+from vehiclemor.reduction.vehicle.mirror import mirror
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.trajectory_fit import Free
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.trajectory import Trajectory
+
+# The states that are coordinates, and those of them whose rates are accelerations.
+COORDINATES = ("y_dot", "psi_dot", "phi", "phi_dot")
+ACCELERATIONS = (0, 1, 3)
+# Symmetric states for which the lifting has terms of its own.
+SEEN = ("theta", "z_dot")
+RIDGE = 1e-12
+
+
+# What terms are for -> those that are chosen: of the equations and the lifting, and by their lines
+# of slips and loads.
+FEATURES = ("odd", "even", "lifted")
+Chosen = dict[str, list[str]]
+
+
+class Sizes(NamedTuple):
+    """Settings of the fit, see `TwoTrackSettings`."""
+
+    terms: int
+    even_terms: int
+    wheel_terms: int
+    lifted_terms: int
+    hull: float
+    reversal: float
+    saturation: float
+
+
+class Samples(NamedTuple):
+    """Samples of all training runs.
+
+    Attributes
+    ----------
+    z, inputs
+        Reduced coordinates (samples, 5), inputs (samples, inputs).
+    rates
+        Their rates (samples, 5).
+    shape
+        Of the vehicle's shape.
+    outputs
+        Of the vehicle (samples, outputs).
+    """
+
+    z: np.ndarray
+    inputs: np.ndarray
+    rates: np.ndarray
+    shape: ShapeSamples
+    outputs: np.ndarray
+
+
+def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
+    """Training runs of a car that begin in straight running, at any speed.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    shape = VehicleShape(model)
+    dropped = slow_modes(shape, np.inf).symmetric
+    found = []
+    for run in training:
+        if not difference(model, run.model):
+            deviation = shape.of(model.start(run.start)[None])[0] - shape.reference
+            if not len(dropped.amplitudes(deviation)):
+                found.append(run)
+    if not found:
+        raise InputError(f"no training run is of this {model.name} and begins in straight running")
+    return found
+
+
+def fitted_to(
+    model: DynamicModel,
+    runs: Sequence[Trajectory],
+    sizes: Sizes,
+    chosen: Chosen,
+    stride: int = 1,
+) -> tuple[ReducedVehicle, Samples]:
+    """Slips, loads, accelerations and the other states, fitted to every `stride`th sample of runs.
+
+    Parameters
+    ----------
+    chosen
+        Terms by what they are for; what is missing is chosen and added.
+    """
+    shape = VehicleShape(model)
+    modes = slow_modes(shape, np.inf)
+    runs = [thinned(run, stride) for run in runs]
+    of_shape = shape_samples(shape, runs)
+    encoding = np.zeros((tf.STATES, len(shape.names)))
+    for i, name in enumerate(COORDINATES):
+        encoding[i, shape.names.index(name)] = 1.0
+    encoding[tf.SPEED] = modes.speed_left
+    samples = Samples(
+        of_shape.deviations @ encoding.T,
+        of_shape.inputs,
+        of_shape.rates @ encoding.T,
+        of_shape,
+        np.concatenate([run.outputs for run in runs]),
+    )
+    text = tire_text(shape, samples, sizes, chosen)
+    return fitted_on_rates(shape, modes, encoding, text, samples, sizes, chosen), samples
+
+
+def tire_text(shape: VehicleShape, samples: Samples, sizes: Sizes, chosen: Chosen) -> tf.Text:
+    """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
+    z, u = samples.z, samples.inputs
+    model, inputs = shape.model, u.shape[1]
+    reach = sizes.hull * largest(tf.argument_values(shape.speed, z, u))
+    reversal = sizes.reversal * float(largest(u[:, :1] * u[:, 1:2])[0])
+    text = tf.arguments(shape.speed, reach, reversal)
+    linear = tf.linear_terms(inputs)
+    odd = [*linear, *tf.CUBIC, *tf.FASTER]
+    even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]
+    given = text.features(inputs, [*odd, *even])
+    columns = feature_columns(given, z, u, np.array(text.values))
+    parities = (
+        (odd, columns[:, : len(odd)], len(linear)),
+        (even, columns[:, len(odd) :], 1),
+    )
+
+    def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
+        return samples.outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
+
+    for axle, wheels in enumerate(tf.AXLES):
+        slips, loads = np.tan(of_wheels("slip_angle", wheels)), of_wheels("Fz", wheels)
+        for name, values, mean_parity in (("slip", slips, 0), ("load", loads, 1)):
+            mean, half = values @ [0.5, 0.5], values @ [0.5, -0.5]
+            for end, target, parity in (("", mean, mean_parity), ("_half", half, 1 - mean_parity)):
+                terms, table, first = parities[parity]
+                line = f"{name}{end}{axle}"
+                if line not in chosen:
+                    found = forward_selection(table, target[:, None], first, sizes.wheel_terms)
+                    chosen[line] = [terms[i] for i in found]
+                numbers = [terms.index(term) for term in chosen[line]]
+                weights = ridge_fit(table[:, numbers], target, RIDGE)
+                text.sum(line, chosen[line], weights.tolist())
+        parameters = {name: float(model.parameters[name]) for name in FIALA}
+        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), sizes.saturation))
+    return text
+
+
+def fitted_on_rates(
+    shape: VehicleShape,
+    modes: SlowModes,
+    encoding: np.ndarray,
+    text: tf.Text,
+    samples: Samples,
+    sizes: Sizes,
+    chosen: Chosen,
+) -> ReducedVehicle:
+    """Equations fitted to the accelerations of the training runs."""
+    z, u, rates, of_shape, _ = samples
+    inputs, parameters = u.shape[1], np.array(text.values)
+
+    def columns_of(terms: Sequence[str]) -> np.ndarray:
+        return feature_columns(text.features(inputs, terms), z, u, parameters)
+
+    def of(
+        kind: str, given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
+    ) -> list[str]:
+        if kind not in chosen:
+            terms = [*given, *(term for term in others if term not in given)]
+            scaled = values / np.sqrt(np.mean(values**2, axis=0))
+            numbers = forward_selection(columns_of(terms), scaled, len(given), more)
+            chosen[kind] = [terms[i] for i in numbers]
+        return chosen[kind]
+
+    plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
+    odd = of("odd", plain, tf.odd_candidates(), rates[:, ACCELERATIONS], sizes.terms)
+    forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
+    symmetric = np.column_stack([rates[:, tf.SPEED], forward])
+    candidates = tf.even_candidates(inputs)
+    even = of("even", [f"z{tf.SPEED}"], candidates, symmetric, sizes.even_terms)
+    terms = [*odd, "1.0", *even]
+    seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
+    lifted = of("lifted", terms, candidates, seen, sizes.lifted_terms)
+    columns = columns_of(terms)
+    k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
+    lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
+    c[:k, tf.LATERAL] = ridge_fit(columns[:, :k], lateral, RIDGE)
+    # Straight running at any speed is an equilibrium.
+    c[k, 6], c[k + 1, 6] = shape.speed, 1.0
+    c[k + 2 :, tf.SYMMETRIC] = ridge_fit(columns[:, k + 2 :], symmetric, RIDGE)
+    return ReducedVehicle(
+        shape.model,
+        shape,
+        text.features(inputs, terms, len(odd)),
+        parameters,
+        c,
+        both_sides(shape, columns_of(lifted), len(odd), of_shape.deviations),
+        encoding,
+        np.zeros((tf.STATES, inputs)),
+        np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
+        Offline(),
+        "dopri5",
+        1e-6,
+        modes.symmetric,
+        text.features(inputs, lifted),
+    )
+
+
+def both_sides(
+    shape: VehicleShape, columns: np.ndarray, odd: int, deviations: np.ndarray
+) -> np.ndarray:
+    """Coefficients (terms, n) of the shape: of its odd part by odd terms, which are the first."""
+    image = deviations @ mirror(shape).T
+    parts = np.split(columns, [odd], axis=1)
+    return np.vstack(
+        [
+            ridge_fit(part, 0.5 * (deviations + sign * image), RIDGE)
+            for part, sign in zip(parts, (-1, 1), strict=True)
+        ]
+    )
+
+
+def free_coefficients(reduced: ReducedVehicle) -> Free:
+    """The coefficients that whole runs improve."""
+    (odd, _), (even, symmetric) = reduced.features.groups
+    return [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
+
+
+def thinned(run: Trajectory, stride: int) -> Trajectory:
+    """Every so many samples of a run."""
+    return replace(run, **{name: getattr(run, name)[::stride] for name in PATHS})
+
+
+def lifted_anew(
+    reduced: ReducedVehicle, training: Training, samples: Samples, stride: int = 1
+) -> ReducedVehicle:
+    """The lifting fitted to where the reduced runs are, whose speed has become their own."""
+    paths = [reduced.path(run.maneuver, run.start) for run in training]
+    kept = [path[::stride] for path in paths if path is not None]
+    if len(kept) < len(paths):
+        return reduced
+    assert reduced.lifted_features is not None
+    z = np.ascontiguousarray(np.concatenate(kept)[:, : tf.STATES])
+    columns = feature_columns(reduced.lifted_features, z, samples.inputs, reduced.parameters)
+    odd = len(reduced.features.groups[0][0])
+    lifting = both_sides(reduced.shape, columns, odd, samples.shape.deviations)
+    return replace(reduced, lifting=lifting)

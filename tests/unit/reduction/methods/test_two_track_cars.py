@@ -1,0 +1,129 @@
+"""Two-track models of a box of cars: each car's own, checked, and warned of beyond the box."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.errors import InputError
+from vehiclemor.reduction.vehicle import two_track_cars
+from vehiclemor.reduction.vehicle.two_track_fit import straight
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+from vehiclemor.study.scenario import Scenario, start_of, training_run
+
+NAME = "high_fidelity_vehicle"
+LANE_CHANGE = component("maneuver", "rack_lane_change")
+RUNS = [(f, a, v) for f in (0.8, 1.1, 1.6) for a in (-0.6, 1.2) for v in (19.0, 20.0, 21.5)]
+CORNERS = [
+    {"chassis_mass": 1300.0, "cornering_stiffness": 130000.0},
+    {"chassis_mass": 1700.0, "cornering_stiffness": 105000.0},
+]
+
+
+def scenario(frequency, amplitude, speed, start="equilibrium"):
+    return Scenario(LANE_CHANGE.perturbed(frequency, amplitude), start, speed)
+
+
+@cache
+def of_box():
+    return vm.reduce(
+        NAME,
+        "two_track",
+        training=[scenario(*run) for run in RUNS],
+        cars=CORNERS,
+        terms=8,
+        even_terms=12,
+        wheel_terms=6,
+        sweeps=4,
+    )
+
+
+@cache
+def corner(number):
+    return of_box().for_parameters(CORNERS[number])
+
+
+def unseen(rom):
+    """A run that no model was trained on, and the full one."""
+    case = scenario(1.1, -1.0, 20.5)
+    start = start_of(rom.model, case)
+    return rom.simulate(case.maneuver, start), rom.model.simulate(case.maneuver, start)
+
+
+def apart(run, other, name="lateral_position"):
+    column = build(NAME).outputs.index(name)
+    return np.abs(run.outputs[:, column] - other.outputs[:, column]).max()
+
+
+def test_the_first_car_is_as_it_was_fitted_and_nearly_so_when_it_is_remade():
+    first = of_box()
+    assert first.for_parameters({}).reduced is first.reduced
+    remade = corner(0).for_parameters({name: first.parameters[name] for name in CORNERS[0]})
+    (run, full), (again, _) = unseen(first), unseen(remade)
+    assert run.status == again.status == "ok"
+    # The one is checked by a run that the other has learnt from.
+    assert apart(again, run) < 0.1
+    assert apart(run, full) < 0.1
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_car_at_a_corner_is_predicted(number):
+    run, full = unseen(corner(number))
+    assert run.status == "ok"
+    for name in ("lateral_position", "longitudinal_position"):
+        assert apart(run, full, name) < 0.05
+    # The first car drives elsewhere.
+    assert apart(unseen(of_box())[1], full) > 0.2
+
+
+def test_its_terms_are_those_of_the_first_car_and_its_tires_its_own():
+    first, other = of_box().reduced, corner(0).reduced
+    assert other.features == first.features
+    assert other.lifted_features == first.lifted_features
+    stiffness = CORNERS[0]["cornering_stiffness"] / 3.0
+    assert np.isclose(other.parameters, stiffness).any()
+    assert not np.isclose(first.parameters, stiffness).any()
+
+
+def test_a_car_beyond_the_box_is_not_trusted():
+    heavy = of_box().for_parameters({"chassis_mass": 1750.0})
+    run, _ = unseen(heavy)
+    assert run.status == "untrusted"
+    assert "chassis_mass is 1750; the cars of the training have 1300 to 1700" in run.message
+
+
+def test_a_car_whose_own_runs_tell_otherwise_is_not_trusted(monkeypatch):
+    def worse(reduced, *_):
+        spoilt = reduced.coefficients.copy()
+        spoilt[:, 5] *= 1.02
+        return replace(reduced, coefficients=spoilt)
+
+    monkeypatch.setattr(two_track_cars, "improved", worse)
+    run, _ = unseen(of_box().for_parameters(CORNERS[0]))
+    assert run.status == "untrusted"
+    assert "runs that check this car" in run.message
+
+
+def test_a_car_that_slides_wherever_it_is_driven_is_refused():
+    first = of_box().reduced
+    strict = replace(first, box=replace(first.box, sliding=1e-3))
+    with pytest.raises(InputError, match="slides"):
+        strict.for_car(vm.model(NAME, parameters=CORNERS[0]))
+
+
+def test_runs_that_begin_with_a_drop_are_not_learnt_from():
+    model = build(NAME)
+    starts = ("equilibrium", "dropped", "equilibrium")
+    runs = [training_run(model, scenario(1.0, 1.0, 18.0 + i, s)) for i, s in enumerate(starts)]
+    assert straight(model, runs) == [runs[0], runs[2]]
+    with pytest.raises(InputError, match="straight running"):
+        straight(model, runs[1:2])
+
+
+def test_what_is_saved_makes_the_same_cars(tmp_path):
+    of_box().save(tmp_path / "box.nc")
+    found = vm.load(tmp_path / "box.nc").for_parameters(CORNERS[0])
+    np.testing.assert_allclose(unseen(found)[0].outputs, unseen(corner(0))[0].outputs, atol=1e-6)
