@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+# Names of which all are listed where none is near.
+MANY = 40
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
     getattr(errno, name)
@@ -100,6 +102,11 @@ def blamed(whose: str) -> Iterator[None]:
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Question that offers the nearest of the known names; empty if none is near."""
-    near = difflib.get_close_matches(str(name), list(known), n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else ""
+    """Question that offers the nearest of the known names; of few, if none is near, nothing."""
+    name, known = str(name), list(known)
+    if near := difflib.get_close_matches(name, known, n=3, cutoff=0.5):
+        return f"did you mean {' or '.join(near)}?"
+    if len(known) <= MANY:
+        return ""
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.0)
+    return f"nearest of {len(known)}: {', '.join(near)}; all: vehiclemor list, vehiclemor show NAME"

@@ -5,6 +5,7 @@ import pytest
 import vehiclemor.online.sobol as online
 from vehiclemor.errors import InputError
 from vehiclemor.report import sobol
+from vehiclemor.report.figures import sobol as drawing
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.sobol import SobolFile, sobol_dataset
 from vehiclemor.resources import data_folder, data_names
@@ -51,8 +52,12 @@ def test_the_figure_is_drawn_of_stored_indices(tmp_path, monkeypatch):
     for name in ("total_order", "first_order"):
         assert first[name].values.ravel() == pytest.approx(heights[:2])
         heights = heights[2:]
+    doubted = first.assign(untrusted=("model", [0.25]))
+    monkeypatch.setattr(drawing, "sobol_dataset", lambda *_: doubted)
+    text = entry.draw({}).legends[0].get_texts()[0].get_text()
+    assert text.endswith("s, 25 % untrusted)")
 
 
 def test_other_models_have_no_box(tmp_path):
     with pytest.raises(InputError, match="declares a box"):
-        sobol_dataset("high_fidelity_vehicle", tmp_path)
+        sobol_dataset("quarter_car", tmp_path)

@@ -28,6 +28,7 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
     out
         Results folder.
     """
+    from vehiclemor.report.errors import warned_runs
     from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
@@ -43,7 +44,12 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
             results = run_studies(study, out, jobs, scheduler)
     errors = 0
     for name, dataset in results.items():
-        count = Counter(str(status) for status in dataset["status"].values.ravel())
+        status = dataset["status"]
+        if "remark" in dataset:
+            # What a protocol would not trust is no plain success.
+            doubted = (status == "ok") & warned_runs(dataset)
+            status = status.where(~doubted, "untrusted")
+        count = Counter(str(one) for one in status.values.ravel())
         counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
         places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
         print(wrapped(f"{name}: {places}; {dataset.encoding['source']}", 0, 2))

@@ -14,7 +14,6 @@ from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.training import training_set
-from vehiclemor.reduction.car_checks import doubted
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -123,7 +122,8 @@ class ReducedOrderModel(ShortRepr):
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The reduced model of another car: what follows from its parameters is made anew.
 
-        Nothing is fitted.  Runs of a car beyond the `cars` of the training are not trusted.
+        Nothing is fitted but slow manifolds and two-track models, to some runs of the car itself.
+        Cars beyond the `cars` of the training, or doubted by own runs, are not trusted.
 
         Parameters
         ----------
@@ -147,8 +147,8 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def outside(self) -> Trust | None:
         """What is told of the car, if it lies beyond those of the training or is doubted."""
-        told = self.input_range.outside(component("method", self.method), self.model)
-        return told or doubted(self.reduced)
+        method = component("method", self.method)
+        return self.input_range.outside(method, self.model, self.reduced)
 
     @cached_property
     def _range(self) -> InputRange | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -67,17 +68,18 @@ def sobol_indices(
     -------
     xarray.Dataset
         `first_order` and `total_order` (objective, parameter) with the ends `_low` and `_high` of
-        their 95 % intervals, `mean` and `standard_deviation` (objective,) of the objectives, and
-        the CPU seconds of all in the attributes; `untrusted` counts the runs that the reduced model
-        doesn't trust, and `remark` says why the first of them isn't.
+        their 95 % intervals, NaN of an objective that is the same in all runs, `mean` and
+        `standard_deviation` (objective,) of the objectives, and the CPU seconds of all in the
+        attributes; `untrusted` counts the runs that the reduced model doesn't trust, and `remark`
+        says why the first of them isn't.
 
     Raises
     ------
     InputError
         If an argument is wrong, or a car of the box has no value of an objective.
     """
+    from scipy.stats import DegenerateDataWarning, uniform
     from scipy.stats import sobol_indices as indices_of
-    from scipy.stats import uniform
 
     reduced = model_behind(model)
     chosen = [objective(objectives)] if isinstance(objectives, str) else _all(objectives)
@@ -89,9 +91,12 @@ def sobol_indices(
     runs = _Runs(reduced, chosen, names, maneuver, start, jobs)
     spread = [uniform(low, high - low) for low, high in ranges]
     began, rng = time.process_time(), np.random.default_rng(seed)
-    found = indices_of(func=runs, n=samples, dists=spread, rng=rng)
-    seconds = time.process_time() - began
-    sure = found.bootstrap(CONFIDENCE, n_resamples=RESAMPLES)
+    # Parts of no variance, and intervals about what is zero in every sample, are none.
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", DegenerateDataWarning)
+        found = indices_of(func=runs, n=samples, dists=spread, rng=rng)
+        seconds = time.process_time() - began
+        sure = found.bootstrap(CONFIDENCE, n_resamples=RESAMPLES)
     return _dataset(runs, (found, sure), ranges, {"samples": samples, "seed": seed}, seconds)
 
 
@@ -180,13 +185,17 @@ def _dataset(
     shape = len(runs.objectives), len(runs.names)
     both, model = ("objective", "parameter"), runs.reduced.model
     variables: dict[str, tuple] = {}
+    # Of what is the same in all runs, but for rounding of their mean, there are no parts.
+    varies = np.ptp(np.concatenate(runs.values, axis=1), axis=1, keepdims=True) > 0.0
     for name, text in NAMES.items():
         interval = getattr(sure, name).confidence_interval
         about = {"units": "1", "long_name": f"part of the variance {text}"}
-        variables[name] = both, np.reshape(getattr(indices, name), shape), about
+        index = np.where(varies, np.reshape(getattr(indices, name), shape), np.nan)
+        variables[name] = both, index, about
         for end in ("low", "high"):
-            values = np.reshape(getattr(interval, end), shape)
-            variables[f"{name}_{end}"] = both, values, about
+            values = np.where(varies, np.reshape(getattr(interval, end), shape), np.nan)
+            # What has no effect has none in any resample.
+            variables[f"{name}_{end}"] = both, np.where(index == 0.0, 0.0, values), about
     # The first two calls are of independent samples.
     values = np.concatenate(runs.values[:2], axis=1)
     for name, own in (("mean", values.mean(axis=1)), ("standard_deviation", values.std(axis=1))):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -75,13 +74,6 @@ def difference(model: Model, other: Model) -> str:
         return ""
     differs = np.flatnonzero(_flat(model) != _flat(other))
     return _names(model)[differs[0]] if len(differs) else ""
-
-
-def monomials(places: np.ndarray, degree: int) -> np.ndarray:
-    """1, x_i, and products x_i x_j up to a degree (..., m), of places (..., varied) of cars."""
-    varied = range(places.shape[-1])
-    chosen = [part for k in range(degree + 1) for part in combinations_with_replacement(varied, k)]
-    return np.stack([places[..., list(part)].prod(axis=-1) for part in chosen], axis=-1)
 
 
 def _flat(model: Model) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
+from vehiclemor.codegen.sources import source_digest
 from vehiclemor.errors import InputError
 from vehiclemor.files import make_folder
 from vehiclemor.resources import data_folder, data_names
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FOLDER = "sobol"
+# What lays results out.
+SOURCES = ("online/sobol.py", "report/sobol.py")
 
 
 class Contestant(FileSchema):
@@ -61,15 +64,20 @@ def sobol_dataset(model: str, results: Path) -> xr.Dataset:
     path = data_folder() / FOLDER / f"{model}.toml"
     declared = read_toml(path, SobolFile)
     digests = [code_digest(declared.model, own.method) for own in declared.models]
+    digests.append(source_digest((), SOURCES, ()))
     key = hashlib.sha256("\n".join([path.read_text(), *digests]).encode()).hexdigest()[:16]
     stored = results / FOLDER / f"{model}-{key}.nc"
     if stored.exists():
         return read_dataset(stored, "key", key)
     found = [_indices(declared, own) for own in declared.models]
     labels = xr.DataArray([own.label for own in declared.models], dims="model")
-    seconds = xr.DataArray([own.attrs["seconds"] for own in found], dims="model")
+    seconds, runs, untrusted = (
+        xr.DataArray([own.attrs[name] for own in found], dims="model")
+        for name in ("seconds", "runs", "untrusted")
+    )
     whole = xr.concat(found, "model", combine_attrs="override").assign_coords(model=labels)
     whole["seconds"] = seconds.assign_attrs(units="s", long_name="CPU seconds of all runs")
+    whole["untrusted"] = (untrusted / runs).assign_attrs(units="1", long_name="part of the runs")
     whole = whole.assign_attrs(key=key, title=declared.title)
     make_folder(stored.parent)
     write_dataset(whole, stored)

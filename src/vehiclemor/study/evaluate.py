@@ -13,7 +13,6 @@ import numpy as np
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.car_checks import doubted
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import checked_run, fitted, of_car
@@ -342,7 +341,7 @@ def warned(
     if judges_itself and method.learns_from == "inputs":
         return run
     known = input_range(model, trained_for(experiment.training, test))
-    if outside := known.outside(method, car_of(model, test)) or doubted(reduced):
+    if outside := known.outside(method, car_of(model, test), reduced):
         return run.judged(outside)
     return run if judges_itself else run.judged(known.trust(model, test))
 

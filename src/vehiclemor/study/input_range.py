@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.car_checks import doubted
 from vehiclemor.reduction.cars import Cars, cars_of
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.trust import trust_of
@@ -40,15 +42,13 @@ class InputRange:
     longest: float
     cars: Cars | None = None
 
-    def outside(self, method: Method, car: Model) -> Trust | None:
-        """What is told of a car that lies beyond those of the training, of which the method learns.
+    def outside(self, method: Method, car: Model, reduced: Any) -> Trust | None:
+        """What is told of a car beyond those of the training, or that its reduced model doubts.
 
         A method that is exact for every car has none that lie beyond.
         """
-        if self.cars is None or method.learns_from == "inputs":
-            return None
-        found = self.cars.trust(car)
-        return found if found.reason else None
+        told = self.cars.trust(car) if self.cars and method.learns_from != "inputs" else None
+        return told if told and told.reason else doubted(reduced)
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""

@@ -45,6 +45,26 @@ def test_indices_of_a_small_box_are_those_of_the_gradient(travel, box):
     np.testing.assert_array_equal(again["total_order"], found["total_order"])
 
 
+def test_what_has_no_effect_has_the_index_zero_and_no_warning(recwarn):
+    ends = ("", "_low", "_high")
+    orders = [f"{order}_order{end}" for order in ("first", "total") for end in ends]
+
+    def indices(**box):
+        found = vm.sobol_indices(
+            "independent_suspension_vehicle", "peak_roll", box, samples=8, jobs=1
+        )
+        return found.isel(objective=0)
+
+    # It stands at rest, wherever it would drop from.
+    found = indices(drop_height=[0.005, 0.01], sprung_mass=[900.0, 1000.0])
+    assert [float(found[name][0]) for name in orders] == [0.0] * 6
+    assert float(found["total_order_low"][1]) > 0.0
+    found = indices(drop_height=[0.005, 0.01], drop_pitch=[0.001, 0.002])
+    assert float(found["standard_deviation"]) < 1e-12
+    assert all(np.isnan(found[name]).all() for name in orders)
+    assert not recwarn.list
+
+
 def test_runs_beyond_the_cars_of_a_reduced_model_are_counted(travel, box):
     given = {"maneuver": travel, "samples": 8, "jobs": 1}
     # With fewer modes the runs that check each car doubt it.

@@ -8,7 +8,7 @@ does; here it is by radial basis functions that are exact on polynomials.
 
 import numpy as np
 
-from vehiclemor.reduction.cars import monomials
+from vehiclemor.reduction.polynomials.kernels import monomials
 
 # By the degree of the polynomial beside them.
 KERNELS = ("linear", "thin_plate_spline", "quintic")
@@ -47,5 +47,6 @@ def interpolation_weights(places: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 def _determined(places: np.ndarray, degree: int) -> bool:
     """Whether values at some places (m, d) determine a polynomial of a degree."""
-    rows = monomials(places, degree)
-    return bool(np.linalg.matrix_rank(rows) == rows.shape[1])
+    terms = monomials(places.shape[1], degree)
+    columns = [places[:, list(term)].prod(axis=1) for term in terms]
+    return bool(np.linalg.matrix_rank(np.array(columns)) == len(terms))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.car_checks import Input, registered
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import (
@@ -19,13 +17,12 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     planar_errors,
     spread,
 )
-from vehiclemor.registry import component
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start
 
-# Runs of a car; one of so many checks, the others correct; Gauss-Newton steps of the correction.
-RUNS, CHECKED, STEPS = 64, 4, 3
+# Runs of a car; one of so many only checks, the others correct too; Gauss-Newton steps of that.
+RUNS, CHECKED, STEPS = 64, 4, 2
 # Their speeds, in parts of how far those of training runs lie from the car's own; the last of them
 # goes with the other starts.
 SPEEDS = (-0.8, 0.0, 0.8, -0.4, 0.4)
@@ -38,34 +35,10 @@ BELOW = 0.95
 SPEED = "initial_speed"
 
 
-class Input(NamedTuple):
-    """A registered maneuver with its factors."""
-
-    maneuver: str
-    frequency: float
-    amplitude: float
-
-    @property
-    def made(self) -> Maneuver:
-        """The maneuver itself."""
-        return component("maneuver", self.maneuver).perturbed(self.frequency, self.amplitude)
-
-
 def chosen_inputs(training: Training) -> tuple[Input, ...]:
     """Some inputs of the training, that are registered maneuvers."""
-    given = [
-        Input(m.name, m.frequency_factor, m.amplitude_factor)
-        for m in (run.maneuver for run in training)
-    ]
-    known = [entry for entry in dict.fromkeys(given) if _registered(entry)]
+    known = list(dict.fromkeys(filter(None, (registered(run.maneuver) for run in training))))
     return tuple(spread(known, RUNS / max(len(known), 1)))
-
-
-def _registered(entry: Input) -> bool:
-    try:
-        return bool(entry.made.samples)
-    except InputError:
-        return False
 
 
 def own_runs(model: DynamicModel, inputs: Sequence[Input], speeds: float) -> list[TrainingRun]:

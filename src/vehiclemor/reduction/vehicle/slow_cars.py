@@ -16,12 +16,13 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.reduction.car_checks import Input
 from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.own_runs import Input, chosen_inputs, corrected, own_runs
+from vehiclemor.reduction.vehicle.own_runs import chosen_inputs, corrected, own_runs
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import ridge_fit
@@ -47,7 +48,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Gauss-Newton steps of the common fit.
-SWEEPS = 4
+SWEEPS = 6
 # Part of the ranges up to which a car is trusted of which nothing is known.
 NOTHING = 1e-6
 # Solver and tolerance of runs of a car, and of their reduced ones; weight of its lifting's size.

@@ -17,7 +17,7 @@ WIDTH = 0.8
 def figure_sobol(*, model: str, results: str) -> Figure:
     """A panel for each objective: bars of each parameter, with intervals of 95 %.
 
-    Legends tell the CPU time of all runs of a model.
+    Legends tell the CPU time of all runs of a model, and the part that it does not trust.
     """
     data = sobol_dataset(model, Path(results))
     names = data["objective"].values
@@ -49,7 +49,10 @@ def _draw(axis: Axes, data: xr.Dataset) -> None:
         for name, opacity, shift in (("total_order", 0.35, 0.2), ("first_order", 1.0, -0.2)):
             values = own[name].values
             ends = np.array([values - own[f"{name}_low"], own[f"{name}_high"] - values])
-            text = f"{label} ({float(own['seconds']):.0f} s)" if opacity == 1.0 else None
+            told = f"{label} ({float(own['seconds']):.0f} s"
+            if share := 100.0 * float(own["untrusted"]):
+                told += f", {share:.2g} % untrusted"
+            text = f"{told})" if opacity == 1.0 else None
             axis.bar(at, values, width, color=color, alpha=opacity, label=text)
             # Of the first order on the left of a bar, of the total on its right.
             interval = {"yerr": np.maximum(ends, 0.0), "fmt": "none", "ecolor": "black"}

@@ -39,14 +39,17 @@ def test_a_subspace_does_not_depend_on_its_basis():
     np.testing.assert_allclose(direction, tangent(origin, end @ turn), atol=1e-10)
 
 
-@pytest.mark.parametrize(("cars", "linear"), [(20, True), (3, False)])
-def test_weights_give_back_every_car_and_what_is_linear_between(cars, linear):
+# In four dimensions a linear function has 5 coefficients, a quadratic one 15.
+@pytest.mark.parametrize(("cars", "degree"), [(4, 0), (9, 1), (14, 1), (15, 2), (40, 2)])
+def test_weights_give_back_every_car_and_the_polynomials_that_cars_determine(cars, degree):
     places = np.random.default_rng(4).uniform(-1.0, 1.0, (cars, 4))
     for number, place in enumerate(places):
         weights = interpolation_weights(places, place)
-        np.testing.assert_allclose(weights, np.eye(cars)[number], atol=1e-9)
+        np.testing.assert_allclose(weights, np.eye(cars)[number], atol=1e-7)
     at = np.full(4, 0.1)
     weights = interpolation_weights(places, at)
     assert weights.sum() == pytest.approx(1.0)
-    if linear:
+    if degree > 0:
         np.testing.assert_allclose(weights @ places, at, atol=1e-9)
+    if degree > 1:
+        np.testing.assert_allclose(np.einsum("m,mi,mj", weights, places, places), 0.01, atol=1e-8)
