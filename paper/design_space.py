@@ -29,8 +29,10 @@ from vehiclemor.files import make_folder, write_text
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
 from vehiclemor.report.design_studies import FULL, KEPT, design_space
+from vehiclemor.report.figures.lines import FULL as FULL_LINE
 from vehiclemor.report.figures.lines import legend_outside, panels, styles
 from vehiclemor.report.figures.saving import save_figure, styled
+from vehiclemor.report.labels import method_text
 from vehiclemor.resources import data_folder
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
@@ -193,11 +195,11 @@ def figure(data: xr.Dataset) -> Figure:
     drawn, axes = panels(1, len(data["run"]), (6.7, 3.4), sharey=True, sharex=True)
     drawn.set_layout_engine("constrained")
     share = 100.0 * (1.0 - np.arange(data.sizes["car"]) / data.sizes["car"])
-    lines = styles(str(row) for row in data["row"].values)
+    lines = styles(str(row) for row in data["row"].values if row != FULL) | {FULL: FULL_LINE}
     for axis, run in zip(axes.flat, data["run"].values, strict=True):
         for row, style in lines.items():
             worst = np.sort(data["score"].sel(row=row, run=run).max("output").values)
-            axis.semilogx(worst, share, label=row, **style)
+            axis.semilogx(worst, share, label=method_text(row), **style)
         axis.axvline(1.0, color="black", linewidth=0.8)
         axis.set_title(str(run))
         axis.set_xlabel("largest error / its bound")

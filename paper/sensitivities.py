@@ -1,24 +1,37 @@
-"""What sensitivities cost and how exact they are.
+"""What sensitivities cost and how exact they are, and what Sobol indices of reduced models are.
 
-Usage: python paper/sensitivities.py
+Usage: python paper/sensitivities.py [--results DIR]
 
-Loop times are CPU seconds of the thread, the least of interleaved rounds.  Errors are the largest
-difference from central differences of order 6 of whole runs at a tolerance of 1e-12, relative to
-the largest derivative of that output.
+Writes DIR/sensitivities.nc, named values with units, which `paper/facts.py` writes into the texts,
+and prints them.  Loop times are CPU seconds of the thread, the least of interleaved rounds.  Errors
+are the largest difference from central differences of order 6 of whole runs at a tolerance of
+1e-12, relative to the largest derivative of that output; those of an index are from full order.
+It wants an idle machine, and five minutes, most of them for the indices.
 """
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+import argparse
+from functools import partial
 from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from named_values import Values, measured_values
 
 import vehiclemor as vm
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
+from vehiclemor.report.sobol import sobol_dataset
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.model import Model
 
-ROUNDS, COUNTS = 9, (1, 2, 4, 8)
+if TYPE_CHECKING:
+    import xarray as xr
+
+FILE, TITLE = "sensitivities.nc", "Sensitivities"
+ROUNDS, COUNTS, TOLERANCES = 9, (1, 2, 4, 8), (1e-8, 1e-10)
 OUTPUTS = ("lateral_position", "yaw", "roll", "yaw_rate")
 PARAMETERS = {
     "independent_suspension_vehicle": (
@@ -45,43 +58,65 @@ def differences(model: Model, name: str, maneuver: Maneuver, step: float) -> np.
     return (16.0 * second[1] - second[0]) / 15.0 / value
 
 
-def errors(model: Model, maneuver: Maneuver, names: Sequence[str]) -> None:
-    """Print the largest relative error of the derivatives of some outputs, by tolerance."""
+def costs(name: str) -> Values:
+    """CPU times of plain runs and of runs with derivatives, in ms."""
+    model, parameters = vm.model(name), PARAMETERS[name]
+    maneuver = component("maneuver", model.definition.maneuver)
+    calls = {
+        solver: partial(model.simulate, maneuver, solver=solver, tolerance=1e-10)
+        for solver in ("dopri5", "exponential_adams")
+    } | {
+        f"with {k}": partial(vm.sensitivities, model, maneuver, parameters=parameters[:k])
+        for k in COUNTS
+    }
+    rounds = [[float(call().seconds) for call in calls.values()] for _ in range(ROUNDS)]
+    least = 1e3 * np.min(rounds, axis=0)
+    return {f"{name} {what}, ms": ms for what, ms in zip(calls, least, strict=True)}
+
+
+def errors(name: str) -> Values:
+    """Largest relative errors of the derivatives of some outputs, by tolerance."""
+    model, parameters = vm.model(name), PARAMETERS[name][:2]
+    maneuver = component("maneuver", model.definition.maneuver)
     places = [model.outputs.index(output) for output in OUTPUTS]
-    expected = [differences(model, name, maneuver, 2e-2)[:, places] for name in names]
-    for tolerance in (1e-6, 1e-8, 1e-10):
-        run = vm.sensitivities(model, maneuver, parameters=names, tolerance=tolerance)
+    expected = [differences(model, own, maneuver, 2e-2)[:, places] for own in parameters]
+    values = {}
+    for tolerance in TOLERANCES:
+        run = vm.sensitivities(model, maneuver, parameters=parameters, tolerance=tolerance)
         found = run["d_output"].values[:, :, places]
-        worst = max(
+        values[f"{name} off at {tolerance:.0e}, 1"] = max(
             (np.abs(found[:, k] - own).max(axis=0) / np.abs(own).max(axis=0)).max()
             for k, own in enumerate(expected)
         )
-        print(
-            f"  tolerance {tolerance:.0e}: {1e3 * float(run['seconds']):.1f} ms, off by {worst:.1e}"
-        )
+    return values
+
+
+def indices(name: str, folder: Path) -> Values:
+    """CPU times of Sobol indices, and by how much total ones of reduced models are off."""
+    found, values = sobol_dataset(name, folder), {}
+    off = np.abs(found["total_order"] - found["total_order"][0]).max("parameter")
+    for label in found["model"].values:
+        own = f"{name} {label}"
+        values[f"{own} seconds, s"] = found["seconds"].sel(model=label).item()
+        values[f"{own} untrusted, 1"] = found["untrusted"].sel(model=label).item()
+        for objective in found["objective"].values:
+            values[f"{own} {objective}, 1"] = off.sel(model=label, objective=objective).item()
+    return values
+
+
+def measured(folder: Path, anew: bool = False) -> xr.Dataset:
+    """What the results folder holds; measured where it lacks it, or once more."""
+    parts = [partial(part, name) for name in PARAMETERS for part in (costs, errors)]
+    parts += [partial(indices, name, folder) for name in PARAMETERS]
+    return measured_values(folder / FILE, TITLE, parts, anew)
 
 
 def main() -> None:
-    """Print times and errors of the vehicles."""
-    for name, parameters in PARAMETERS.items():
-        model = vm.model(name)
-        maneuver = component("maneuver", model.definition.maneuver)
-        calls = {
-            "plain run, dopri5": lambda m=model, w=maneuver: m.simulate(w, tolerance=1e-10).seconds,
-            "plain run, exponential_adams": lambda m=model, w=maneuver: (
-                m.simulate(w, solver="exponential_adams", tolerance=1e-10).seconds
-            ),
-        } | {
-            f"with {k} derivatives": lambda m=model, w=maneuver, p=parameters[:k]: float(
-                vm.sensitivities(m, w, parameters=p)["seconds"]
-            )
-            for k in COUNTS
-        }
-        rounds = [[call() for call in calls.values()] for _ in range(ROUNDS)]
-        print(f"{name}, {maneuver.name}, tolerance 1e-10")
-        for label, seconds in zip(calls, np.min(rounds, axis=0), strict=True):
-            print(f"  {label}: {1e3 * seconds:.2f} ms")
-        errors(model, maneuver, parameters[:2])
+    """Measure, write and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
+    for value in measured(parser.parse_args().results, anew=True)["value"]:
+        print(f"{value['name'].item():70} {value.item():10.4g} {value['output_unit'].item()}")
 
 
 if __name__ == "__main__":

@@ -37,8 +37,10 @@ vm.model("independent_suspension_vehicle").simulate(straight_ahead, tolerance=1e
 """,
     """
 import vehiclemor as vm
-vm.model("high_fidelity_vehicle")
 vm.model("double_wishbone").solve([0.05, 0.0])
+car = vm.model("high_fidelity_vehicle")
+for by in ("state", "inputs"):
+    car.jacobian(car.start(), [0.0] * 3, by)
 """,
 )
 

@@ -106,6 +106,22 @@ def test_counts_of_cells_agree(study, tmp_path, capsys):
         assert printed.out.startswith("small: 6 cells, 8 grid points: 8 ok;")
 
 
+def test_runs_that_are_not_trusted_are_counted_apart(tmp_path, capsys):
+    path = tmp_path / "other.toml"
+    path.write_text(
+        """
+title = "another car than that of the training"
+model = "double_wishbone"
+cars = "nominal"
+keep = "metrics"
+methods = [{ method = "replay" }, { method = "full_order" }]
+grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09] }
+"""
+    )
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert "4 grid points: 2 ok, 2 untrusted;" in " ".join(capsys.readouterr().out.split())
+
+
 def test_cells_with_errors_are_tried_again_and_said_in_the_exit_status(
     study, tmp_path, monkeypatch, capsys
 ):

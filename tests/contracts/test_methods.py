@@ -1,21 +1,17 @@
 """What every registered reduction method keeps, on every registered model that it accepts."""
 
 import copy
-from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from vehiclemor.codegen.kernels import KernelSource
+from tests.oracles.tangent_texts import run_as_text
 from vehiclemor.codegen.tangent import Tangent
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.exported import exported_system
-from vehiclemor.exporting.interpreter import evaluated
-from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine, entries, straight_line
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.online.rom import ReducedOrderModel
@@ -347,27 +343,13 @@ def test_rates_are_those_of_the_steps(pair: Pair) -> None:
 # compile: their texts are run here instead.  The 14-DOF vehicle's are compiled.
 LONG_TO_COMPILE = {
     **dict.fromkeys(
-        ("fixed_basis", "global_pod", "independent_coordinates", "pod"), ("state", "inputs")
+        (
+            *("balanced_pod", "fixed_basis", "global_pod"),
+            *("independent_coordinates", "pod", "quasi_steady_wheels"),
+        ),
+        ("state", "inputs"),
     ),
-    "balanced_pod": ("inputs",),
 }
-
-
-NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
-IN_NUMPY = {name: getattr(np, NUMPY.get(name, name)) for name in FUNCTIONS} | {"select": np.where}
-
-
-@cache
-def written_out(source: KernelSource) -> StraightLine:
-    pairs = zip(source.arguments, source.sizes, strict=True)
-    return straight_line(source.text, {name: entries(name, size) for name, size in pairs})
-
-
-def run_as_text(tangent: Tangent, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:
-    """What a tangent gives along all seeds at once, without machine code."""
-    values = dict(zip(tangent.source.arguments, [*arrays, seeds.T], strict=False))
-    results = evaluated(written_out(tangent.source), values, IN_NUMPY)
-    return np.column_stack([np.broadcast_to(result, len(seeds)) for result in results])
 
 
 @pytest.mark.parametrize("by", ["state", "inputs"])

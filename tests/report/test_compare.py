@@ -13,6 +13,7 @@ from vehiclemor.report.comparison.rows import ALL_MODELS, COLUMNS, Row
 from vehiclemor.report.comparison.times import agreement_rows, slower_row, time_rows
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.predictive import paper_terms
 from vehiclemor.report.published import load_published
 from vehiclemor.report.regenerate import regenerate_figures
 from vehiclemor.report.tables import latex, markdown, regenerate_tables
@@ -317,14 +318,21 @@ def test_command_prints_a_summary_and_tables_that_fit(results_folder, capsys, mo
     assert 80 < max(map(len, capsys.readouterr().out.splitlines())) <= 110
 
 
-def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeypatch):
+def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeypatch, rows):
     # The whole study of settings has hundreds of cells: a few stand in for them.
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
     monkeypatch.setattr(tables, "settings_studies", lambda: {str(path): ("pitch", "yaw")})
-    names = ["5", "8", "10"]
+    # Of the paper's terms too: the baselines and every eighth variant.
+    cases = paper_terms.paper_cases
+    few = lambda shown: [*(every := list(cases(shown)))[:2], *every[2::8]]  # noqa: E731
+    monkeypatch.setattr(paper_terms, "paper_cases", few)
+    names = ["10"]
     contents = []
-    for turn in ("first", "second"):
+    # The first comparison is the one of the other tests.
+    comparisons = {"first": lambda *_: rows, "second": tables.paper_comparison}
+    for turn, comparison in comparisons.items():
+        monkeypatch.setattr(tables, "paper_comparison", comparison)
         out = tmp_path / turn
         paths = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)

@@ -44,6 +44,13 @@ def test_nearest_names_come_best_first() -> None:
     assert message == "unknown colour 'gren'; did you mean green or grey?"
 
 
+def test_of_many_names_the_nearest_are_told_and_how_to_see_all() -> None:
+    message = str(unknown("colour", "0", [f"shade_{number}" for number in range(200)]))
+    assert message.startswith("unknown colour '0'; nearest of 200: shade_0, ")
+    assert message.endswith("; all: vehiclemor list, vehiclemor show NAME")
+    assert len(message) < 120
+
+
 @pytest.fixture
 def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     found = {
