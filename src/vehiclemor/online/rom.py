@@ -146,8 +146,7 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def outside(self) -> Trust | None:
         """What is told of the car, if it lies beyond those of the training or is doubted."""
-        method = component("method", self.method)
-        return self.input_range.outside(method, self.model, self.reduced)
+        return self.input_range.outside(component("method", self.method), self.model, self.reduced)
 
     @cached_property
     def _range(self) -> InputRange | None:
