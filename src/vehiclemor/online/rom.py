@@ -122,7 +122,8 @@ class ReducedOrderModel(ShortRepr):
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The reduced model of another car: what follows from its parameters is made anew.
 
-        No fit.  Cars beyond the `cars` of the training, or doubted by own runs, are not trusted.
+        Nothing is fitted but slow manifolds and two-track models, to some runs of the car itself.
+        Cars beyond the `cars` of the training, or doubted by own runs, are not trusted.
 
         Parameters
         ----------

@@ -10,6 +10,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.cars import cars_of, difference
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import fitted, of_car, validated
+from vehiclemor.reduction.vehicle import own_runs
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import as_of, slow_modes
 from vehiclemor.registry import component, names
@@ -236,7 +237,7 @@ def test_slow_modes_of_another_car_span_the_same_in_coordinates_near_the_first()
     np.testing.assert_allclose(same.left, first.left, atol=1e-8)
 
 
-def test_a_slow_manifold_of_a_box_knows_cars_between():
+def test_a_slow_manifold_of_a_box_knows_cars_between_and_how_far_it_is_right(monkeypatch):
     runs = [LANE.perturbed(1.0, a) for a in (0.5, 0.8, 1.0)]
     quick = {"sweeps": 1, "terms": 12, "training": runs}
     ends = [{"PKY1": stiffness} for stiffness in (-25.0, -23.5, -20.5, -19.0)]
@@ -250,6 +251,11 @@ def test_a_slow_manifold_of_a_box_knows_cars_between():
     assert run.status == "ok"
     assert error < 0.25 * np.abs(nominal.outputs - full.outputs)[:, column].max()
     assert box.for_parameters({"PKY1": -27.0}).simulate().status == "untrusted"
+    # With all runs of the car itself wrong it knows nothing.
+    monkeypatch.setattr(own_runs, "TRUSTED", 0.0)
+    told = box.for_parameters(between).simulate(lane)
+    assert told.status == "untrusted"
+    assert "leaves what the training runs have covered" in told.message
 
 
 def test_a_loaded_model_of_a_box_gives_other_cars_too(tmp_path):

@@ -21,8 +21,8 @@ from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start
 
-# Runs of a car; one of so many checks, the others correct; Gauss-Newton steps of the correction.
-RUNS, CHECKED, STEPS = 64, 4, 3
+# Runs of a car; one of so many only checks, the others correct too; Gauss-Newton steps of that.
+RUNS, CHECKED, STEPS = 64, 4, 2
 # Their speeds, in parts of how far those of training runs lie from the car's own; the last of them
 # goes with the other starts.
 SPEEDS = (-0.8, 0.0, 0.8, -0.4, 0.4)

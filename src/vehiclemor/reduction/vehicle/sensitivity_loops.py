@@ -5,8 +5,6 @@ from typing import NamedTuple
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix
 from vehiclemor.simulation.integrators.dense_solves import factorise, substitute
 
-INLINED = ("factorise", "substitute", "turned", "copied")
-
 
 class AlongRun(NamedTuple):
     """A run and its equations' derivatives, at the times that are stepped on.

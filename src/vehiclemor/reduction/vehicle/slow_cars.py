@@ -48,7 +48,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Gauss-Newton steps of the common fit.
-SWEEPS = 4
+SWEEPS = 6
 # Part of the ranges up to which a car is trusted of which nothing is known.
 NOTHING = 1e-6
 # Solver and tolerance of runs of a car, and of their reduced ones; weight of its lifting's size.

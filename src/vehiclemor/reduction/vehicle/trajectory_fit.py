@@ -10,6 +10,7 @@ Levenberg and Marquardt.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,12 +62,12 @@ class Target:
     states: np.ndarray
     steps: np.ndarray
 
-    @property
+    @cached_property
     def compared(self) -> np.ndarray:
         """Numbers of the output times at which runs are compared, the last one among them."""
         return self.steps[(len(self.steps) - 1) % COMPARED :: COMPARED]
 
-    @property
+    @cached_property
     def shares(self) -> np.ndarray:
         """Root of the part of the run's time that each of them stands for."""
         widths = np.gradient(self.times[self.compared])
@@ -287,15 +288,15 @@ def _sensitivities(
     columns = feature_columns(
         reduced.features, moved, np.tile(inputs, (k + 1, 1)), reduced.parameters
     )
-    values, *others = (columns @ c).reshape(k + 1, samples, -1)
-    slopes = np.stack(
-        [(other - values) / width for other, width in zip(others, widths, strict=True)], axis=2
-    )
+    rates = (columns @ c).reshape(k + 1, samples, -1)
+    values, others = rates[0], rates[1:]
+    slopes = np.ascontiguousarray(((others - values) / widths[:, None, None]).transpose(1, 2, 0))
     cosine, sine = np.cos(path[:, k]), np.sin(path[:, k])
     forward, sideward = values[:, k + 1], values[:, k + 2]
     by_heading = -forward * sine - sideward * cosine, forward * cosine - sideward * sine
     motion = np.column_stack([cosine, sine, *by_heading])
-    terms, targets = np.array([(i, column) for some, column in free for i in some]).T.copy()
+    terms = np.concatenate([some for some, _ in free])
+    targets = np.repeat([column for _, column in free], [len(some) for some, _ in free])
     dim, m = k + PLANAR, len(terms)
     result = np.empty((len(goal.compared), dim, m))
     scratch = np.empty((2 * dim + PLANAR) * m + 3 * k * k)
