@@ -56,11 +56,13 @@ def drawn(folder: Path) -> str:
     parts = []
     for _, part in rows[rows["study"].str.startswith(OF_CARS) & rows["sealed"]].groupby("study"):
         first = part.iloc[0]
-        text = part[list(DRAWN)].copy()
-        for name, (_, printed) in DRAWN.items():
-            text[name] = [printed(value) for value in part[name]]
-        text["method"] += ["*" if winner else "" for winner in part["winner"]]
-        table = markdown(text.set_axis([heading for heading, _ in DRAWN.values()], axis=1))
+        columns = {
+            heading: [printed(value) for value in part[name]]
+            for name, (heading, printed) in DRAWN.items()
+        }
+        names = zip(columns[""], part["winner"], strict=True)
+        columns[""] = [f"{name}*" if winner else name for name, winner in names]
+        table = markdown(pd.DataFrame(columns))
         when = first["drawn_on"][:10]
         parts.append(f"{_title(first['title'])}, {first['runs']} runs drawn on {when}:\n\n{table}")
     return "\n".join(parts)

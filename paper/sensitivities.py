@@ -94,7 +94,7 @@ def errors(name: str) -> Values:
 def indices(name: str, folder: Path) -> Values:
     """CPU times of Sobol indices, and by how much total ones of reduced models are off."""
     found, values = sobol_dataset(name, folder), {}
-    off = np.abs(found["total_order"] - found["total_order"][0]).max("parameter")
+    off = abs(found["total_order"] - found["total_order"][0]).max("parameter")
     for label in found["model"].values:
         own = f"{name} {label}"
         values[f"{own} seconds, s"] = found["seconds"].sel(model=label).item()

@@ -114,7 +114,7 @@ title = "another car than that of the training"
 model = "double_wishbone"
 cars = "nominal"
 keep = "metrics"
-methods = [{ method = "replay" }, { method = "full_order" }]
+methods = [{ method = "pod" }, { method = "full_order" }]
 grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09] }
 """
     )

@@ -97,8 +97,9 @@ def by_cars(dataset: xr.Dataset, kept: Sequence[str]) -> xr.Dataset:
     What a method was trained on makes another of it; one that learns from no car stays one.
     """
     if dataset.sizes.get("cars", 1) == 1:
-        return dataset[kept]
-    dataset, parts = dataset[[*kept, "cell_key"]], []
+        return dataset[list(kept)]
+    dataset = dataset[[*kept, "cell_key"]]
+    parts: list[xr.Dataset] = []
     for method in dataset["method"].values:
         part = dataset.sel({"method": [method]})
         learns = bool((part["cell_key"] != part["cell_key"].isel(cars=0)).any())
