@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from vehiclemor.reduction.vehicle.mirror import mirror
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.two_track_fit import straight
 from vehiclemor.registry import component
-from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 NAME = "high_fidelity_vehicle"
@@ -25,12 +25,16 @@ CORNERS = [
 ]
 
 
+def model(parameters=None) -> Any:
+    return vm.model(NAME, parameters=parameters)
+
+
 def scenario(frequency, amplitude, speed, start="equilibrium"):
     return Scenario(LANE_CHANGE.perturbed(frequency, amplitude), start, speed)
 
 
 @cache
-def of_box():
+def of_box() -> Any:
     return vm.reduce(
         NAME,
         "two_track",
@@ -44,7 +48,7 @@ def of_box():
 
 
 @cache
-def corner(number):
+def corner(number) -> Any:
     return of_box().for_parameters(CORNERS[number])
 
 
@@ -56,7 +60,7 @@ def unseen(rom):
 
 
 def apart(run, other, name="lateral_position"):
-    column = build(NAME).outputs.index(name)
+    column = model().outputs.index(name)
     return np.abs(run.outputs[:, column] - other.outputs[:, column]).max()
 
 
@@ -113,7 +117,7 @@ def test_a_car_that_slides_wherever_it_is_driven_is_refused():
     first = of_box().reduced
     strict = replace(first, box=replace(first.box, sliding=1e-3))
     with pytest.raises(InputError, match="slides"):
-        strict.for_car(vm.model(NAME, parameters=CORNERS[0]))
+        strict.for_car(model(CORNERS[0]))
 
 
 def test_a_mirror_image_does_not_hang_on_modes_of_one_frequency():
@@ -126,17 +130,17 @@ def test_a_mirror_image_does_not_hang_on_modes_of_one_frequency():
         "front_damping": 12261.706625030742,
         "cornering_stiffness": 110192.62918363753,
     }
-    images = [mirror(VehicleShape(vm.model(NAME, parameters=car))) for car in ({}, mixed)]
-    np.testing.assert_array_equal(*images)
+    image, other = (mirror(VehicleShape(model(car))) for car in ({}, mixed))
+    np.testing.assert_array_equal(image, other)
 
 
 def test_runs_that_begin_with_a_drop_are_not_learnt_from():
-    model = build(NAME)
+    car = model()
     starts = ("equilibrium", "dropped", "equilibrium")
-    runs = [training_run(model, scenario(1.0, 1.0, 18.0 + i, s)) for i, s in enumerate(starts)]
-    assert straight(model, runs) == [runs[0], runs[2]]
+    runs = [training_run(car, scenario(1.0, 1.0, 18.0 + i, s)) for i, s in enumerate(starts)]
+    assert straight(car, runs) == [runs[0], runs[2]]
     with pytest.raises(InputError, match="straight running"):
-        straight(model, runs[1:2])
+        straight(car, runs[1:2])
 
 
 def test_what_is_saved_makes_the_same_cars(tmp_path):
