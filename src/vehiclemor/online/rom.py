@@ -122,8 +122,7 @@ class ReducedOrderModel(ShortRepr):
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The reduced model of another car: what follows from its parameters is made anew.
 
-        Nothing is fitted but slow manifolds and two-track models, to some runs of the car itself.
-        Cars beyond the `cars` of the training, or doubted by own runs, are not trusted.
+        Beyond the `cars` of the training, or doubted by runs of its own, it is not trusted.
 
         Parameters
         ----------
@@ -147,8 +146,7 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def outside(self) -> Trust | None:
         """What is told of the car, if it lies beyond those of the training or is doubted."""
-        method = component("method", self.method)
-        return self.input_range.outside(method, self.model, self.reduced)
+        return self.input_range.outside(component("method", self.method), self.model, self.reduced)
 
     @cached_property
     def _range(self) -> InputRange | None:

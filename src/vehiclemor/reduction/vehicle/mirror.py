@@ -6,13 +6,14 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from vehiclemor.reduction.training import Training, TrainingRun
-from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
 from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.mirror_image import partners
 
 # States that move less than this part of their range count as not moved.
 STILL = 1e-6
+# How often steering is followed through the equations; relative singular values that are rounding.
+POWERS, RANK = 4, 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +39,12 @@ def mirror(shape: VehicleShape) -> np.ndarray:
     Names tell the partners.  Signs follow from what steering moves, which changes its sign in the
     mirror: of a state without a partner, and against its partner's of any other.
     """
-    lateral = lateral_modes(shape)
-    moved = np.hstack([lateral.right, lateral.follow])
+    # Not its modes: a symmetric one of the same frequency would be mixed with a lateral one.
+    linear = shape.linearised
+    parts = [np.linalg.lstsq(linear.a, linear.b[:, :1], rcond=RANK)[0], linear.b]
+    for _ in range(POWERS):
+        parts.append(linear.a @ parts[-1])
+    moved = np.hstack(parts)
     moved /= largest(moved)
     partner = partners(shape.names)
     matrix = np.zeros((len(partner), len(partner)))

@@ -23,8 +23,9 @@ from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED, Input
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, planar_errors, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import improved, planar_errors, targets
 from vehiclemor.reduction.vehicle.two_track_fit import (
+    SEEN,
     Chosen,
     Sizes,
     fitted_to,
@@ -39,15 +40,15 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 # How a car's own runs are solved.
 SOLVER, FINE = "exponential_adams", 1e-7
 # Every so many samples of them are fitted to; Gauss-Newton steps on whole runs, once and again.
-STRIDE, SWEEPS = 4, 3
+STRIDE, SWEEPS = 6, 2
 # Every so many runs one checks instead.
 EVERY = 12
 # How many times the error of the first car in the same run, or 1 in the units of `trajectory_fit`,
 # that of another car may be.
-TRUSTED = 3.0
-# Runs that slide sideways so many times as fast as any of the first car are left out, and those of
-# which the first guess is so far off, in the units of `trajectory_fit`.
-SLIDING, LOST = 1.2, 200.0
+TRUSTED = 2.0
+# Runs are left out that slide sideways so many times as fast as any of the first car, or are so far
+# off, in the units of `trajectory_fit`, before the fit to whole runs and after it.
+SLIDING, LOST, NEAR = 1.2, 200.0, 20.0
 SLIDES = "lateral_speed"
 NAME = "two_track"
 NOTHING = 1e-6
@@ -93,6 +94,8 @@ class Box(ShortRepr):
         Some of the training.
     sliding
         Lateral speed (m/s) beyond which a run is left out.
+    left
+        What the first car's lifting leaves of the states of the shape (n,).
     """
 
     cars: Cars
@@ -100,6 +103,7 @@ class Box(ShortRepr):
     chosen: Chosen
     drives: tuple[Drive, ...]
     sliding: float
+    left: np.ndarray
 
     def driven(self, model: DynamicModel) -> list[Driven]:
         """The runs of a car, but for those in which it slides."""
@@ -135,29 +139,30 @@ class TwoTrackVehicle(ReducedVehicle):
         training, runs = ([getattr(entry, n) for entry in fitting] for n in ("run", "true"))
         reduced, samples = fitted_to(model, runs, box.sizes, dict(box.chosen), STRIDE)
         goals = targets(reduced, training, runs)
-        some, free = near(reduced, goals), free_coefficients(reduced)
+        free = free_coefficients(reduced)
+        some = planar_errors(reduced, goals) < LOST
         for power in (1.0, 2.0):
             reduced = improved(reduced, list(compress(goals, some)), free, SWEEPS, power)
-        reduced = lifted_anew(reduced, training, samples, STRIDE)
-        some = near(reduced, goals)
+        some = planar_errors(reduced, goals) < NEAR
+        near, runs_near = (list(compress(of, some)) for of in (training, runs))
+        rows = np.repeat(some, [len(run.time[::STRIDE]) for run in runs])
+        reduced = lifted_anew(reduced, near, samples.at(rows), STRIDE)
         reduced = replace(
             reduced,
-            reach=training_reach(reduced, *(list(compress(of, some)) for of in (training, runs))),
+            reach=training_reach(reduced, near, runs_near),
             offline=offline_cost(began, model, runs, len(samples.inputs)),
             solver=self.solver,
             tolerance=self.tolerance,
         )
-        reduced.parameters[0] = 1.0 / right(reduced, driven)
+        reduced.parameters[0] = 1.0 / right(reduced, driven, box.left)
         return in_box(reduced, box)
 
 
-def near(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
-    """Which runs the reduced ones are not lost from."""
-    return planar_errors(reduced, goals) < LOST
-
-
-def right(reduced: ReducedVehicle, driven: Sequence[Driven]) -> float:
+def right(reduced: ReducedVehicle, driven: Sequence[Driven], left: np.ndarray) -> float:
     """Part of what a model knows up to which no run of its car is wrong, at most 1."""
+    seen, own = [reduced.shape.names.index(name) for name in SEEN], reduced.reach.left
+    if not len(own) or (own[seen] > TRUSTED * left[seen]).any():
+        return NOTHING
     goals = targets(reduced, [entry.run for entry in driven], [entry.true for entry in driven])
     found = 1.0
     for entry, error in zip(driven, planar_errors(reduced, goals), strict=True):
@@ -203,4 +208,4 @@ def box_of(
                 faster = float(reduced.encoded(true.states[0], true.inputs[0])[tf.SPEED])
                 drives.append(Drive(entry, round(faster, 6), float(error)))
     cars, sliding = cars_of(run.model for run in training), sideways(reduced.model, runs)
-    return Box(cars, *fit, tuple(drives), SLIDING * sliding)
+    return Box(cars, *fit, tuple(drives), SLIDING * sliding, reduced.reach.left)

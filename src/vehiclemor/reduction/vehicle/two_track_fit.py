@@ -74,6 +74,11 @@ class Samples(NamedTuple):
     shape: ShapeSamples
     outputs: np.ndarray
 
+    def at(self, rows: np.ndarray) -> "Samples":
+        """Some of them (samples,)."""
+        shape = ShapeSamples(*(part[rows] for part in self.shape))
+        return Samples(self.z[rows], self.inputs[rows], self.rates[rows], shape, self.outputs[rows])
+
 
 def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
     """Training runs of a car that begin in straight running, at any speed.
