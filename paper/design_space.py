@@ -1,7 +1,7 @@
 """Measures reduced models of a box of cars on a Latin hypercube of its cars.
 
-Usage: python paper/design_space.py [--cars N] [--results DIR] [--figures DIR] [--kept FILE]
-[MODEL ...]
+Usage: python paper/design_space.py [--cars N] [--jobs N] [--results DIR] [--figures DIR]
+[--kept FILE] [MODEL ...]
 
 Each vehicle is fitted once for the box of its protocol over cars; then every car drives the nominal
 lane change, on which all bases are trained, and another one.  Writes DIR/design_space-MODEL.nc and
@@ -17,7 +17,7 @@ import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -40,6 +40,8 @@ from vehiclemor.study.plans.protocol_file import Bound
 from vehiclemor.study.provenance import attributes
 
 SEED = 1000
+# Cars that a process gets at a time.
+AT_ONCE = 25
 # Frequency and amplitude factors of the runs; bases are trained on the first.
 RUNS = {"trained input": (1.0, 1.0), "other input": (1.3, -1.2)}
 FITS: dict[str, dict[str, Any]] = {
@@ -104,23 +106,38 @@ def score(error: np.ndarray, outputs: list[str], bounds: Mapping[str, Bound]) ->
     return np.array(found)
 
 
-def measured(protocol: Protocol, count: int) -> xr.Dataset:
-    """Errors, warnings and times of all methods on a Latin hypercube of cars."""
-    from scipy.stats import qmc
+class Found(NamedTuple):
+    """What is measured of some cars.
 
+    Attributes
+    ----------
+    scores
+        Errors (rows, cars, runs, outputs) in parts of their bounds; infinite if a run has failed.
+    warned
+        Whether a run (rows, cars, runs) says that it may be wrong.
+    made, seconds
+        CPU time (rows, cars) of making a car and (rows, cars, runs) of a run in s.
+    """
+
+    scores: np.ndarray
+    warned: np.ndarray
+    made: np.ndarray
+    seconds: np.ndarray
+
+
+def of_cars(
+    protocol: Protocol, reduced: Mapping[str, ReducedOrderModel], values: np.ndarray
+) -> Found:
+    """Errors, warnings and times of all methods on cars by their parameters (cars, varied)."""
     model, definition = protocol.model, protocol.definition
-    names, (low, high) = list(definition.cars), np.transpose(list(definition.cars.values()))
-    places = qmc.LatinHypercube(len(names), rng=SEED).random(count)
-    values = low + places * (high - low)
     base = component("maneuver", model.definition.maneuver)
     maneuvers = [base.perturbed(*factors) for factors in RUNS.values()]
-    reduced = fits(protocol)
     labels = [*reduced, REFITTED]
-    shape = (len(labels), count, len(RUNS))
+    shape = (len(labels), len(values), len(RUNS))
     scores, warned = np.full((*shape, len(definition.bounds)), np.inf), np.zeros(shape, dtype=bool)
-    made, run_times = np.zeros(shape[:2]), np.zeros(shape)
+    made, seconds = np.zeros(shape[:2]), np.zeros(shape)
     for number, row in enumerate(values.tolist()):
-        changed = dict(zip(names, row, strict=True))
+        changed = dict(zip(definition.cars, row, strict=True))
         car = vm.model(model.name, parameters=changed)
         full = [car.simulate(maneuver) for maneuver in maneuvers]
         for place, label in enumerate(labels):
@@ -135,23 +152,42 @@ def measured(protocol: Protocol, count: int) -> xr.Dataset:
             for k, (maneuver, true) in enumerate(zip(maneuvers, full, strict=True)):
                 began = time.thread_time()
                 run = own.simulate(maneuver)
-                run_times[place, number, k] = time.thread_time() - began
+                seconds[place, number, k] = time.thread_time() - began
                 told = run.trust is not None and bool(run.trust.reason)
                 warned[place, number, k] = run.status != "ok" or told
                 if run.finished:
                     error = run.outputs - true.outputs
                     scores[place, number, k] = score(error, list(car.outputs), definition.bounds)
-            made[place, number] -= run_times[place, number, 0]
-        if (number + 1) % 100 == 0:
-            print(f"{number + 1} of {count} cars", flush=True)
+            made[place, number] -= seconds[place, number, 0]
+    return Found(scores, warned, made, seconds)
+
+
+def measured(protocol: Protocol, count: int, jobs: int) -> xr.Dataset:
+    """Errors, warnings and times of all methods on a Latin hypercube of cars."""
+    from joblib import Parallel, delayed
+    from scipy.stats import qmc
+
+    model, definition = protocol.model, protocol.definition
+    low, high = np.transpose(list(definition.cars.values()))
+    places = qmc.LatinHypercube(len(low), rng=SEED).random(count)
+    values = low + places * (high - low)
+    reduced = fits(protocol)
+    parts = np.array_split(values, -(-count // AT_ONCE))
+    done = Parallel(n_jobs=jobs, verbose=1)(delayed(of_cars)(protocol, reduced, p) for p in parts)
+    scores, warned, made, seconds = (np.concatenate(of, axis=1) for of in zip(*done, strict=True))
     found = {
         "score": (("row", "car", "run", "output"), scores),
         "warned": (("row", "car", "run"), warned),
         "seconds_to_make": (("row", "car"), made),
-        "seconds": (("row", "car", "run"), run_times),
+        "seconds": (("row", "car", "run"), seconds),
         "parameters": (("car", "parameter"), values),
     }
-    axes = {"row": labels, "run": list(RUNS), "output": list(definition.bounds), "parameter": names}
+    axes = {
+        "row": [*reduced, REFITTED],
+        "run": list(RUNS),
+        "output": list(definition.bounds),
+        "parameter": list(definition.cars),
+    }
     title = f"{model.name}: reduced models on {count} cars"
     return xr.Dataset(found, axes, attributes(title, model.kernel_hash, model=model.name))
 
@@ -213,6 +249,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("models", nargs="*", default=list(BEST), metavar="MODEL")
     parser.add_argument("--cars", type=int, default=1000, help="cars of the Latin hypercube")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
     parser.add_argument("--figures", type=Path, default=Path("paper/figures"), help="of figures")
     kept = data_folder() / KEPT
@@ -221,7 +258,7 @@ def main() -> None:
     make_folder(given.results)
     make_folder(given.figures)
     for model in given.models:
-        data = measured(load_protocol(f"cars-{model}"), given.cars)
+        data = measured(load_protocol(f"cars-{model}"), given.cars, given.jobs)
         write_dataset(data, given.results / f"design_space-{model}.nc")
         keep(data, given.kept)
         with styled():
