@@ -23,7 +23,7 @@ from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED, Input
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.trajectory_fit import improved, planar_errors, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, planar_errors, targets
 from vehiclemor.reduction.vehicle.two_track_fit import (
     SEEN,
     Chosen,
@@ -38,7 +38,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # How a car's own runs are solved.
-SOLVER, FINE = "exponential_adams", 1e-7
+SOLVER, FINE = "exponential_adams", 1e-6
 # Every so many samples of them are fitted to; Gauss-Newton steps on whole runs, once and again.
 STRIDE, SWEEPS = 6, 2
 # Every so many runs one checks instead.
@@ -51,6 +51,7 @@ TRUSTED = 2.0
 SLIDING, LOST, NEAR = 1.2, 200.0, 20.0
 SLIDES = "lateral_speed"
 NAME = "two_track"
+WRONG = "this car slides or is lost in all of the runs that it would be learnt from"
 NOTHING = 1e-6
 
 
@@ -91,7 +92,7 @@ class Box(ShortRepr):
     sizes, chosen
         Settings of the fit, and terms of the first car's.
     drives
-        Some of the training.
+        Inputs of the training.
     sliding
         Lateral speed (m/s) beyond which a run is left out.
     left
@@ -121,7 +122,13 @@ class Box(ShortRepr):
 
 @dataclass(frozen=True, eq=False)
 class TwoTrackVehicle(ReducedVehicle):
-    """The two-track model of a car in a box."""
+    """The two-track model of a car in a box.
+
+    Attributes
+    ----------
+    box
+        What the cars have in common.
+    """
 
     box: Box | None = None
 
@@ -135,15 +142,15 @@ class TwoTrackVehicle(ReducedVehicle):
         first = min(EVERY, len(driven)) // 2
         fitting = [entry for i, entry in enumerate(driven) if i % EVERY != first]
         if not fitting:
-            raise InputError(f"{NAME}: this car slides in too many of the runs that it drives")
+            raise InputError(f"{NAME}: {WRONG}")
         training, runs = ([getattr(entry, n) for entry in fitting] for n in ("run", "true"))
         reduced, samples = fitted_to(model, runs, box.sizes, dict(box.chosen), STRIDE)
         goals = targets(reduced, training, runs)
         free = free_coefficients(reduced)
-        some = planar_errors(reduced, goals) < LOST
+        some = within(reduced, goals, LOST)
         for power in (1.0, 2.0):
             reduced = improved(reduced, list(compress(goals, some)), free, SWEEPS, power)
-        some = planar_errors(reduced, goals) < NEAR
+        some = within(reduced, goals, NEAR)
         near, runs_near = (list(compress(of, some)) for of in (training, runs))
         rows = np.repeat(some, [len(run.time[::STRIDE]) for run in runs])
         reduced = lifted_anew(reduced, near, samples.at(rows), STRIDE)
@@ -156,6 +163,20 @@ class TwoTrackVehicle(ReducedVehicle):
         )
         reduced.parameters[0] = 1.0 / right(reduced, driven, box.left)
         return in_box(reduced, box)
+
+
+def within(reduced: ReducedVehicle, goals: Sequence[Target], most: float) -> np.ndarray:
+    """Which runs are no further off than that.
+
+    Raises
+    ------
+    InputError
+        If none is.
+    """
+    found = planar_errors(reduced, goals) < most
+    if not found.any():
+        raise InputError(f"{NAME}: {WRONG}")
+    return found
 
 
 def right(reduced: ReducedVehicle, driven: Sequence[Driven], left: np.ndarray) -> float:

@@ -116,7 +116,7 @@ def test_a_car_whose_own_runs_tell_otherwise_is_not_trusted(monkeypatch):
 def test_a_car_that_slides_wherever_it_is_driven_is_refused():
     first = of_box().reduced
     strict = replace(first, box=replace(first.box, sliding=1e-3))
-    with pytest.raises(InputError, match="slides"):
+    with pytest.raises(InputError, match="slides or is lost"):
         strict.for_car(model(CORNERS[0]))
 
 
