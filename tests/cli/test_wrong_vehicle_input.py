@@ -20,7 +20,7 @@ def vehicle_file(parameter_file):
 
 
 WRONG_VEHICLES = [
-    ({"sprung_mass": -900.0}, ["sprung_mass", "-900 kg is not above 0"]),
+    ({"sprung_mass": -900.0}, ["sprung_mass", "-900 kg is below the smallest allowed"]),
     ({"unsprung_mass": 0.0}, ["unsprung_mass", "0 kg is not above 0"]),
     ({"initial_speed": 0.0}, ["initial_speed", "0 m/s", "smallest allowed 1 m/s"]),
     ({"initial_speed": -20.0}, ["initial_speed", "-20 m/s"]),

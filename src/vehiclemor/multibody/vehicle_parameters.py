@@ -7,7 +7,7 @@ from vehiclemor.parameters import Declared
 
 GRAVITY = Declared("m/s^2", above=0.0, at_most=100.0)
 LENGTH = Declared("m", above=0.0, at_most=20.0)
-MASS = Declared("kg", above=0.0, at_most=1e5)
+MASS = Declared("kg", at_least=1e-3, at_most=1e5)
 INERTIA = Declared("kg m^2", above=0.0, at_most=1e6)
 STIFFNESS = Declared("N/m", above=0.0, at_most=1e9)
 DAMPING = Declared("N s/m", at_least=0.0, at_most=1e8)

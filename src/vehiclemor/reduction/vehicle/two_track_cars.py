@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.reduction.car_checks import Input, registered
 from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
-from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED, Input
+from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, planar_errors, targets
@@ -222,11 +223,8 @@ def box_of(
     """What other cars need of the first one's fit to its own runs, among the training."""
     drives, errors = [], planar_errors(reduced, targets(reduced, own, runs))
     for run, true, error in zip(own, runs, errors, strict=True):
-        m = run.maneuver
-        entry = Input(m.name, m.frequency_factor, m.amplitude_factor)
-        with suppress(InputError):
-            if entry.made.samples:
-                faster = float(reduced.encoded(true.states[0], true.inputs[0])[tf.SPEED])
-                drives.append(Drive(entry, round(faster, 6), float(error)))
+        if entry := registered(run.maneuver):
+            faster = float(reduced.encoded(true.states[0], true.inputs[0])[tf.SPEED])
+            drives.append(Drive(entry, round(faster, 6), float(error)))
     cars, sliding = cars_of(run.model for run in training), sideways(reduced.model, runs)
     return Box(cars, *fit, tuple(drives), SLIDING * sliding, reduced.reach.left)
