@@ -20,7 +20,7 @@ def vehicle_file(parameter_file):
 
 
 WRONG_VEHICLES = [
-    ({"chassis_mass": -1515.0}, ["chassis_mass", "-1515 kg is not above 0"]),
+    ({"chassis_mass": -1515.0}, ["chassis_mass", "-1515 kg", "smallest allowed 0.001 kg"]),
     ({"gravity": 0.0}, ["gravity", "0 m/s^2 is not above 0"]),
     ({"baumgarte_a": -50.0}, ["baumgarte_a", "-50 1/s", "smallest allowed 0 1/s"]),
     ({"baumgarte_b": 2e4}, ["baumgarte_b", "20000 1/s", "largest allowed 10000 1/s"]),
