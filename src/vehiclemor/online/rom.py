@@ -112,7 +112,7 @@ class ReducedOrderModel(ShortRepr):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
         run = self.reduced.simulate(chosen, begun)
-        if self.outside and not (run.trust and run.trust.reason):
+        if self.outside and (run.status == "untrusted" or not (run.trust and run.trust.reason)):
             return run.judged(self.outside)
         if run.trust or self._range is None:
             return run

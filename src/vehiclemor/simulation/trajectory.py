@@ -108,7 +108,7 @@ class Trajectory(ShortRepr):
 
     def judged(self, trust: Trust | None) -> Trajectory:
         """The same with what its model tells of it; untrusted if that is that it has left."""
-        if trust is None or self.status != "ok" or not trust.reason:
+        if trust is None or self.status not in ("ok", "untrusted") or not trust.reason:
             return Trajectory.of(**self.__dict__ | {"trust": trust})
         told = {"trust": trust, "status": "untrusted", "message": trust.message}
         return Trajectory.of(**self.__dict__ | told)

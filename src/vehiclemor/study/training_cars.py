@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.cars import OF_STARTS
 from vehiclemor.reduction.vehicle.trajectory_fit import spread
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.scenario import Scenario, overrides, with_parameters
@@ -70,10 +72,9 @@ def cars_in(box: Box) -> list[dict[str, float]]:
     """Cars that stand for a box: its centre, the ends of each parameter, and some inside."""
     from scipy.stats import qmc
 
-    names, ranges = list(box), [real_array(ends) for ends in box.values()]
-    for name, ends in zip(names, ranges, strict=True):
-        if ends.shape != (2,) or not ends[0] < ends[1]:
-            raise InputError(f"cars: {name} is {quoted(box[name])}, not the two ends of a range")
+    names, ranges = list(box), [_ends(*entry) for entry in box.items()]
+    if started := next((name for name in names if name in OF_STARTS), ""):
+        raise InputError(f"cars: {started} says how a run starts, not which car it is")
     if not names:
         return []
     star = np.vstack([np.zeros(len(names)), *(sign * np.eye(len(names)) for sign in (-1.0, 1.0))])
@@ -81,3 +82,12 @@ def cars_in(box: Box) -> list[dict[str, float]]:
     low, high = np.transpose(ranges)
     shares = np.vstack([0.5 * (1.0 + star), inside])
     return [dict(zip(names, car, strict=True)) for car in (low + shares * (high - low)).tolist()]
+
+
+def _ends(name: str, given: object) -> np.ndarray:
+    """Both ends (2,) of the range of a parameter."""
+    with suppress(TypeError):
+        ends = real_array(given)
+        if ends.shape == (2,) and ends[0] < ends[1]:
+            return ends
+    raise InputError(f"cars: {name} is {quoted(given)}, not the two ends of a range")

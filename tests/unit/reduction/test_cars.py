@@ -197,6 +197,8 @@ WRONG = {
     "no-parameter": ({"mass": [1.0, 2.0]}, "is not a parameter"),
     "ends": ({"sprung_mass": [1100.0, 900.0]}, "not the two ends of a range"),
     "number": ({"sprung_mass": 900.0}, "not the two ends of a range"),
+    "nothing": ({"sprung_mass": None}, "sprung_mass is None, not the two ends of a range"),
+    "start": ({"initial_speed": [18.0, 22.0]}, "initial_speed says how a run starts"),
     "empty-box": ({}, "a box without parameters"),
     "no-cars": ("heavy", "neither ranges of parameters nor a list of cars"),
     "no-car": ([900.0], "neither ranges of parameters nor a list of cars"),
@@ -250,12 +252,20 @@ def test_a_slow_manifold_of_a_box_knows_cars_between_and_how_far_it_is_right(mon
     error = np.abs(run.outputs - full.outputs)[:, column].max()
     assert run.status == "ok"
     assert error < 0.25 * np.abs(nominal.outputs - full.outputs)[:, column].max()
-    assert box.for_parameters({"PKY1": -27.0}).simulate().status == "untrusted"
+    # That it is another car is told first, and of the whole run.
+    assert "from t = 0 s on PKY1 is -27" in box.for_parameters({"PKY1": -27.0}).simulate().message
     # With all runs of the car itself wrong it knows nothing.
     monkeypatch.setattr(own_runs, "TRUSTED", 0.0)
     told = box.for_parameters(between).simulate(lane)
     assert told.status == "untrusted"
     assert "leaves what the training runs have covered" in told.message
+
+
+def test_a_box_of_slow_manifolds_needs_inputs_that_each_car_can_drive():
+    own = vm.Signal.from_samples(LANE.times, LANE.at(LANE.times))
+    quick = {"sweeps": 0, "terms": 0, "training": [own]}
+    with pytest.raises(InputError, match="none of them is a registered maneuver"):
+        vm.reduce(car(), "slow_manifold", cars=[HEAVY], **quick)
 
 
 def test_a_loaded_model_of_a_box_gives_other_cars_too(tmp_path):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vehiclemor.errors import InputError
 from vehiclemor.reduction.car_checks import Input, registered
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -33,11 +34,20 @@ BELOW = 0.95
 
 
 SPEED = "initial_speed"
+UNNAMED = "cars: each drives inputs of the training, but none of them is a registered maneuver"
 
 
 def chosen_inputs(training: Training) -> tuple[Input, ...]:
-    """Some inputs of the training, that are registered maneuvers."""
+    """Some inputs of the training, that are registered maneuvers.
+
+    Raises
+    ------
+    InputError
+        If none is.
+    """
     known = list(dict.fromkeys(filter(None, (registered(run.maneuver) for run in training))))
+    if not known:
+        raise InputError(UNNAMED)
     return tuple(spread(known, RUNS / max(len(known), 1)))
 
 

@@ -21,7 +21,7 @@ from vehiclemor.reduction.cars import Cars, cars_of, difference
 from vehiclemor.reduction.interface import offline_cost
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
-from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED
+from vehiclemor.reduction.vehicle.own_runs import BELOW, SPEED, UNNAMED
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import Target, improved, planar_errors, targets
@@ -226,5 +226,7 @@ def box_of(
         if entry := registered(run.maneuver):
             faster = float(reduced.encoded(true.states[0], true.inputs[0])[tf.SPEED])
             drives.append(Drive(entry, round(faster, 6), float(error)))
+    if not drives:
+        raise InputError(UNNAMED)
     cars, sliding = cars_of(run.model for run in training), sideways(reduced.model, runs)
     return Box(cars, *fit, tuple(drives), SLIDING * sliding, reduced.reach.left)
