@@ -21,6 +21,7 @@ from fragments import ROOT
 
 import vehiclemor as vm
 from vehiclemor.files import write_text
+from vehiclemor.registry import component
 from vehiclemor.resources import data_folder
 from vehiclemor.study.provenance import attributes
 from vehiclemor.study.scenario import Scenario
@@ -30,8 +31,8 @@ SPRINGS, POINTS = (
     runpy.run_path(str(EXAMPLES / f"{name}.py"))
     for name in ("spring_damper_front", "suspension_hard_points")
 )
-# Steering that reduced cars learn from, as parts of the lane change's; margin of their box.
-AMPLITUDES, BEYOND = (0.85, 1.0, 1.15), 0.03
+# Steering that slow manifolds learn from, as parts of the lane change's; margin of the box.
+AMPLITUDES, BEYOND = np.linspace(0.8, 1.1, 13).tolist(), 0.03
 # Samples of a fine path of the suspension.
 FINE = 5000
 # Designs whose making and running is timed, rounds of which the least counts.
@@ -48,13 +49,19 @@ def car(method: str, **settings: Any) -> Callable[[], vm.ReducedOrderModel]:
         today = vm.model(SPRINGS["MODEL"]).parameters.values()
         ends = SPRINGS["LOWEST"] - BEYOND, SPRINGS["HIGHEST"] + BEYOND
         box = {name: [end * today[name] for end in ends] for name in SPRINGS["DESIGN"]}
-        parts = AMPLITUDES if method == "slow_manifold" else (1.0,)
+        # A slow manifold has each car drive inputs of the training, by their registered names, at
+        # speeds about its own.
+        named = method == "slow_manifold"
+        speed = {"initial_speed": float(np.mean(SPRINGS["SPEEDS"]))} if named else {}
+        driven = vm.model(SPRINGS["MODEL"], parameters=speed)
+        parts = AMPLITUDES if named else (1.0,)
+        base = component("maneuver", "lane_change") if named else SPRINGS["lane_change"]()
         runs = [
-            Scenario(SPRINGS["lane_change"]().perturbed(amplitude=part), "equilibrium", speed)
+            Scenario(base.perturbed(amplitude=part), "equilibrium", speed)
             for speed in SPRINGS["SPEEDS"]
             for part in parts
         ]
-        return vm.reduce(SPRINGS["MODEL"], method, training=runs, cars=box, **settings)
+        return vm.reduce(driven, method, training=runs, cars=box, **settings)
 
     return made
 
