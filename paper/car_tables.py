@@ -38,7 +38,7 @@ def latin_hypercube(folder: Path) -> str:
         title = _title(load_protocol(f"cars-{model}").definition.title)
         rows = pd.DataFrame(kept["rows"])
         numbers = rows.select_dtypes("number").columns
-        rows[numbers] = rows[numbers].map(lambda v: f"{v:.0f}" if v >= 100.0 else short(v))
+        rows[numbers] = rows[numbers].map(_number)
         parts.append(f"{title}, {kept['cars']} cars:\n\n{markdown(rows)}")
         name = f"design-space-{model}.png"
         if (FIGURES / name).exists():
@@ -66,6 +66,12 @@ def drawn(folder: Path) -> str:
         when = first["drawn_on"][:10]
         parts.append(f"{_title(first['title'])}, {first['runs']} runs drawn on {when}:\n\n{table}")
     return "\n".join(parts)
+
+
+def _number(value: float) -> str:
+    if value >= 100.0:
+        return f"{value:.0f}"
+    return f"{value:.3g}" if value >= 10.0 else short(value)
 
 
 def _title(protocol: str) -> str:
