@@ -26,6 +26,7 @@ from matplotlib.figure import Figure
 
 import vehiclemor as vm
 from vehiclemor.files import make_folder, write_text
+from vehiclemor.metrics import max_abs, rms
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
 from vehiclemor.report.design_studies import FULL, KEPT, design_space
@@ -98,12 +99,9 @@ def fits(protocol: Protocol) -> dict[str, ReducedOrderModel]:
 
 def score(error: np.ndarray, outputs: list[str], bounds: Mapping[str, Bound]) -> np.ndarray:
     """Errors (outputs,) of a run (samples, outputs) in parts of their bounds."""
-    found = []
-    for output, bound in bounds.items():
-        part = error[:, outputs.index(output)]
-        size = np.abs(part).max() if bound.measure == "max" else np.sqrt(np.mean(part**2))
-        found.append(size / bound.bound)
-    return np.array(found)
+    size = {"max": max_abs(error), "rms": rms(error)}
+    parts = [size[b.measure][outputs.index(output)] / b.bound for output, b in bounds.items()]
+    return np.array(parts)
 
 
 class Found(NamedTuple):
