@@ -174,7 +174,10 @@ def test_maneuvers_that_are_none(change, words):
     ("change", "words"),
     [
         ({"signal": lambda *_: 1 / 0}, ["maneuver 'mine': signal: ZeroDivisionError"]),
-        ({"signal": lambda t, *_: np.zeros(len(t))}, ["shape (51,)", "not (51, 1)"]),
+        (
+            {"signal": lambda t, *_: np.zeros(len(t))},
+            ["shape (1001,) at 1001 times", "not (1001, 1)"],
+        ),
         ({"signal": lambda *_: None}, ["signal: TypeError: None is not a number"]),
         ({"signal": lambda t, *_: 1j * np.ones((len(t), 1))}, ["is not a number"]),
         ({"signal": lambda t, *_: np.ma.masked_all((len(t), 1))}, ["is not a number"]),

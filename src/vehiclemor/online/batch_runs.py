@@ -24,7 +24,7 @@ from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.checks import lifted_wheels, out_of_validity
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.input_polynomials import Extent, signal_of
 from vehiclemor.simulation.integrators.structures import NODES
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import smooth_spans, whole_space
@@ -49,7 +49,7 @@ class Begin(NamedTuple):
     until
         Time (s) up to which points are samples, see `structures.Output`.
     told
-        Of the start, see `lifting_loops.Known`.
+        Of the start and the inputs, see `lifting_loops.Known`.
     """
 
     state: np.ndarray
@@ -133,6 +133,7 @@ class BatchRuns:
         runs = [run for run in range(len(signals)) if run not in refused]
         first = first if isinstance(signals, Signals) else signals[runs[0]]
         begins = [self._begin(starts[run], given.inputs[k, 0]) for k, run in enumerate(runs)]
+        begins = self._driven(begins, given, signals, runs)
         kinds = _by([(begin.excited.shape[1], begin.until < first.duration) for begin in begins])
         for kind, numbers in kinds.items():
             of_kind = given if len(kinds) == 1 else given.part(numbers)
@@ -150,7 +151,7 @@ class BatchRuns:
         names = self.model.inputs
         if isinstance(signals, Signals):
             given = signals.given(names, times)
-            outside = outside_of_bounds(self.model.definition, given.inputs)
+            outside = outside_of_bounds(self.model.definition, given.extent)
             refused = {run: refusal(signals[run], self.model) for run in outside}
             runs = [run for run in range(len(signals)) if run not in refused]
             if refused:
@@ -167,6 +168,23 @@ class BatchRuns:
         known = self.reduced.known(start, inputs)
         state = self.reduced.equations.begin(start, inputs)
         return Begin(state, known.state, known.excited, known.until, known.told)
+
+    def _driven(
+        self, begins: list[Begin], given: Given, signals: Sequence[Maneuver], runs: Sequence[int]
+    ) -> list[Begin]:
+        """The same with what is told of the inputs."""
+        if self.reduced is None or not self.reduced.reach.inputs.size:
+            return [begin._replace(told=(*begin.told, 0.0, np.inf)) for begin in begins]
+        reach = self.reduced.reach
+        used = (given.extent.largest / reach.inputs).max(axis=(1, 2)).tolist()
+        since = [
+            np.inf if size <= 1.0 else reach.driven(signals[run].for_inputs(self.model.inputs))[1]
+            for size, run in zip(used, runs, strict=True)
+        ]
+        return [
+            begin._replace(told=(*begin.told, *driven))
+            for begin, *driven in zip(begins, used, since, strict=True)
+        ]
 
     def _of_kind(
         self, kind: Hashable, signal: Maneuver, given: Given, begins: Sequence[Begin]
@@ -351,14 +369,13 @@ def _by(keys: Sequence[Hashable]) -> dict[Any, list[int]]:
     return found
 
 
-def outside_of_bounds(definition: ModelDefinition, inputs: np.ndarray) -> list[int]:
-    """Runs whose inputs (runs, samples, inputs) leave the bounds that a model declares."""
-    outside = np.zeros(len(inputs), dtype=bool)
+def outside_of_bounds(definition: ModelDefinition, extent: Extent) -> list[int]:
+    """Runs whose inputs leave the bounds that a model declares."""
+    outside = np.zeros(len(extent.low), dtype=bool)
     for column, quantity in enumerate(definition.inputs):
         if quantity.name in definition.validity:
             low, high = definition.validity[quantity.name]
-            values = inputs[:, :, column]
-            outside |= ((values < low) | (values > high)).any(axis=1)
+            outside |= (extent.low[:, column] < low) | (extent.high[:, column] > high)
     return np.flatnonzero(outside).tolist()
 
 

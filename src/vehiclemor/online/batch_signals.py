@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from vehiclemor.arguments import real_array
-from vehiclemor.codegen.loops import Ready, address_of_array, ready
+from vehiclemor.codegen.loops import Prepared, address_of_array, ready
 from vehiclemor.errors import InputError, one_line
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_stages import addresses, batch_loop, stage
@@ -17,7 +17,15 @@ from vehiclemor.piecewise import through
 from vehiclemor.sample_loops import Pieces
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.signals import OUTPUT_STEP, Signal
-from vehiclemor.simulation.input_polynomials import recorded_inputs, sampled, signal_of
+from vehiclemor.simulation.input_polynomials import (
+    Extent,
+    extent_of,
+    no_limits,
+    recorded_inputs,
+    sampled,
+    signal_loops,
+    signal_of,
+)
 from vehiclemor.simulation.maneuver_checks import cut_short
 
 
@@ -32,6 +40,8 @@ class Given(NamedTuple):
         Ends of the smooth segments of each, in s.
     inputs
         At the times at which the runs are recorded (runs, samples, inputs).
+    extent
+        Of the inputs of each (runs, ...).
     remarks
         That a maneuver is longer than its run.
     kept
@@ -41,13 +51,15 @@ class Given(NamedTuple):
     words: np.ndarray
     edges: Sequence[np.ndarray]
     inputs: np.ndarray
+    extent: Extent
     remarks: Sequence[str]
     kept: Any
 
     def part(self, runs: Sequence[int]) -> Given:
         """Those of some of the runs."""
         edges, remarks = [self.edges[run] for run in runs], [self.remarks[run] for run in runs]
-        return Given(self.words[runs], edges, self.inputs[runs], remarks, self.kept)
+        extent = Extent(*(part[runs] for part in self.extent))
+        return Given(self.words[runs], edges, self.inputs[runs], extent, remarks, self.kept)
 
 
 class Signals(Sequence[Signal], ShortRepr):
@@ -141,8 +153,14 @@ class Signals(Sequence[Signal], ShortRepr):
         begin, size = address_of_array(pieces[0].coefficients), pieces[0].coefficients.nbytes
         words[:, -4] = begin + size * np.arange(self.runs)
         output_times = self.first.times if times is None else times
-        inputs = _sampled(of[id(pieces[0].edges)], words, output_times)
-        return Given(words, [own.edges for own in pieces], inputs, [""] * self.runs, pieces)
+        first, columns = of[id(pieces[0].edges)], self.u.shape[2]
+        inputs = np.empty((self.runs, len(output_times), columns))
+        _of_each(sampled().prepared(first, output_times, inputs[0]), "inputs", words, inputs)
+        found = np.empty((self.runs, 4, columns))
+        extent = signal_loops()["extent"].prepared(first, no_limits(columns), found[0])
+        _of_each(extent, "result", words, found)
+        edges = [own.edges for own in pieces]
+        return Given(words, edges, inputs, Extent.of(found), [""] * self.runs, pieces)
 
     def apart(self) -> list[Signal]:
         """The signals, one by one; polynomials of all are made together."""
@@ -152,14 +170,11 @@ class Signals(Sequence[Signal], ShortRepr):
         return through(self.t - self.t[0], self.u, self.hold)
 
 
-def _sampled(first: Ready, words: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Inputs (runs, samples, inputs) at some times, of signals in words; one of them is ready."""
-    result = np.empty((len(words), len(times), first.bundle.coefficients.shape[1]))
-    call = sampled().prepared(first, times, result[0])
+def _of_each(call: Prepared, result: str, words: np.ndarray, results: np.ndarray) -> None:
+    """A loop of a signal for signals in words, each with its own part of the results."""
     begin = call.address("signal.edges")
-    places = [*range(begin, begin + words.shape[1]), call.address("inputs")]
-    batch_loop("for_each_run")(stage(call, places, [words, addresses(result)]))
-    return result
+    places = [*range(begin, begin + words.shape[1]), call.address(result)]
+    batch_loop("for_each_run")(stage(call, places, [words, addresses(results)]))
 
 
 def given_of(signals: Sequence[Maneuver], times: np.ndarray | None) -> Given:
@@ -177,6 +192,7 @@ def given_of(signals: Sequence[Maneuver], times: np.ndarray | None) -> Given:
         words.reshape(len(signals), -1),
         [signal.bundle.edges for signal in held],
         np.stack(inputs),
+        Extent(*map(np.stack, zip(*map(extent_of, signals), strict=True))),
         [cut_short(signal) for signal in signals],
         held,
     )

@@ -32,7 +32,7 @@ from vehiclemor.study.provenance import attributes, code_digest
 from vehiclemor.study.scenario import parameters_of
 
 # Of the layout of these files.
-SCHEMA = 2
+SCHEMA = 3
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
 # What is taken apart.

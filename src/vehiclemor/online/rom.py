@@ -157,7 +157,8 @@ class ReducedOrderModel(ShortRepr):
     def input_range(self) -> InputRange:
         """Range of the inputs of the training."""
         runs = tuple(run for run in self.training if isinstance(run, Scenario))
-        return self.known or input_range(self.model, runs)
+        method: Method = component("method", self.method)
+        return self.known or input_range(self.model, runs, method.follows_time)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""

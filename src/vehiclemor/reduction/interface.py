@@ -105,6 +105,9 @@ class Method(ShortRepr):
     own_limits
         Whether its runs tell themselves when they leave what the model knows, or it knows no
         bounds; else a run beyond the inputs of the training runs is not trusted.
+    follows_time
+        Whether what it fits belongs to the times of the training runs, as a basis for each control
+        period does: then a run is known where its inputs are those of a training run.
     exported
         Whether what it fits can be exported; it can't if it is no straight-line program.
     fits_others
@@ -127,6 +130,7 @@ class Method(ShortRepr):
     check: Callable[[Any, Any], None] = fits_all
     learns_from: Literal["own", "any", "inputs"] = "own"
     own_limits: bool = False
+    follows_time: bool = False
     exported: bool = True
     fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)

@@ -8,6 +8,7 @@ input's largest value.  A signal brings its own.
 
 from functools import cache, lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,7 +44,73 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
 @cache
 def sampled() -> Loop:
     """The loop that gives inputs at some times."""
-    return loops(SIGNAL_LOOPS, ("sampled",))["sampled"]
+    return signal_loops()["sampled"]
+
+
+@cache
+def signal_loops() -> dict[str, Loop]:
+    """Loops over the polynomials of a signal."""
+    return loops(SIGNAL_LOOPS, ("sampled", "extent"))
+
+
+class Extent(NamedTuple):
+    """How far inputs go in whole signals, between output times too.
+
+    Attributes
+    ----------
+    low, high
+        Smallest and largest value of each input (..., inputs).
+    largest
+        Largest magnitudes (..., 2, inputs) of the inputs, and of what of them is above 2 Hz, see
+        `formulations.inputs.extent`.
+    since
+        Times (..., inputs) in s at which limits are passed first; infinite if they are not.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    largest: np.ndarray
+    since: np.ndarray
+
+    @classmethod
+    def of(cls, found: np.ndarray) -> "Extent":
+        """The extent that the loop has found (..., 4, inputs)."""
+        low, high, quick, since = np.moveaxis(found, -2, 0)
+        return cls(low, high, np.stack([np.maximum(-low, high), quick], axis=-2), since)
+
+
+def extent_of(maneuver: Maneuver, limits: np.ndarray | None = None) -> Extent:
+    """Extent of the inputs of a maneuver; without limits it is kept.
+
+    Parameters
+    ----------
+    limits
+        Of low, high and quick (3, inputs), for `since`.
+    """
+    if limits is not None:
+        return _extent(signal_of(maneuver), limits)
+    if not isinstance(maneuver, Signal):
+        return _kept_extent(maneuver)
+    if "extent" not in maneuver.kept:
+        maneuver.kept["extent"] = _extent(signal_of(maneuver))
+    return maneuver.kept["extent"]
+
+
+@lru_cache(maxsize=KEPT)
+def _kept_extent(maneuver: Maneuver) -> Extent:
+    return _extent(_found_signal(maneuver))
+
+
+def _extent(signal: Ready, limits: np.ndarray | None = None) -> Extent:
+    inputs = signal.bundle.coefficients.shape[1]
+    found = np.empty((4, inputs))
+    signal_loops()["extent"](signal, no_limits(inputs) if limits is None else limits, found)
+    return Extent.of(found)
+
+
+def no_limits(inputs: int) -> np.ndarray:
+    """Limits (3, inputs) that nothing passes."""
+    return np.repeat([[-np.inf], [np.inf], [np.inf]], inputs, axis=1)
 
 
 def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:

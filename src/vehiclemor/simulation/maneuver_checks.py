@@ -9,7 +9,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.signals import Signal
-from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.input_polynomials import extent_of
 
 
 def checked_maneuver(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
@@ -47,22 +47,21 @@ def _check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
 
 
 def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
-    for j, quantity in enumerate(definition.inputs):
-        name, unit = quantity.name, quantity.unit
-        if name not in definition.validity:
-            continue
-        low, high = definition.validity[name]
-        times, values = recorded_inputs(maneuver)
-        column = values[:, j]
-        if low <= np.minimum.reduce(column) and np.maximum.reduce(column) <= high:
-            continue
-        outside = np.flatnonzero(np.isfinite(column) & ((column < low) | (column > high)))
-        if len(outside):
-            sample = outside[0]
-            raise InputError(
-                f"{maneuver}: input {name} is {column[sample]:.4g} {unit} at t = "
-                f"{times[sample]:.6g} s; {definition.name} holds from {low:g} to {high:g} {unit}"
-            )
+    anything = -np.inf, np.inf
+    ranges = [definition.validity.get(q.name, anything) for q in definition.inputs]
+    if all(bounds == anything for bounds in ranges):
+        return
+    extent, (low, high) = extent_of(maneuver), np.array(ranges).T
+    outside = np.flatnonzero((extent.low < low) | (extent.high > high))
+    if len(outside):
+        since = extent_of(maneuver, np.array([low, high, np.full(len(low), np.inf)])).since
+        j = outside[since[outside].argmin()]
+        name, unit = definition.inputs[j].name, definition.inputs[j].unit
+        value = maneuver.at(since[j : j + 1])[0, j]
+        raise InputError(
+            f"{maneuver}: input {name} is {value:.4g} {unit} at t = {since[j]:.6g} s; "
+            f"{definition.name} holds from {low[j]:g} to {high[j]:g} {unit}"
+        )
 
 
 @lru_cache(maxsize=64)

@@ -340,7 +340,7 @@ def warned(
     judges_itself = run.trust or method.own_limits
     if judges_itself and method.learns_from == "inputs":
         return run
-    known = input_range(model, trained_for(experiment.training, test))
+    known = input_range(model, trained_for(experiment.training, test), method.follows_time)
     if outside := known.outside(method, car_of(model, test), reduced):
         return run.judged(outside)
     return run if judges_itself else run.judged(known.trust(model, test))

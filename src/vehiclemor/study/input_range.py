@@ -11,13 +11,24 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.car_checks import doubted
 from vehiclemor.reduction.cars import Cars, cars_of
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.trust import trust_of
+from vehiclemor.reduction.trust import (
+    EDGE,
+    NOTHING,
+    inputs_beyond,
+    largest_inputs,
+    trust_in,
+    trust_of,
+)
+from vehiclemor.simulation.input_polynomials import extent_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.study.scenario import Scenario, car_of, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
 SPEED_SLACK = 0.01
+# Part of the largest input by which one may differ from that of a training run at the same time,
+# where the model follows the times of its training.
+CLOSE = 0.01
 
 
 @dataclass(frozen=True)
@@ -27,13 +38,17 @@ class InputRange:
     Attributes
     ----------
     largest
-        Absolute values of the inputs (inputs,), and of a dynamic model of their rates beside them.
+        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times.  Of a dynamic
+        model those of whole signals, and of what of them is above 2 Hz (2, inputs).
     speed, reach
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
         Duration of the longest run in s; a kinematic model has no memory, and any is known.
     cars
         Those of the training runs; nothing is told of them where None.
+    histories
+        Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
+        the model follows the times of its training; else none.
     """
 
     largest: np.ndarray
@@ -41,6 +56,7 @@ class InputRange:
     reach: float
     longest: float
     cars: Cars | None = None
+    histories: np.ndarray | None = None
 
     def outside(self, method: Method, car: Model, reduced: Any) -> Trust | None:
         """What is told of a car beyond those of the training, or that its reduced model doubts.
@@ -52,47 +68,71 @@ class InputRange:
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""
-        values = _values(model, scenario.maneuver)
-        # An input that was zero in training may be nothing else.
-        used = values / np.maximum(self.largest, 1e-12)
-        times = scenario.maneuver.times
-        off = np.full(len(values), (_speed(model, scenario) - self.speed) / self.reach)
-        names = [f"input {name}" for name in model.inputs]
-        if model.kind != "ae":
-            names += [f"rate of {name}" for name in names]
-        used = np.column_stack([used, off, times / self.longest])
-        return trust_of(times, used, [*names, "initial speed", "duration"])
+        maneuver = scenario.maneuver.for_inputs(model.inputs)
+        if model.kind == "ae":
+            return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
+        used = extent_of(maneuver).largest / self.largest
+        since = np.full(len(model.inputs), np.inf)
+        if (used > 1.0).any():
+            since = inputs_beyond(maneuver, self.largest)
+        ranges = {}
+        for j, name in enumerate(model.inputs):
+            further, quicker = used[:, j].tolist()
+            what = (
+                f"input {name}" if further > 1.0 or quicker <= 1.0 else f"input {name} above 2 Hz"
+            )
+            ranges[what] = max(further, quicker), float(since[j])
+        off = abs(_speed(model, scenario) - self.speed) / self.reach
+        ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
+        lasts = maneuver.duration / self.longest
+        ranges["duration"] = lasts, self.longest if lasts > 1.0 else np.inf
+        if self.histories is not None:
+            ranges["difference from the inputs of training runs"] = self._unlike(maneuver)
+        return trust_in(ranges)
 
-    def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
-        """How far inputs (samples, inputs) go in the range; their rates are not looked at."""
-        used = inputs / np.maximum(self.largest[: inputs.shape[1]], 1e-12)
-        return trust_of(np.zeros(len(inputs)), used, [f"input {name}" for name in names])
+    def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
+        """How far inputs are from those of the nearest training run, and since when (s)."""
+        assert self.histories is not None
+        times = maneuver.times[maneuver.times <= self.longest]
+        known = np.linspace(0.0, self.longest / EDGE, self.histories.shape[1])
+        inputs, off = maneuver.at(times), []
+        for history in self.histories:
+            then = [np.interp(times, known, column) for column in history.T]
+            off.append(np.abs((inputs - np.transpose(then)) / self.largest[0]).max(axis=1) / CLOSE)
+        nearest = min(off, key=np.max)
+        beyond = np.flatnonzero(nearest > 1.0)
+        return float(nearest.max()), float(times[beyond[0]]) if len(beyond) else np.inf
+
+    def trust_of_inputs(
+        self, names: Sequence[str], inputs: np.ndarray, times: np.ndarray | None = None
+    ) -> Trust:
+        """How far inputs (samples, inputs) go in the range, each for itself."""
+        times = np.zeros(len(inputs)) if times is None else times
+        return trust_of(times, inputs / self.largest[0], [f"input {name}" for name in names])
 
 
 @lru_cache(maxsize=64)
-def input_range(model: Model, training: tuple[Scenario, ...]) -> InputRange:
-    """Range of some training scenarios."""
-    largest = [np.abs(_values(model, scenario.maneuver)).max(axis=0) for scenario in training]
+def input_range(
+    model: Model, training: tuple[Scenario, ...], follows_time: bool = False
+) -> InputRange:
+    """Range of some training scenarios, for a method that follows their times or doesn't."""
+    maneuvers = [scenario.maneuver.for_inputs(model.inputs) for scenario in training]
     speeds = [_speed(model, scenario) for scenario in training]
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
-    # One part in a million is rounding.
     reach = max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0
-    lasting = model.kind != "ae"
-    longest = max(scenario.maneuver.duration for scenario in training) if lasting else np.inf
-    edge = 1.0 + 1e-6
     cars = cars_of(car_of(model, scenario) for scenario in training)
-    return InputRange(np.max(largest, axis=0) * edge, middle, reach * edge, longest * edge, cars)
-
-
-def _values(model: Model, maneuver: Maneuver) -> np.ndarray:
-    """Inputs, and of a dynamic model their rates, at the output times."""
-    times = maneuver.times
-    values = maneuver.for_inputs(model.inputs).at(times)
     if model.kind == "ae":
-        return values
-    rates = np.gradient(values, times, axis=0) if len(times) > 1 else np.zeros_like(values)
-    return np.hstack([values, rates])
+        values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
+        largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
+        return InputRange(largest, middle, reach * EDGE, np.inf, cars)
+    longest = max(maneuver.duration for maneuver in maneuvers)
+    histories = None
+    if follows_time:
+        times = np.linspace(0.0, longest, maneuvers[0].samples)
+        histories = np.array([maneuver.at(times) for maneuver in maneuvers])
+    largest = largest_inputs(maneuvers)
+    return InputRange(largest, middle, reach * EDGE, longest * EDGE, cars, histories)
 
 
 def _speed(model: Model, scenario: Scenario) -> float:

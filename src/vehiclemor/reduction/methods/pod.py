@@ -93,5 +93,6 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="any",
+    follows_time=True,
     exported=False,
 )

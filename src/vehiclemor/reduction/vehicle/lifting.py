@@ -217,7 +217,7 @@ class Lifting(ShortRepr):
         address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(times), self.layout.size + len(watched)))
         largest, first = np.empty(self.told), np.empty(self.told, dtype=np.int64)
-        start = np.zeros(3)
+        start = np.array([0.0, 0.0, 0.0, 0.0, np.inf])
         lasted = self.reach.lasted
         known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
         lifted = _loops()["lifted"].prepared(

@@ -13,7 +13,7 @@ NOTHING = 1e-14
 PARTS, MOVING, STILL = 8, 0.02, 1e-4
 LEVELS = PARTS + 1
 # What is told besides, and a time (s) that is hardly after the start.
-BESIDES, SOON = 4, 1e-3
+BESIDES, SOON = 5, 1e-3
 
 
 def with_decay(
@@ -63,8 +63,8 @@ class Known(NamedTuple):
     lasted, spent
         Times (2 columns, levels) that are known, and scratch space alike.
     start
-        When (s) what it excites has settled, how unlike known starts it is, and 1; all zero where
-        the first sample is no start.
+        When (s) what it excites has settled, how unlike known starts it is, and 1, all zero where
+        the first sample is no start; how far the inputs go, and when (s) they are beyond.
     sideways
         How far known starts use the ranges of lateral motion.
     """
@@ -127,6 +127,13 @@ def tell(states, column, known, largest, first):
         first[2] = 0 if largest[2] > 1.0 else first[2]
     largest[3] = known.start[1]
     first[3] = 0 if largest[3] > 1.0 else first[3]
+    largest[4] = known.start[3]
+    if largest[4] > 1.0:
+        # What passes between two samples is told of at the second.
+        first[4] = len(times) - 1
+        for sample in range(len(times)):
+            if times[sample] >= known.start[4]:
+                first[4] = min(first[4], sample)
 
 
 def durations(times, states, column, lasted, spent):

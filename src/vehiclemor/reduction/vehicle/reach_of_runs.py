@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.trust import largest_inputs
 from vehiclemor.reduction.vehicle.landing import after_landing
 from vehiclemor.reduction.vehicle.lifting import ROUNDING
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
@@ -61,4 +62,5 @@ def training_reach(
         np.maximum(amplitudes, ROUNDING * amplitudes.max(initial=0.0)),
         leaves,
         **known_starts(np.array(starts), leaves),
+        inputs=largest_inputs([given.maneuver for given in training]),
     )

@@ -187,7 +187,8 @@ class ReducedVehicle(ShortRepr):
         inputs = recorded_inputs(maneuver)[1]
         known = self.known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
-        states, trust = self.lift.of_run(run, inputs, known.excited, known.told)
+        told = *known.told, *self.reach.driven(maneuver)
+        states, trust = self.lift.of_run(run, inputs, known.excited, told)
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state

@@ -7,11 +7,14 @@ slow motion, is known for the starts of the training alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from vehiclemor.maneuver import Maneuver
+from vehiclemor.reduction.trust import inputs_beyond
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING, PARTS, STILL
+from vehiclemor.simulation.input_polynomials import extent_of
 
 # A run may last so many times as long as any training run, and this (s) where none has been.
 LONGER, SHORTEST = 1.05, 0.1
@@ -29,6 +32,7 @@ REASONS = (
     "it moves sideways before what its start excites has decayed",
     "it starts sideways, as no training run does",
     "its start leaves more than the slow motion, unlike any training run",
+    "it is steered further or quicker than any training run",
 )
 BEYOND = np.array([STILL, MOVING, *np.arange(1, PARTS) / PARTS])
 
@@ -53,6 +57,9 @@ class TrainingReach:
         What lifting leaves of the states of the shape (n,).
     starts, begun
         Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
+    inputs
+        Largest magnitudes (2, inputs) of the inputs, and of what of them is above 2 Hz, between
+        output times too; nothing is told of them where it is empty.
     """
 
     lasted: np.ndarray
@@ -63,6 +70,14 @@ class TrainingReach:
     left: np.ndarray
     starts: np.ndarray
     begun: np.ndarray
+    inputs: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
+
+    def driven(self, maneuver: Maneuver) -> tuple[float, float]:
+        """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
+        if not self.inputs.size:
+            return 0.0, np.inf
+        used = float((extent_of(maneuver).largest / self.inputs).max())
+        return used, np.inf if used <= 1.0 else inputs_beyond(maneuver, self.inputs).min()
 
     def settled(self, excited: np.ndarray) -> float:
         """Time in s from which on a start's transient, as `Lifting.excited` gives it, is known."""

@@ -14,6 +14,12 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, Reduce
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations
 
 
+@pytest.fixture(scope="module")
+def reduced(reduced):
+    """Any steering is known here: that has tests of its own."""
+    return replace(reduced, reach=replace(reduced.reach, inputs=NOTHING_KNOWN.inputs))
+
+
 def test_durations_of_the_compiled_loop_are_those_of_numpy(reduced):
     model, maneuver = reduced.model, CARS[reduced.model.name]
     times, lift = maneuver.times, reduced.lift

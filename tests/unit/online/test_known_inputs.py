@@ -1,0 +1,139 @@
+"""Reduced models tell of inputs that they have not been trained on, between output times too."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.study.plans.boxes import boxes_of, drawn
+from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.scenario import start_of
+
+CAR = "independent_suspension_vehicle"
+# Steering (rad) that the 14-DOF vehicle allows, and about the largest that its model has learnt.
+ALLOWED, LEARNT = 1.066, 0.07
+
+
+@cache
+def shipped(name):
+    return vm.rom(name)
+
+
+def missed(rom, run, full):
+    """Largest error of a run, in parts of the bounds of its model's protocol."""
+    found = 0.0
+    for output, bound in load_protocol(rom.model.name).definition.bounds.items():
+        error = (run.outputs - full.outputs)[:, rom.output_names.index(output)]
+        size = np.abs(error).max() if bound.measure == "max" else np.sqrt(np.mean(error**2))
+        found = max(found, size / bound.bound)
+    return found
+
+
+def pulse(rng):
+    """A steering of 1 to 200 ms, of any size that the vehicle allows."""
+    d, begin = np.exp(rng.uniform(np.log(1e-3), np.log(0.2))), rng.uniform(0.5, 3.0)
+    size = rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(0.05 * LEARNT), np.log(ALLOWED)))
+    kind = rng.choice(["triangle", "hold", "doublet", "ramp", "noise", "train"])
+    if kind == "noise":
+        values = [0.0, *size * rng.uniform(-1.0, 1.0, int(1.0 / d)), 0.0]
+    else:
+        shape = {"triangle": [0, 1, 0], "hold": [1, 0], "doublet": [1, -1, 0], "ramp": [0, 1, 1, 0]}
+        values = size * np.array(shape.get(kind, [0, 1, 0] * 6))
+    times = begin + d * np.arange(len(values))
+    hold = "zero" if kind in ("hold", "doublet") else "linear"
+    end = max(5.0, times[-1] + 0.5)
+    return vm.Signal.from_samples([0.0, *times, end], [0.0, *values, 0.0], hold)
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
+def test_pulses_of_the_steering_are_right_or_told(start):
+    rom, rng = shipped(CAR), np.random.default_rng(20261122)
+    signals = [pulse(rng) for _ in range(150)]
+    runs = [rom.simulate(signal, start) for signal in signals]
+    ends = {"ok": 0, "untrusted": 0}
+    for signal, run in zip(signals, runs, strict=True):
+        ends[run.status] += 1
+        if run.status == "ok":
+            full = rom.model.simulate(signal, start, solver="etdrk4", tolerance=1e-4)
+            assert missed(rom, run, full) <= 1.0
+    # There is something to be right about, and something to be told.
+    assert min(ends.values()) > 20
+    # A batch tells the same.
+    alike = [k for k, signal in enumerate(signals) if signal.duration == 5.0]
+    many = vm.simulate_many(rom, [signals[k] for k in alike], start, outputs=["yaw"])
+    assert many["status"].values.tolist() == [runs[k].status for k in alike]
+    np.testing.assert_allclose(many["until"], [runs[k].trust.until for k in alike])
+
+
+@pytest.mark.parametrize(("size", "hold"), [(0.8812298, "linear"), (0.3, "zero"), (-0.06, "zero")])
+def test_a_pulse_between_two_output_times_is_told_of_when_it_comes(size, hold):
+    rom = shipped(CAR)
+    signal = vm.Signal.from_samples([0, 1.689, 1.692, 1.694, 10], [0, 0, size, 0, 0], hold)
+    run = rom.simulate(signal, "equilibrium")
+    assert run.status == "untrusted"
+    assert "it is steered further or quicker than any training run" in run.message
+    assert run.trust.until == pytest.approx(1.7)
+    together = vm.Signals([0, 1.689, 1.692, 1.694, 10], [[0, 0, size, 0, 0], [0] * 5], hold)
+    many = vm.simulate_many(rom, together, "equilibrium", outputs=["yaw"])
+    assert many["status"].values.tolist() == ["untrusted", "ok"]
+    assert many["until"][0] == pytest.approx(1.7)
+
+
+@pytest.mark.parametrize("name", [CAR, "high_fidelity_vehicle"])
+def test_steering_of_the_protocol_is_within_what_is_known(name):
+    rom, protocol = shipped(name), load_protocol(name)
+    reach = getattr(rom.reduced, "fast", rom.reduced).reach
+    known = [*protocol.sets["training"], *protocol.sets["validation"]]
+    plan = protocol.definition.drawn
+    plan = plan.model_copy(update={"boxes": boxes_of(protocol.definition, plan)})
+    for scenario in (*known, *drawn(protocol.model, plan, "any", "drawn", known)):
+        assert reach.driven(scenario.maneuver)[0] <= 1.0
+
+
+def test_the_whole_signal_is_looked_at():
+    times = np.array([0.0, 1.0, 1.3, 1.7, 2.0, 3.0])
+    values = np.array([[0.0, 0.0], [0.0, 1.0], [2.0, 1.0], [-1.0, -3.0], [0.0, 0.0], [0.0, 0.0]])
+    for hold in ("zero", "linear", "cubic"):
+        signal = vm.Signal.from_samples(times, values, hold)
+        fine = np.linspace(0.0, 3.0, 300_001)[:-1]
+        u = signal.at(fine)
+        found = extent_of(signal)
+        np.testing.assert_allclose(found.low, u.min(axis=0), rtol=0.01, atol=1e-12)
+        np.testing.assert_allclose(found.high, u.max(axis=0), rtol=0.01, atol=1e-12)
+        # Two high passes of 0.08 s, one after the other, by small steps.
+        step, once, twice, largest = fine[1], np.zeros(2), np.zeros(2), np.zeros(2)
+        for change in np.diff(u, axis=0, prepend=[[0.0, 0.0]]):
+            before, once = once, (once + change) / (1.0 + step / 0.08)
+            twice = (twice + once - before) / (1.0 + step / 0.08)
+            largest = np.maximum(largest, np.abs(twice))
+        np.testing.assert_allclose(found.largest[1], largest, rtol=0.01)
+
+
+def test_bounds_of_inputs_hold_between_output_times_in_full_order_too():
+    car = shipped(CAR).model
+    times, values = [0.0, 3.0, 3.0005, 3.001, 10.0], [0.0, 0.0, 3.0, 0.0, 0.0]
+    signal = vm.Signal.from_samples(times, values)
+    refusal = r"input delta is \S+ rad at t = 3.0\d* s; \S+ holds from -1.066 to 1.066 rad"
+    for simulate in (car.simulate, shipped(CAR).simulate):
+        with pytest.raises(vm.InputError, match=refusal):
+            simulate(signal)
+    signals = vm.Signals(times, [values, np.multiply(values, 0.01)])
+    many = vm.simulate_many(car, signals, outputs=["yaw"])
+    assert many["status"].values.tolist() == ["rejected", "ok"]
+    assert "holds from -1.066 to 1.066 rad" in many["message"].values[0]
+
+
+def test_pod_tells_when_it_leaves_its_training_run():
+    car = vm.model(CAR)
+    pod = vm.reduce(car, "pod", rank=3, training="nominal")
+    assert pod.simulate("lane_change").status == "ok"
+    times = np.linspace(0.0, 12.0, 601)
+    steering = vm.Signal.from_samples(times, 0.02 * np.sin(times) * np.clip(times, 0.0, 1.0))
+    run, full = pod.simulate(steering), car.simulate(steering)
+    assert missed(pod, run, full) > 10.0
+    assert run.status == "untrusted"
+    assert "difference from the inputs of training runs" in run.message
+    # Half a second of the training run is known; what comes then is not.
+    assert 0.0 < run.trust.until < 1.0
