@@ -156,7 +156,7 @@ class Signals(Sequence[Signal], ShortRepr):
         first, columns = of[id(pieces[0].edges)], self.u.shape[2]
         inputs = np.empty((self.runs, len(output_times), columns))
         _of_each(sampled().prepared(first, output_times, inputs[0]), "inputs", words, inputs)
-        found = np.empty((self.runs, 4, columns))
+        found = np.empty((self.runs, 5, columns))
         extent = signal_loops()["extent"].prepared(first, no_limits(columns), found[0])
         _of_each(extent, "result", words, found)
         edges = [own.edges for own in pieces]

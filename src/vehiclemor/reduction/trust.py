@@ -45,11 +45,11 @@ def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
 
 
 def largest_inputs(maneuvers: Sequence[Maneuver]) -> np.ndarray:
-    """Largest magnitudes (2, inputs) of inputs, and of what of them is above 2 Hz."""
+    """Largest sizes (3, inputs) of inputs, see `Extent`."""
     largest = [extent_of(maneuver).largest for maneuver in maneuvers]
     return EDGE * np.maximum(np.max(largest, axis=0), NOTHING)
 
 
 def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
-    """Times (inputs,) in s at which inputs pass what is known of them (2, inputs) first."""
+    """Times (inputs,) in s at which inputs pass what is known of them (3, inputs) first."""
     return extent_of(maneuver, np.array([-known[0], *known])).since

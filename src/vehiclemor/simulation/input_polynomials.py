@@ -61,8 +61,8 @@ class Extent(NamedTuple):
     low, high
         Smallest and largest value of each input (..., inputs).
     largest
-        Largest magnitudes (..., 2, inputs) of the inputs, and of what of them is above 2 Hz, see
-        `formulations.inputs.extent`.
+        Sizes (..., 3, inputs): largest magnitudes of the inputs and of what of them is above 2 Hz,
+        root of the integral of the square of what is above 8 Hz, see `formulations.inputs.extent`.
     since
         Times (..., inputs) in s at which limits are passed first; infinite if they are not.
     """
@@ -74,9 +74,10 @@ class Extent(NamedTuple):
 
     @classmethod
     def of(cls, found: np.ndarray) -> "Extent":
-        """The extent that the loop has found (..., 4, inputs)."""
-        low, high, quick, since = np.moveaxis(found, -2, 0)
-        return cls(low, high, np.stack([np.maximum(-low, high), quick], axis=-2), since)
+        """The extent that the loop has found (..., 5, inputs)."""
+        low, high, quick, shaken, since = np.moveaxis(found, -2, 0)
+        largest = np.stack([np.maximum(-low, high), quick, shaken], axis=-2)
+        return cls(low, high, largest, since)
 
 
 def extent_of(maneuver: Maneuver, limits: np.ndarray | None = None) -> Extent:
@@ -85,7 +86,7 @@ def extent_of(maneuver: Maneuver, limits: np.ndarray | None = None) -> Extent:
     Parameters
     ----------
     limits
-        Of low, high and quick (3, inputs), for `since`.
+        As `formulations.inputs.extent` takes them (4, inputs), for `since`.
     """
     if limits is not None:
         return _extent(signal_of(maneuver), limits)
@@ -103,14 +104,14 @@ def _kept_extent(maneuver: Maneuver) -> Extent:
 
 def _extent(signal: Ready, limits: np.ndarray | None = None) -> Extent:
     inputs = signal.bundle.coefficients.shape[1]
-    found = np.empty((4, inputs))
+    found = np.empty((5, inputs))
     signal_loops()["extent"](signal, no_limits(inputs) if limits is None else limits, found)
     return Extent.of(found)
 
 
 def no_limits(inputs: int) -> np.ndarray:
-    """Limits (3, inputs) that nothing passes."""
-    return np.repeat([[-np.inf], [np.inf], [np.inf]], inputs, axis=1)
+    """Limits (4, inputs) that nothing passes."""
+    return np.repeat([[-np.inf], [np.inf], [np.inf], [np.inf]], inputs, axis=1)
 
 
 def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:

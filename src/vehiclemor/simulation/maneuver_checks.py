@@ -54,7 +54,8 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     extent, (low, high) = extent_of(maneuver), np.array(ranges).T
     outside = np.flatnonzero((extent.low < low) | (extent.high > high))
     if len(outside):
-        since = extent_of(maneuver, np.array([low, high, np.full(len(low), np.inf)])).since
+        anything = np.full((2, len(low)), np.inf)
+        since = extent_of(maneuver, np.vstack([low, high, anything])).since
         j = outside[since[outside].argmin()]
         name, unit = definition.inputs[j].name, definition.inputs[j].unit
         value = maneuver.at(since[j : j + 1])[0, j]

@@ -38,8 +38,8 @@ class InputRange:
     Attributes
     ----------
     largest
-        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times.  Of a dynamic
-        model those of whole signals, and of what of them is above 2 Hz (2, inputs).
+        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a dynamic
+        model sizes of whole signals (3, inputs), see `Extent`.
     speed, reach
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
@@ -76,12 +76,9 @@ class InputRange:
         if (used > 1.0).any():
             since = inputs_beyond(maneuver, self.largest)
         ranges = {}
-        for j, name in enumerate(model.inputs):
-            further, quicker = used[:, j].tolist()
-            what = (
-                f"input {name}" if further > 1.0 or quicker <= 1.0 else f"input {name} above 2 Hz"
-            )
-            ranges[what] = max(further, quicker), float(since[j])
+        for name, (further, *quicker), time in zip(model.inputs, used.T, since, strict=True):
+            what = f"input {name}" + " above 2 Hz" * bool(further <= 1.0 < max(quicker))
+            ranges[what] = float(max(further, *quicker)), float(time)
         off = abs(_speed(model, scenario) - self.speed) / self.reach
         ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
         lasts = maneuver.duration / self.longest

@@ -12,6 +12,7 @@ from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
 from vehiclemor.reduction.vehicle.training_reach import (
     BESIDE,
+    KNOWN,
     LONGER,
     NOTHING_KNOWN,
     SHORTEST,
@@ -29,6 +30,7 @@ def training_reach(
     shape, features, transient = reduced.shape, reduced.features, reduced.transient
     lateral = features.lateral
     lasted, sideways, decaying, left, starts = [], [MOVING], [], [], []
+    maneuvers = [given.maneuver for given in training]
     faded, amplitudes = [], []
     for given, run in zip(training, runs, strict=True):
         path = reduced.path(given.maneuver, given.start)
@@ -62,5 +64,5 @@ def training_reach(
         np.maximum(amplitudes, ROUNDING * amplitudes.max(initial=0.0)),
         leaves,
         **known_starts(np.array(starts), leaves),
-        inputs=largest_inputs([given.maneuver for given in training]),
+        inputs=KNOWN[:, : len(shape.model.inputs)] * largest_inputs(maneuvers),
     )

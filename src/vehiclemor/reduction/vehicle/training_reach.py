@@ -18,6 +18,9 @@ from vehiclemor.simulation.input_polynomials import extent_of
 
 # A run may last so many times as long as any training run, and this (s) where none has been.
 LONGER, SHORTEST = 1.05, 0.1
+# Parts of the sizes of the training runs' steering that a run's may have: few of them are as quick
+# as the quickest; its derivatives are as in these.
+KNOWN = np.array([[0.95, 1.0, 1.0], [0.75, 1.0, 1.0], [0.75, 1.0, 1.0]])
 # A start may leave so many times what samples of training runs leave.
 UNLIKE = 3.0
 # Part of the steered motion's own amplitudes that a start's transient may have beside it.
@@ -58,8 +61,8 @@ class TrainingReach:
     starts, begun
         Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
     inputs
-        Largest magnitudes (2, inputs) of the inputs, and of what of them is above 2 Hz, between
-        output times too; nothing is told of them where it is empty.
+        Sizes (3, inputs) that the inputs may have between output times too, see `Extent`; nothing
+        is told of them where it is empty.
     """
 
     lasted: np.ndarray
@@ -70,7 +73,7 @@ class TrainingReach:
     left: np.ndarray
     starts: np.ndarray
     begun: np.ndarray
-    inputs: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
+    inputs: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
 
     def driven(self, maneuver: Maneuver) -> tuple[float, float]:
         """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""

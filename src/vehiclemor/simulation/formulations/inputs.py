@@ -7,11 +7,11 @@ import numpy as np
 from vehiclemor.codegen.loop_types import Int, Matrix, Vector
 from vehiclemor.sample_loops import EQUIDISTANT, Pieces
 
-INLINED = ("input_at", "signal_at")
-# Time constant (s) of the two high passes that leave what of an input is above 2 Hz.
-CORNER = 0.08
+INLINED = ("input_at", "signal_at", "passed")
+# Time constants (s) of two high passes, one after the other, that leave what is above 2 and 8 Hz.
+CORNER, HIGHER = 0.08, 0.02
 # Parts that a piece is looked at in, and the longest of them (s).
-PARTS, LONGEST = 8, 0.02
+PARTS, LONGEST = 4, 0.01
 
 
 def input_at(problem, t, u):
@@ -63,51 +63,63 @@ def sampled(signal: Pieces, times: Vector, inputs: Matrix) -> Int:
 
 
 def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
-    """Extremes of whole inputs, between samples too, and of what of them is above 2 Hz.
+    """Extremes of whole inputs, between samples too, and of what of them is quick.
 
     Parameters
     ----------
     limits
-        By input (3, inputs): smallest and largest value, largest magnitude above 2 Hz.
+        By input (4, inputs): smallest and largest value, largest magnitude above 2 Hz, and the root
+        of the integral over time of the square of what is above 8 Hz.
     result
         The same of the inputs, and the time in s at which a limit is passed first; infinite if none
-        is (4, inputs).
+        is (5, inputs).
     """
     edges, first, starts, coefficients = signal
     degree, pieces, segments = coefficients.shape[2] - 1, len(coefficients), len(edges) - 1
     for j in range(coefficients.shape[1]):
         low, high, most, since = math.inf, -math.inf, 0.0, math.inf
-        least, largest, quickest = limits[0, j], limits[1, j], limits[2, j]
-        # Before it begins an input is zero; `once` and `twice` have passed one and both filters.
-        before, once, twice = 0.0, 0.0, 0.0
-        segment, parts, length, share, inverse, decay = 0, 1, -1.0, 0.0, 0.0, 1.0
+        # Before it begins an input is zero.  What has passed one filter and both, of each corner.
+        before, once, twice, high_once, high_twice, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        segment, parts, length, span, share = 0, 1, -1.0, 1.0, 1.0
+        decay, high_decay = 1.0, 1.0
         even = (edges[1] - edges[0]) / (first[1] - first[0])
         for piece in range(pieces):
             if piece == first[segment + 1] and segment + 1 < segments:
                 segment += 1
                 even = (edges[segment + 1] - edges[segment]) / (first[segment + 1] - piece)
-            a, long = edges[segment] + even * (piece - first[segment]), even
+            begin, long = edges[segment] + even * (piece - first[segment]), even
             if len(starts):
-                a = starts[piece]
-                long = (starts[piece + 1] if piece + 1 < pieces else edges[segments]) - a
+                begin = starts[piece]
+                long = (starts[piece + 1] if piece + 1 < pieces else edges[segments]) - begin
             if abs(long - length) > EQUIDISTANT * long:
                 parts = max(PARTS if degree > 1 else 1, math.ceil(long / LONGEST))
-                length, share = long, long / parts / CORNER
-                inverse, decay = 1.0 / share, math.exp(-share)
+                length, span, share = long, long / parts, 1.0 / parts
+                decay, high_decay = math.exp(-span / CORNER), math.exp(-span / HIGHER)
             for part in range(parts + 1):
-                z = part / parts if parts > 1 else float(part)
                 value = coefficients[piece, j, degree]
                 for power in range(degree - 1, -1, -1):
-                    value = coefficients[piece, j, power] + z * value
+                    value = coefficients[piece, j, power] + part * share * value
                 change, before = value - before, value
                 if part:
-                    slope = change * inverse
-                    twice = (twice + (slope - once) * share) * decay
-                    once = slope + (once - slope) * decay
+                    left = high_twice * high_twice
+                    once, twice = passed(once, twice, change, span / CORNER, decay)
+                    high_once, high_twice = passed(
+                        high_once, high_twice, change, span / HIGHER, high_decay
+                    )
+                    squares += 0.5 * span * (left + high_twice * high_twice)
                 else:
                     once, twice = once + change, twice + change
+                    high_once, high_twice = high_once + change, high_twice + change
                 low, high, most = min(low, value), max(high, value), max(most, abs(twice))
-                if not (least <= value <= largest and abs(twice) <= quickest):
-                    since = min(since, a + z * long)
-        result[0, j], result[1, j], result[2, j], result[3, j] = low, high, most, since
+                inside = limits[0, j] <= value <= limits[1, j] and abs(twice) <= limits[2, j]
+                if not (inside and squares <= limits[3, j] * limits[3, j]):
+                    since = min(since, begin + part * span)
+        result[0, j], result[1, j], result[2, j] = low, high, most
+        result[3, j], result[4, j] = math.sqrt(squares), since
     return 0
+
+
+def passed(once, twice, change, time, decay):
+    """What has passed a high pass once and twice after a linear change; time is in its constant."""
+    steady = change / time
+    return steady + (once - steady) * decay, (twice + change - once * time) * decay
