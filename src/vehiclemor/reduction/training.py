@@ -7,14 +7,14 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import unknown
+from vehiclemor.registry import component, names, unknown
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 POLICIES = {
     "matched": "trained on the very run that it is tested on (paper, section 3)",
-    "nominal": "trained on the unperturbed run (paper, section 4)",
+    "nominal": "trained on the model's own maneuver, unperturbed (paper, section 4)",
     "set": "trained on a listed set of frequency and amplitude factors",
 }
 
@@ -47,30 +47,37 @@ def training_runs(
     model: Model,
     maneuver: Maneuver,
     start: Start,
-    policy: str,
+    training: str,
     factors: Sequence[tuple[float, float]] = (),
 ) -> tuple[TrainingRun, ...]:
-    """Training runs for what a reduced model is tested on, see `policy_factors`."""
-    pairs = policy_factors(maneuver, policy, factors)
-    return tuple(TrainingRun(model, maneuver.perturbed(*pair), start) for pair in pairs)
+    """Training runs for what a reduced model is tested on, see `trained_maneuvers`."""
+    runs = trained_maneuvers(model, maneuver, training, factors)
+    return tuple(TrainingRun(model, run, start) for run in runs)
 
 
-def policy_factors(
-    maneuver: Maneuver, policy: str, factors: Sequence[tuple[float, float]] = ()
-) -> tuple[tuple[float, float], ...]:
-    """(frequency, amplitude) factors of the runs of one of `POLICIES`; those of `set` are given.
+def trained_maneuvers(
+    model: Model, tested: Maneuver, training: str, factors: Sequence[tuple[float, float]] = ()
+) -> tuple[Maneuver, ...]:
+    """What one of `POLICIES`, or the name of a maneuver, trains on.
+
+    Parameters
+    ----------
+    tested
+        What the reduced model is tested on; `set` takes it with each pair of factors (frequency,
+        amplitude).
 
     Raises
     ------
     InputError
-        If the policy is unknown, or `set` without factors.
+        If there is no such policy or maneuver, or `set` without factors.
     """
-    if policy == "matched":
-        return ((maneuver.frequency_factor, maneuver.amplitude_factor),)
-    if policy == "nominal":
-        return ((1.0, 1.0),)
-    if policy == "set":
+    if training == "matched":
+        return (tested,)
+    if training == "set":
         if not factors:
-            raise InputError("the training policy 'set' needs training_set: pairs of factors")
-        return tuple(factors)
-    raise unknown("training policy", policy, POLICIES)
+            raise InputError("training 'set' needs training_set: pairs of factors")
+        return tuple(tested.perturbed(*pair) for pair in factors)
+    name = model.definition.maneuver if training == "nominal" else training
+    if name not in names("maneuver"):
+        raise unknown("training", training, [*POLICIES, *names("maneuver")])
+    return (component("maneuver", name),)

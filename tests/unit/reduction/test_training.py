@@ -37,7 +37,7 @@ def test_run_is_exact_at_any_times(
 
 @pytest.mark.parametrize(
     ("policy", "message"),
-    [("set", "needs training_set"), ("nomnal", "unknown training policy .* did you mean nominal")],
+    [("set", "needs training_set"), ("nomnal", "unknown training .* did you mean nominal")],
 )
 def test_wrong_policy_is_one_line(
     model: AlgebraicModel, nominal: Maneuver, policy: str, message: str
