@@ -54,7 +54,7 @@ def car():
         ({"training": "nomnal"}, ["unknown training 'nomnal'; did you mean nominal?"]),
         ({"training": "sine_travl"}, ["unknown training", "did you mean sine_travel"]),
         ({"training": "lane_change"}, ["gives inputs delta", "needs z, s0"]),
-        ({"training_set": [(1, 1)]}, ["training_set is for training 'set' alone"]),
+        ({"training_set": [(1, 1)]}, ["'set' needs training_set", "nothing else"]),
         ({"training_set": 3, "training": "set"}, ["training_set is 3", "pairs"]),
         ({"training_set": [1.0, 2.0], "training": "set"}, ["training_set", "pairs"]),
         ({"training_set": [(1, 2, 3)], "training": "set"}, ["training_set", "pairs"]),

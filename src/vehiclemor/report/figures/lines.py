@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from vehiclemor.report.labels import MARK, TRAINED
 from vehiclemor.report.printing import alphabetic
@@ -78,10 +77,9 @@ def legend_outside(
     With 0 `columns` it has as many as there is room for.
     """
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
-    if any(text.endswith(MARK) for text in shown):
-        shown[f"{MARK} {TRAINED}"] = Line2D([], [], linestyle="none")
     longest = max(map(len, shown), default=0)
     room = int(figure.get_figwidth() / (HANDLE + LETTER * longest))
     columns = min(columns or max(1, room), len(shown))
     where = "outside upper center" if place == "upper" else "outside lower center"
-    figure.legend(shown.values(), shown, loc=where, ncols=columns)
+    told = f"{MARK} {TRAINED}" if any(text.endswith(MARK) for text in shown) else None
+    figure.legend(shown.values(), shown, loc=where, ncols=columns, title=told)

@@ -7,19 +7,20 @@ from functools import cache, lru_cache
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.training import trained_maneuvers
-from vehiclemor.registry import component
+from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol
 from vehiclemor.study.scenario import Overrides, Scenario, check
 
-# One of `POLICIES`, `protocol`, the name of a maneuver, or what is run.
+# One of `NAMED`, the name of a maneuver, or what is run.
 Entry = str | Scenario | Maneuver
 Given = Entry | Sequence[Entry]
-# What follows from the run that is tested.
-OF_TESTED = ("matched", "set")
+Pairs = Sequence[tuple[float, float]]
+# The tested run itself and that with listed factors; what any model has, and some.
+NAMED = ("matched", "set", "nominal", "protocol")
+OF_TESTED = NAMED[:2]
 
 
 def training_set(
@@ -27,7 +28,7 @@ def training_set(
     method: str,
     given: Given | None,
     test: Scenario | None = None,
-    factors: Sequence[tuple[float, float]] = (),
+    factors: Pairs = (),
     cars: Sequence[Overrides] | None = None,
 ) -> tuple[Scenario, ...]:
     """Training scenarios of a method for a model, see `simulate` and `reduce`.
@@ -39,7 +40,7 @@ def training_set(
     test
         What is tested: maneuvers are run from its start, at its speed, by its car.
     factors
-        Of `set`.
+        Of `set`: pairs (frequency, amplitude).
     cars
         Parameters of the cars that are trained on, each with every run; as they are where None.
 
@@ -53,37 +54,39 @@ def training_set(
     entries = [given] if isinstance(given, Entry) else given
     if not isinstance(entries, Sequence) or not entries:
         raise InputError(f"training is {quoted(given)}: give names, maneuvers or scenarios")
-    if factors and "set" not in [entry for entry in entries if isinstance(entry, str)]:
-        raise InputError("training_set is for training 'set' alone")
-    found = [s for entry in entries for s in _scenarios(model, method, entry, test, factors)]
+    if bool(factors) != any(isinstance(entry, str) and entry == "set" for entry in entries):
+        raise InputError("training 'set' needs training_set, pairs of factors; nothing else does")
+    own = Scenario(component("maneuver", model.definition.maneuver), model.starts[0])
+    found: list[Scenario] = []
+    for entry in entries:
+        if test is None and isinstance(entry, str) and entry in OF_TESTED:
+            raise InputError(f"training {entry!r} needs a run that is tested, as simulate has it")
+        found += _scenarios(model, method, entry, test or own, factors)
     if cars is not None:
         found = [replace(scenario, parameters=car) for car in cars for scenario in found]
     return tuple(found)
 
 
 def _scenarios(
-    model: Model,
-    method: str,
-    entry: Entry,
-    test: Scenario | None,
-    factors: Sequence[tuple[float, float]],
+    model: Model, method: str, entry: Entry, test: Scenario, factors: Pairs
 ) -> list[Scenario]:
     """What one entry trains on, checked but for what follows from the tested run."""
-    base = test or Scenario(component("maneuver", model.definition.maneuver), model.starts[0])
     if not isinstance(entry, str):
-        run = entry if isinstance(entry, Scenario) else replace(base, maneuver=entry)
+        run = entry if isinstance(entry, Scenario) else replace(test, maneuver=entry)
         run = replace(run, maneuver=checked_maneuver(run.maneuver, model.definition))
         check(model, run)
         return [run]
     if entry == "protocol":
         runs = _of_protocol(model.name, method) or _protocol_of(model.name).sets["training"]
-        return [replace(run, parameters=base.parameters) for run in runs]
-    derived = entry in OF_TESTED
-    if derived and test is None:
-        raise InputError(f"training {entry!r} needs a run that is tested, as simulate has it")
-    maneuvers = trained_maneuvers(model, base.maneuver, entry, factors)
-    found = [replace(base, maneuver=maneuver) for maneuver in maneuvers]
-    return found if derived else [_checked(model, run) for run in found]
+        return [replace(run, parameters=test.parameters) for run in runs]
+    if entry == "matched":
+        return [test]
+    if entry == "set":
+        return [replace(test, maneuver=test.maneuver.perturbed(*pair)) for pair in factors]
+    name = model.definition.maneuver if entry == "nominal" else entry
+    if name not in names("maneuver"):
+        raise unknown("training", entry, [*NAMED, *names("maneuver")])
+    return [_checked(model, replace(test, maneuver=component("maneuver", name)))]
 
 
 # All runs of a grid may be trained on the same.
