@@ -144,7 +144,7 @@ def simulate(
     start
         Initial condition, by name or as a state (n,); the model's first by default.
     frequency, amplitude
-        Factors on the maneuver.
+        Factors on the maneuver, beside its own.
     preset
         `recommended`, or another preset of the method, such as `literal` (the paper's words).
     training
@@ -204,6 +204,7 @@ def _scenario(
     factors: tuple[float, float],
 ) -> Scenario:
     """What is simulated, checked."""
+    from vehiclemor.maneuver import FACTORS, checked_factor
     from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.study.scenario import Scenario, check
 
@@ -212,7 +213,11 @@ def _scenario(
     if start is None:
         start = model.starts[0]
     own = start if isinstance(start, str) else tuple(model.start(start).tolist())
-    scenario = Scenario(base.perturbed(*factors), own)
+    scaled = [
+        checked_factor(name, factor) * getattr(base, f"{name}_factor")
+        for name, factor in zip(FACTORS, factors, strict=True)
+    ]
+    scenario = Scenario(base.perturbed(*scaled), own)
     check(model, scenario)
     return scenario
 
