@@ -56,12 +56,11 @@ def training_set(
         raise InputError(f"training is {quoted(given)}: give names, maneuvers or scenarios")
     if bool(factors) != any(isinstance(entry, str) and entry == "set" for entry in entries):
         raise InputError("training 'set' needs training_set, pairs of factors; nothing else does")
-    own = Scenario(component("maneuver", model.definition.maneuver), model.starts[0])
-    found: list[Scenario] = []
-    for entry in entries:
-        if test is None and isinstance(entry, str) and entry in OF_TESTED:
-            raise InputError(f"training {entry!r} needs a run that is tested, as simulate has it")
-        found += _scenarios(model, method, entry, test or own, factors)
+    if test is None:
+        if wrong := [entry for entry in entries if isinstance(entry, str) and entry in OF_TESTED]:
+            raise InputError(f"training {wrong[0]!r} needs a run that is tested: see simulate")
+        test = Scenario(component("maneuver", model.definition.maneuver), model.starts[0])
+    found = [s for entry in entries for s in _scenarios(model, method, entry, test, factors)]
     if cars is not None:
         found = [replace(scenario, parameters=car) for car in cars for scenario in found]
     return tuple(found)
