@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuver import sine_travel
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -80,7 +80,7 @@ def test_method(benchmark, model, label):
     method = component("method", name)
     settings = validated(method, model.kind, chosen, preset)
     start = model.starts[0]
-    reduced = method.fit(model, training_runs(model, sine_travel, start, "matched"), settings)
+    reduced = method.fit(model, [TrainingRun(model, sine_travel, start)], settings)
     trajectory = benchmark(reduced.simulate, sine_travel, start)
     benchmark.extra_info |= trajectory.counts
     benchmark.extra_info["offline_seconds"] = reduced.offline.seconds

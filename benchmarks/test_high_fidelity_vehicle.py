@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -203,7 +203,7 @@ def test_method(benchmark, model, references, label):
     method = component("method", name)
     settings = validated(method, model.kind, chosen, preset)
     start = "equilibrium"
-    runs = training_runs(model, rack_lane_change, start, "matched")
+    runs = [TrainingRun(model, rack_lane_change, start)]
     reduced = method.fit(model, runs, settings)
     run = benchmark(reduced.simulate, rack_lane_change, start)
     benchmark.extra_info |= run.counts

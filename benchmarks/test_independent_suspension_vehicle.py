@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -99,7 +99,7 @@ def test_method(benchmark, model, reference, label):
     method = component("method", name)
     settings = validated(method, model.kind, chosen, preset)
     start = model.starts[0]
-    reduced = method.fit(model, training_runs(model, lane_change, start, "matched"), settings)
+    reduced = method.fit(model, [TrainingRun(model, lane_change, start)], settings)
     run = benchmark(reduced.simulate, lane_change, start)
     benchmark.extra_info |= run.counts
     benchmark.extra_info |= {

@@ -1,20 +1,34 @@
 """Short ways to fit methods for the tests."""
 
+from typing import Any
+
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import ReducedModel
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.steering_maneuvers import lane_change, rack_lane_change
+from vehiclemor.study.plans.training import training_set
+from vehiclemor.study.scenario import Scenario, training_run
 
 # Vehicle -> its lane change.
 CARS = {"independent_suspension_vehicle": lane_change, "high_fidelity_vehicle": rack_lane_change}
 FIGURES = ("spindle_y", "second_euler_angle")
+
+
+def training_runs(
+    model: Model, maneuver: Maneuver, training: str = "matched", factors: Any = ()
+) -> list[TrainingRun]:
+    """What is trained on before a maneuver from the first start is tested."""
+    test = Scenario(maneuver, model.starts[0])
+    found = training_set(model, "", training, test, factors)
+    return [training_run(model, scenario) for scenario in found]
 
 
 def fitted(
@@ -28,8 +42,7 @@ def fitted(
     definition = component("method", method)
     complete = validated(definition, model.kind, settings)
     definition.check(model, complete)
-    runs = training_runs(model, maneuver, model.starts[0], policy)
-    return definition.fit(model, runs, complete)
+    return definition.fit(model, training_runs(model, maneuver, policy), complete)
 
 
 def figure_errors(model: AlgebraicModel, outputs: np.ndarray, reference: Trajectory) -> np.ndarray:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
+    from vehiclemor.maneuver import maneuver as maneuver
     from vehiclemor.online.batch_signals import Signals as Signals
     from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
@@ -52,6 +53,7 @@ _DEFINED_IN = {
     "compare": "vehiclemor.report.comparison.kinds",
     "figures": "vehiclemor.report.regenerate",
     "leaderboard": "vehiclemor.report.leaderboard",
+    "maneuver": "vehiclemor.maneuver",
     "write_report": "vehiclemor.report.html.document",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
@@ -71,6 +73,7 @@ __all__ = [
     "figures",
     "leaderboard",
     "load",
+    "maneuver",
     "maneuvers",
     "methods",
     "model",
@@ -94,7 +97,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _DEFINED_IN:
         raise AttributeError(f"module 'vehiclemor' has no attribute {name!r}")
-    return getattr(import_module(_DEFINED_IN[name]), name)
+    module = import_module(_DEFINED_IN[name])
+    # One is named as the module that defines it, which is a name here too, and can be called.
+    return globals().get(name) or getattr(module, name)
 
 
 def __dir__() -> list[str]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from vehiclemor.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
+    from vehiclemor.study.plans.training import Given
     from vehiclemor.study.scenario import Scenario
     from vehiclemor.study.status import StudyStatus
 
@@ -121,7 +122,7 @@ def simulate(
     frequency: float = 1.0,
     amplitude: float = 1.0,
     preset: str = "recommended",
-    training: str = "matched",
+    training: Given = "matched",
     training_set: Sequence[tuple[float, float]] = (),
     rtol: float | None = None,
     errors: bool = True,
@@ -143,13 +144,15 @@ def simulate(
     start
         Initial condition, by name or as a state (n,); the model's first by default.
     frequency, amplitude
-        Factors on the maneuver.
+        Factors on the maneuver, beside its own.
     preset
         `recommended`, or another preset of the method, such as `literal` (the paper's words).
     training
-        `matched` (the very run that is simulated), `nominal` (factors 1) or `set`.
+        What is learnt from: `matched` (the very run that is simulated), `nominal` (the model's own
+        maneuver), the name of a maneuver, a maneuver, a signal or a scenario; `protocol` (the
+        training of the model's protocol), `set`; or a list of these.
     training_set
-        (frequency, amplitude) factors of the policy `set`.
+        (frequency, amplitude) factors of `set`, with which the maneuver is learnt from.
     rtol
         Tolerance of the solver; for a kinematic model the largest step of the last iteration.
     errors
@@ -175,7 +178,7 @@ def simulate(
     from vehiclemor.study.evaluate import evaluate
     from vehiclemor.study.experiment import make_experiment
     from vehiclemor.study.method_settings import complete_settings
-    from vehiclemor.study.scenario import training_scenarios
+    from vehiclemor.study.plans.training import training_set as training_of
 
     ready = model if isinstance(model, Model) else kept_build(model)
     if rtol is not None:
@@ -184,7 +187,7 @@ def simulate(
         settings["tolerance"] = number("rtol", rtol)
     chosen = complete_settings(ready, method, settings, preset)
     test = _scenario(ready, maneuver, start, (frequency, amplitude))
-    trained = training_scenarios(test, training, _pairs(training_set))
+    trained = training_of(ready, method, training, test, _pairs(training_set))
     experiment = make_experiment(ready, method, chosen, trained, (test,))
     dataset = evaluate(experiment, ready, errors=errors)
     status = str(dataset["status"].item())
@@ -201,18 +204,20 @@ def _scenario(
     factors: tuple[float, float],
 ) -> Scenario:
     """What is simulated, checked."""
-    from vehiclemor.maneuver import Maneuver
+    from vehiclemor.maneuver import FACTORS, checked_factor
     from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.study.scenario import Scenario, check
 
-    if maneuver is None:
-        maneuver = model.definition.maneuver
-    base = maneuver if isinstance(maneuver, Maneuver) else component("maneuver", maneuver)
-    base = checked_maneuver(base, model.definition)
+    chosen = model.definition.maneuver if maneuver is None else maneuver
+    base = checked_maneuver(chosen, model.definition)
     if start is None:
         start = model.starts[0]
     own = start if isinstance(start, str) else tuple(model.start(start).tolist())
-    scenario = Scenario(base.perturbed(*factors), own)
+    scaled = [
+        checked_factor(name, factor) * getattr(base, f"{name}_factor")
+        for name, factor in zip(FACTORS, factors, strict=True)
+    ]
+    scenario = Scenario(base.perturbed(*scaled), own)
     check(model, scenario)
     return scenario
 

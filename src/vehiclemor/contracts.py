@@ -13,7 +13,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -109,8 +109,8 @@ def check_method(name: str, model_name: str) -> None:
         method.check(model, settings)
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)
-            runs = training_runs(model, test, model.starts[0], policy)
-            reduced = method.fit(model, runs, settings)
+            trained = TrainingRun(model, test if policy == "matched" else maneuver, model.starts[0])
+            reduced = method.fit(model, (trained,), settings)
             first = reduced.simulate(test, model.starts[0])
             again = reduced.simulate(test, model.starts[0])
             where = f"{name} ({preset}, {policy}) on {model_name}"

@@ -1,12 +1,18 @@
-"""Maneuvers: input time histories that studies scale in frequency and amplitude; wheel travel."""
+"""Maneuvers: input time histories that studies scale in frequency and amplitude; wheel travel.
 
+The module can be called: `vehiclemor.maneuver("lane_change")` gives a maneuver by its name.
+"""
+
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from types import ModuleType
 
 import numpy as np
 
 from vehiclemor.arguments import count, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed
+from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 
 # Bounds far beyond anything that is meant.  A maneuver that is a thousand times slower does not
@@ -180,3 +186,23 @@ chirp_travel = replace(
     summary="wheel travel 0.1 m, sine swept from 0.1 to 0.4 Hz, rack fixed, 10 s",
     signal=_chirp_travel,
 )
+
+
+def maneuver(name: str, *, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
+    """A registered maneuver, see `maneuvers()`, with factors on its frequency and amplitude.
+
+    Raises
+    ------
+    InputError
+        If none has the name, or a factor is out of its bounds.
+    """
+    return component("maneuver", name).perturbed(frequency, amplitude)
+
+
+class _Callable(ModuleType):
+    """A module, from which plug-ins import, that is the function of its name in `vehiclemor`."""
+
+    __call__ = staticmethod(maneuver)
+
+
+sys.modules[__name__].__class__ = _Callable

@@ -52,7 +52,7 @@ POD = (*SIMULATE, "--method", "pod")
         ([*SIMULATE, "--method", "pood"], ["unknown method", "pod"]),
         ([*SIMULATE, "--maneuver", "sine"], ["unknown maneuver", "sine_travel"]),
         ([*SIMULATE, "--start", "dropped"], ["unknown start", "equilibrium"]),
-        ([*SIMULATE, "--training", "matchd"], ["unknown training policy", "matched"]),
+        ([*SIMULATE, "--training", "matchd"], ["unknown training", "matched"]),
         ([*POD, "--preset", "litteral"], ["unknown preset", "literal"]),
         ([*POD, "--set", "rnak=3"], ["unknown setting", "rank"]),
         ([*POD, "--set", "rank"], ["key=value"]),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.oracles.tangent_texts import run_as_text
+from tests.reducing import training_runs
 from vehiclemor.codegen.tangent import Tangent
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.exported import exported_system
@@ -18,7 +19,6 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.training import training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
@@ -82,10 +82,9 @@ class Pair:
         settings = validated(self.method, self.model.kind, chosen, preset)
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)
-        start = self.model.starts[0]
         factors = TRAINED_ON.get(self.name, ())
         policy = "set" if factors else "nominal"
-        runs = training_runs(self.model, self.maneuver, start, policy, factors)
+        runs = training_runs(self.model, self.maneuver, policy, factors)
         reduced = self.method.fit(self.model, runs, settings)
         assert settings == before
         return reduced

@@ -168,7 +168,7 @@ def test_training_policies_and_maneuvers_are_axes():
         "model": "double_wishbone",
         "keep": "metrics",
         "grid": {
-            "training": ["matched", "nominal"],
+            "training": ["matched", "nominal", "travel_and_rack"],
             "maneuver": ["sine_travel", "chirp_travel"],
             "amplitude_factor": [0.9],
             "cars": ["own", "nominal"],
@@ -183,8 +183,10 @@ def test_training_policies_and_maneuvers_are_axes():
         for run in cell.training
     }
     cars = ((), (("tie_rod_inner.z", -0.09),))
-    names = ("sine_travel", "chirp_travel")
-    assert seen == set(itertools.product(names, (0.9, 1.0), cars))
+    # The tested ones, the model's own, and the named one.
+    runs = [("sine_travel", 0.9), ("chirp_travel", 0.9), ("sine_travel", 1.0)]
+    runs.append(("travel_and_rack", 1.0))
+    assert seen == {(*run, car) for run, car in itertools.product(runs, cars)}
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import make_experiment
 from vehiclemor.study.method_settings import complete_settings
-from vehiclemor.study.scenario import Scenario, start_of, training_run, training_scenarios
+from vehiclemor.study.plans.training import training_set
+from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
 MOVED = (("tie_rod_inner.z", -0.09),)
@@ -65,7 +66,7 @@ def test_a_component_of_a_point_is_a_parameter(suspension):
 @pytest.mark.parametrize("cars", [None, ((),), ((), MOVED)], ids=["own", "nominal", "set"])
 def test_the_fit_of_a_car_is_the_method_on_its_equations_and_the_training_cars(suspension, cars):
     test = Scenario(sine_travel, "equilibrium", None, MOVED)
-    training = training_scenarios(test, "matched", cars=cars)
+    training = training_set(suspension, "pod", "matched", test, cars=cars)
     found = evaluate(experiment(suspension, "pod", training, (test,), "metrics", rank=3))
     moved, method = vm.model(suspension.name, dict(MOVED)), component("method", "pod")
     trained = {None: [moved], ((),): [suspension], ((), MOVED): [suspension, moved]}[cars]

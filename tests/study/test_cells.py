@@ -18,16 +18,17 @@ from vehiclemor.study.plans import grid as grid_module
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import flattened
 from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.scenario import Scenario, training_scenarios
+from vehiclemor.study.scenario import Scenario
 
 
-def make_cell(model, maneuver, method, given, **policy):
+def make_cell(model, maneuver, method, given, training="matched", **factors):
     """An experiment on one run from the equilibrium."""
     test = Scenario(maneuver, "equilibrium")
     settings = complete_settings(model, method, given)
-    training = training_scenarios(test, **{"policy": "matched"} | policy)
-    return make_experiment(model, method, settings, training, (test,))
+    trained = training_set(model, method, training, test, **factors)
+    return make_experiment(model, method, settings, trained, (test,))
 
 
 @pytest.fixture(autouse=True)
@@ -126,7 +127,7 @@ def test_divergence_is_a_result(cell):
 def test_set_policy_needs_and_uses_its_factors():
     model = build("double_wishbone")
     with pytest.raises(InputError, match="training_set"):
-        make_cell(model, sine_travel, "pod", {}, policy="set")
+        make_cell(model, sine_travel, "pod", {}, training="set")
     errors = {}
     for factors in (((1.0, 1.0),), ((1.0, 1.0), (1.2, 1.0))):
         cell = make_cell(
@@ -134,7 +135,7 @@ def test_set_policy_needs_and_uses_its_factors():
             sine_travel.perturbed(1.2),
             "pod",
             {"rank": 4},
-            policy="set",
+            training="set",
             factors=factors,
         )
         errors[len(factors)] = float(evaluate(cell)["rms_error"].sel(output="spindle_y"))

@@ -3,7 +3,7 @@
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component, names
 from vehiclemor.study.method_settings import complete_settings, for_method
 
@@ -14,7 +14,7 @@ LONGEST = 500
 def test_objects_of_a_simulation_show_themselves_in_one_line(name):
     model, definition, method = vm.model(name), component("model", name), component("method", "pod")
     maneuver = component("maneuver", definition.maneuver)
-    runs = training_runs(model, maneuver, model.starts[0], "matched")
+    runs = [TrainingRun(model, maneuver, model.starts[0])]
     settings = for_method(model, "pod", complete_settings(model, "pod"))
     reduced = method.fit(model, runs, settings)
     full = model.simulate(maneuver)

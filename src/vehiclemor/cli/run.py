@@ -29,6 +29,7 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
         Results folder.
     """
     from vehiclemor.report.errors import warned_runs
+    from vehiclemor.report.labels import trained_runs
     from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
@@ -51,6 +52,8 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
             status = status.where(~doubted, "untrusted")
         count = Counter(str(one) for one in status.values.ravel())
         counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
+        if trained := int(trained_runs(dataset).sum()):
+            counts += f"; {trained} trained on the tested run"
         places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
         print(wrapped(f"{name}: {places}; {dataset.encoding['source']}", 0, 2))
         errors += count["error"]

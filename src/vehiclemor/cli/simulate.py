@@ -31,7 +31,7 @@ def simulate(
     amplitude: float = 1.0,
     start: str | None = None,
     preset: str = "recommended",
-    training: str = "matched",
+    training: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = ("matched",),
     parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     parameters: Path | None = None,
     out: Path | None = None,
@@ -59,7 +59,9 @@ def simulate(
     preset
         Preset of the method's settings.
     training
-        matched, or nominal (trained on the unperturbed input).
+        matched (the very run that is simulated; the default), nominal (the model's own maneuver),
+        the name of a maneuver, or protocol (the training of the model's protocol); may be given
+        several times.
     parameter
         name=value: a parameter of the model in SI units, a point as x,y,z or one component as
         name.z=value; may be given several times.  `vehiclemor show MODEL` has names, units and

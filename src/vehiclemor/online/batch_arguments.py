@@ -14,7 +14,6 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.online.batch_result import Selection
 from vehiclemor.online.batch_signals import Signals
 from vehiclemor.online.rom import ReducedOrderModel
-from vehiclemor.online.training import training_set
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
@@ -23,6 +22,7 @@ from vehiclemor.simulation.checks import checked_path
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
+from vehiclemor.study.plans.training import training_set
 
 
 def model_behind(model: Any) -> ReducedOrderModel:

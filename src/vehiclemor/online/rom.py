@@ -13,7 +13,6 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.online.training import training_set
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component
@@ -24,6 +23,7 @@ from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.study.input_range import InputRange, input_range
 from vehiclemor.study.method_settings import Settings
+from vehiclemor.study.plans.training import Given, training_set
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.training_cars import Box, of_cars
 
@@ -348,7 +348,7 @@ def reduce(
     model: str | Model,
     method: str,
     *,
-    training: str | Sequence[Scenario | Maneuver] | None = None,
+    training: Given | None = None,
     cars: Box | Sequence[Mapping[str, Any]] = (),
     preset: str = "recommended",
     **settings: object,
@@ -363,8 +363,8 @@ def reduce(
         Registered name, see `methods()`; `full_order` gives the full model with the same names.
     training
         `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
-        the model's own protocol, which is the default of the methods that compete there.  Or a
-        list of maneuvers, or of scenarios.
+        the model's own protocol, which is the default of the methods that compete there.  Or the
+        name of a maneuver, a maneuver, a signal, a scenario, or a list of these.
     cars
         Cars whose runs are learnt from beside the model's own, each with a few of the training:
         names of parameters with the two ends of their ranges, in which some cars are chosen, or a

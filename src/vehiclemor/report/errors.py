@@ -112,7 +112,7 @@ def by_cars(dataset: xr.Dataset, kept: Sequence[str]) -> xr.Dataset:
 def flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:
     """One row for each cell of a study: its place in the grid, errors, counts, status."""
     grid = list(dataset["status"].dims)
-    kept = ["effective_rank", *(DYNAMIC_COUNTS | ALGEBRAIC_COUNTS), "growth_rate"]
+    kept = ["effective_rank", *(DYNAMIC_COUNTS | ALGEBRAIC_COUNTS), "growth_rate", "in_training"]
     scalars = [name for name in kept if name in dataset]
     table = dataset[[*scalars, "status", "message"]].to_dataframe().reset_index()
     for output in outputs:

@@ -34,6 +34,8 @@ LABELS = {
     "vertical_speed": Label("vertical speed", "$v_z$", "v_z"),
 }
 
+# What is said of a run that was in its own training, and the mark of it in a legend.
+TRAINED, MARK = "trained on this run", "*"
 # Words of an axis that leave no room for more beside them.
 LONG = 16
 # Of a label beside a low panel in one line.
@@ -55,6 +57,16 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
 def method_text(label: str) -> str:
     """A method's label in a study, as a legend says it."""
     return label.replace("pod", "POD").replace("_", " ")
+
+
+def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
+    """Which runs were in their own training; of a result that does not tell, none."""
+    return dataset.get("in_training", xr.zeros_like(dataset["status"], dtype=bool))
+
+
+def marked(text: str, run: xr.Dataset) -> str:
+    """The text of a run in a legend, with a mark if its method was trained on it."""
+    return text + MARK * bool(trained_runs(run).all())
 
 
 def readable_unit(largest: float, unit: str) -> tuple[float, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from vehiclemor.report.labels import TRAINED, trained_runs
 from vehiclemor.report.printing import Line, power, table_text, terms, wrapped
 
 if TYPE_CHECKING:
@@ -27,7 +28,9 @@ LEGEND = {
 
 def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[str]) -> str:
     """Status, a table of the errors of some outputs, solver counts and seconds of a simulation."""
-    title = f"{dataset.attrs['title']}: {dataset['status'].item()} {dataset['message'].item()}"
+    told = f" ({TRAINED})" if trained_runs(dataset) else ""
+    ended = f"{dataset['status'].item()} {dataset['message'].item()}"
+    title = f"{dataset.attrs['title']}{told}: {ended}"
     parts = [wrapped(title), wrapped(str(dataset["remark"].item()))]
     lines = []
     for output in shown:

@@ -17,7 +17,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.projection.dynamic import DynamicProjection
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.printing import Line, power, table_text, wrapped
@@ -97,7 +97,7 @@ def _of_model(name: str) -> xr.Dataset:
     model = build(name)
     definition = component("model", name)
     maneuver = component("maneuver", definition.maneuver)
-    training = training_runs(model, maneuver, model.starts[0], "matched")
+    training = [TrainingRun(model, maneuver, model.starts[0])]
     parts, chosen = [], {}
     for preset in PRESETS:
         settings = validated(pod.METHOD, model.kind, definition.shown.paper_fixed, preset)

@@ -8,12 +8,13 @@ from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.registry import component
 from vehiclemor.signals import Signal
 from vehiclemor.simulation.input_polynomials import extent_of
 
 
-def checked_maneuver(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
-    """A maneuver, a signal with all inputs that a model has.
+def checked_maneuver(maneuver: str | Maneuver, definition: ModelDefinition) -> Maneuver:
+    """A maneuver, also by its name; a signal with all inputs that a model has.
 
     Raises
     ------
@@ -21,9 +22,10 @@ def checked_maneuver(maneuver: Maneuver, definition: ModelDefinition) -> Maneuve
         If it is none, gives other inputs than the model has, or one that leaves the bounds in which
         the model declares that it means anything.
     """
+    if isinstance(maneuver, str):
+        maneuver = component("maneuver", maneuver)
     if not isinstance(maneuver, Maneuver):
-        wrong = quoted(maneuver)
-        raise InputError(f"{wrong} is not a maneuver: get one by its name from the registry")
+        raise InputError(f"{quoted(maneuver)} is not a maneuver, as vm.maneuver(name) gives one")
     if not isinstance(maneuver, Signal):
         _check_inputs(maneuver, definition)
         return maneuver

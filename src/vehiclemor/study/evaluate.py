@@ -39,6 +39,7 @@ from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
     car_of,
+    in_training,
     start_of,
     trained_for,
     training_run,
@@ -136,7 +137,15 @@ def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -
     if experiment.keep == "errors":
         return errors_dataset(model, experiment, outcomes, total_cost(costs.values()))
     car = car_of(model, experiment.test[0])
-    return metrics_dataset(car, experiment, outcomes[0], fitted.reduced)
+    seen = not isinstance(outcomes[0], Failure) and _seen(model, experiment)
+    return metrics_dataset(car, experiment, outcomes[0], fitted.reduced, seen)
+
+
+def _seen(model: Model, experiment: Experiment) -> bool:
+    """Whether the method has learnt from the very run that it is tested on."""
+    method: Method = component("method", experiment.method)
+    learns = method.learns_from != "inputs"
+    return learns and in_training(model, experiment.training, experiment.test[0])
 
 
 def _failed(experiment: Experiment, model: Model, failure: Failure) -> xr.Dataset:

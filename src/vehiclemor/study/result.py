@@ -54,8 +54,14 @@ def metrics_dataset(
     experiment: Experiment,
     outcome: Outcome | Failure,
     reduced: ReducedModel | Failure,
+    in_training: bool = False,
 ) -> xr.Dataset:
     """Result of the one test scenario.
+
+    Parameters
+    ----------
+    in_training
+        Whether the method has learnt from that very run.
 
     Returns
     -------
@@ -73,7 +79,7 @@ def metrics_dataset(
     if model.kind == "ae":
         residuals = model.along("residual", run.coordinates, run.inputs)
         found["largest_residual"] = float(np.abs(residuals).max())
-    found |= fit_cost(reduced)._asdict()
+    found |= {**fit_cost(reduced)._asdict(), "in_training": in_training}
     dataset = trajectory_dataset(model, run, variables(found) | histories)
     if experiment.keep == "metrics":
         dataset = dataset.drop_dims(["time", "input"])

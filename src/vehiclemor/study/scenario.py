@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.training import TrainingRun, policy_factors
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import reparametrised
@@ -24,6 +24,10 @@ from vehiclemor.simulation.trajectory import Start
 SPEED = "initial_speed"
 # Parameter name (of a component of a point such as `tie_rod_inner.z`) and value in SI units.
 Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
+# Difference of inputs, as part of the largest, that rounding explains: of a table with its samples.
+ROUNDING = 1e-9
+# Times at which inputs are first looked at.
+FEW = 16
 
 
 def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
@@ -205,31 +209,26 @@ def trained_for(training: Sequence[Scenario], test: Scenario) -> tuple[Scenario,
     return tuple(replace(s, parameters=own) if s.parameters is None else s for s in training)
 
 
-def training_scenarios(
-    test: Scenario,
-    policy: str,
-    factors: Sequence[tuple[float, float]] = (),
-    cars: Sequence[Overrides] | None = None,
-) -> tuple[Scenario, ...]:
-    """What a training policy trains on before a test scenario, see `policy_factors`.
+def in_training(model: Model, training: Sequence[Scenario], test: Scenario) -> bool:
+    """Whether a run is among those of a training, or the beginning of one, whatever its name."""
+    runs = trained_for(training, test)
+    return any(run == test or _alike(model, run, test) for run in runs)
 
-    Parameters
-    ----------
-    cars
-        Parameters of the cars that are trained on, each with every input; the tested one's where
-        None.
 
-    Raises
-    ------
-    InputError
-        If the policy is unknown or the factors don't fit it.
-    """
-    pairs = policy_factors(test.maneuver, policy, factors)
-    if factors and policy != "set":
-        raise InputError("training_set is for the training policy 'set' alone")
-    inputs = [test.maneuver.perturbed(*pair) for pair in pairs]
-    known = [test.parameters] if cars is None else cars
-    return tuple(replace(test, maneuver=run, parameters=car) for car in known for run in inputs)
+def _alike(model: Model, run: Scenario, test: Scenario) -> bool:
+    """Whether a run has the same car, start and inputs as another as long as that lasts."""
+    last = test.maneuver.duration
+    if run.maneuver.duration < last:
+        return False
+    known, tested = run.maneuver.times, test.maneuver.times
+    # Most differ at a few times already.
+    for times in (tested[:: max(len(tested) // FEW, 1)], tested, known[known <= last]):
+        learnt, used = (s.maneuver.for_inputs(model.inputs).at(times) for s in (run, test))
+        if np.abs(learnt - used).max() > ROUNDING * np.abs(used).max():
+            return False
+    one, other = car_of(model, run), car_of(model, test)
+    begun, wanted = one.start(start_of(model, run)), other.start(start_of(model, test))
+    return np.array_equal(one.constants, other.constants) and np.array_equal(begun, wanted)
 
 
 def check(model: Model, scenario: Scenario) -> None:

@@ -208,7 +208,7 @@ def test_training_is_a_name_or_what_is_handed_in(full, wishbone):
 WRONG = {
     "kind of training": (
         lambda: vm.reduce(WISHBONE, "pod", training="matched"),
-        "unknown training",
+        "needs a run that is tested",
     ),
     "no training": (lambda: vm.reduce(WISHBONE, "pod", training=[]), "training is \\[\\]"),
     "training of another model": (

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.reducing import fitted
+from tests.reducing import fitted, training_runs
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.training import POLICIES, training_runs
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -19,9 +18,9 @@ def test_policies_choose_the_factors(model: AlgebraicModel, nominal: Maneuver) -
     found = {
         policy: [
             (run.maneuver.frequency_factor, run.maneuver.amplitude_factor)
-            for run in training_runs(model, tested, model.starts[0], policy, pairs)
+            for run in training_runs(model, tested, policy, pairs if policy == "set" else ())
         ]
-        for policy in POLICIES
+        for policy in ("matched", "nominal", "set")
     }
     assert found == {"matched": [(1.2, 0.9)], "nominal": [(1.0, 1.0)], "set": pairs}
 
@@ -29,7 +28,7 @@ def test_policies_choose_the_factors(model: AlgebraicModel, nominal: Maneuver) -
 def test_run_is_exact_at_any_times(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory
 ) -> None:
-    [run] = training_runs(model, nominal, model.starts[0], "matched")
+    [run] = training_runs(model, nominal)
     some = np.array([3, 250, 250, 700, 1000])
     history = run.at(nominal.times[some])
     np.testing.assert_allclose(history.coordinates, full.coordinates[some], rtol=0, atol=1e-13)
@@ -37,22 +36,22 @@ def test_run_is_exact_at_any_times(
 
 @pytest.mark.parametrize(
     ("policy", "message"),
-    [("set", "needs training_set"), ("nomnal", "unknown training policy .* did you mean nominal")],
+    [("set", "needs training_set"), ("nomnal", "unknown training .* did you mean nominal")],
 )
 def test_wrong_policy_is_one_line(
     model: AlgebraicModel, nominal: Maneuver, policy: str, message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
-        training_runs(model, nominal, model.starts[0], policy)
+        training_runs(model, nominal, policy)
 
 
 def test_snapshots_of_several_runs_are_put_side_by_side(
     model: AlgebraicModel, nominal: Maneuver
 ) -> None:
-    method, start = component("method", "pod"), model.starts[0]
+    method = component("method", "pod")
     settings = validated(method, model.kind, {"rank": 3})
     pairs = [(1.0, 1.0), (1.0, 0.5)]
-    together = method.fit(model, training_runs(model, nominal, start, "set", pairs), settings)
+    together = method.fit(model, training_runs(model, nominal, "set", pairs), settings)
     means = [
         [basis.mean for basis in fitted(model, nominal.perturbed(*pair), "pod").bases]
         for pair in pairs
@@ -66,7 +65,7 @@ def test_replay_of_several_runs_takes_the_nearest_input(
 ) -> None:
     method, start = component("method", "replay"), model.starts[0]
     pairs = [(1.0, 1.0), (1.0, 0.5), (2.0, 1.0)]
-    replay = method.fit(model, training_runs(model, nominal, start, "set", pairs), {})
+    replay = method.fit(model, training_runs(model, nominal, "set", pairs), {})
     for pair, tested in zip(pairs, [(1.0, 0.9), (1.05, 0.4), (1.9, 1.1)], strict=True):
         run = replay.simulate(nominal.perturbed(*tested), start)
         expected = model.simulate(nominal.perturbed(*pair)).coordinates

@@ -11,7 +11,7 @@ import xarray as xr
 
 from vehiclemor.registry import component
 from vehiclemor.report.errors import by_cars, warned_runs
-from vehiclemor.report.labels import label_of
+from vehiclemor.report.labels import label_of, trained_runs
 from vehiclemor.report.predictive.rows import protocol_rows
 from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.report.printing import (
@@ -64,7 +64,8 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     """A row for each method, start and output of a combined dataset.
 
     `runs` are different ones, `failures` says how those that have `failed` ended, `warned` counts
-    those that aren't trusted (`warned_runs`); of those that have ended
+    those that aren't trusted (`warned_runs`), `trained` those that the method was trained on; of
+    those that have ended
     `median` and `largest` are RMS errors over the grid, `largest_deviation` is at one time;
     `largest_at` is the place of the largest RMS error, `floor` that of the best approximation
     there.  `seconds` (of the compiled loop), `offline_seconds` and `evaluations` are medians.
@@ -79,8 +80,9 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     }
     count = EVALUATIONS[component("model", head["model"]).kind]
     errors = ["rms_error", "max_error", "floor_rms_error"]
-    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count, "warned"]
-    small = by_cars(dataset.assign(warned=warned_runs(dataset)), kept).load()
+    told = {"warned": warned_runs(dataset), "trained": trained_runs(dataset)}
+    kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count, *told]
+    small = by_cars(dataset.assign(told), kept).load()
     rows: list[Row] = []
     for start in dataset["start"].values:
         for method in small["method"].values:
@@ -122,7 +124,7 @@ def _rows_of_method(part: xr.Dataset, count: str) -> list[Row]:
         "runs": status.size,
         "failed": failures.total(),
         "failures": ", ".join(f"{n} {name}" for name, n in failures.most_common()),
-        "warned": int(part["warned"].sum()),
+        **{name: int(part[name].sum()) for name in ("warned", "trained")},
         **{name: _median(part[name].values[ended]) for name in ("seconds", "offline_seconds")},
         "evaluations": _median(part[count].values[ended]),
     }
@@ -197,7 +199,9 @@ def _grid_text(rows: list[Row]) -> str:
 
 
 def _error_cells(row: Row, notes: Footnotes) -> list[str]:
-    cells = [f"  {row['method']}", *(power(row[name]) for name in ("median", "largest", "floor"))]
+    trained = f"trained on {row['trained']:.0f} of its {row['runs']:.0f} runs"
+    name = f"  {row['method']} {notes.marks(trained if row['trained'] else '')}".rstrip()
+    cells = [name, *(power(row[name]) for name in ("median", "largest", "floor"))]
     lost = f"{row['failed']:.0f} failed" if row["failed"] else ""
     place = row["largest_at"].replace(PARAMETER, "")
     place = place if len(place) <= LONGEST else notes.marks(place)

@@ -9,7 +9,7 @@ from scipy.linalg import subspace_angles
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection, fit_windows
 from vehiclemor.reduction.projection.windows import by_window, window_edges
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.criteria.finding import (
@@ -101,7 +101,7 @@ def _trained(frequency: float, amplitude: float) -> AlgebraicProjection:
     settings = validated(pod.METHOD, model.kind, {"rank": 3})
     edges = window_edges(maneuver.duration, settings.control_period)
     run = maneuver.perturbed(frequency, amplitude)
-    runs = training_runs(model, run, model.starts[0], "matched")
+    runs = [TrainingRun(model, run, model.starts[0])]
     return fit_windows(model, runs, edges, settings)
 
 

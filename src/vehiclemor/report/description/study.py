@@ -35,7 +35,7 @@ def study_description(name: str) -> dict[str, object]:
         "model": study.model,
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
-        "training": study.training,
+        "training": study.training_words,
         "cars trained on": study.cars
         if isinstance(study.cars, str)
         else f"{len(study.cars)} listed",

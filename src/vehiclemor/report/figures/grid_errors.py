@@ -16,7 +16,13 @@ from matplotlib.figure import Figure
 from vehiclemor.report.figures.error_map import figure_error_map
 from vehiclemor.report.figures.lines import CROSS, Style, legend_outside, letter, panels, styles
 from vehiclemor.report.figures.places import FEW_DECADES, Places, places_of, tick_decades
-from vehiclemor.report.labels import error_label, method_text, readable_unit, unit_of
+from vehiclemor.report.labels import (
+    error_label,
+    method_text,
+    readable_unit,
+    trained_runs,
+    unit_of,
+)
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
@@ -127,8 +133,11 @@ def _curves(
 
 
 def titled(dataset: xr.Dataset, more: str) -> str:
-    """Title of the result, and a line below it."""
-    return "\n".join(filter(None, (str(dataset.attrs.get("title", "")), more)))
+    """Title of the result, and a line below it; which of its runs were trained on, if any."""
+    runs = trained_runs(dataset)
+    trained = f"{int(runs.sum())} of {runs.size} runs were in their own training"
+    lines = str(dataset.attrs.get("title", "")), more, trained if bool(runs.any()) else ""
+    return "\n".join(filter(None, lines))
 
 
 def _unit(lines: Sequence[Line], unit: str) -> tuple[float, str]:

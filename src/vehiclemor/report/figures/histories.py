@@ -26,6 +26,7 @@ from vehiclemor.report.figures.lines import (
     panels,
     styles,
 )
+from vehiclemor.report.labels import marked
 from vehiclemor.report.published import rms_numbers
 
 STARTS = {"equilibrium": "start in equilibrium", "dropped": "dropped start"}
@@ -103,7 +104,8 @@ def _panel(dataset: xr.Dataset, methods: Mapping[str, str], start: str, output: 
     known = [method for method in methods if method in dataset["method"].values]
     runs = dataset.sel(start=start) if "start" in dataset.dims else dataset
     shown = styles(known)
-    curves = [Curve(methods[m], shown[m], at_point(runs, m)) for m in known]
+    points = {m: at_point(runs, m) for m in known}
+    curves = [Curve(marked(methods[m], run), shown[m], run) for m, run in points.items()]
     of_all = at_point(dataset, known[0])["reference_outputs"].sel(output=output)
     return Panel(output, curves[0].run, curves, float(abs(of_all).max()))
 

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vehiclemor.report.labels import MARK, TRAINED
 from vehiclemor.report.printing import alphabetic
 
 Results = Mapping[str, "xr.Dataset"]
@@ -80,4 +81,5 @@ def legend_outside(
     room = int(figure.get_figwidth() / (HANDLE + LETTER * longest))
     columns = min(columns or max(1, room), len(shown))
     where = "outside upper center" if place == "upper" else "outside lower center"
-    figure.legend(shown.values(), shown, loc=where, ncols=columns)
+    told = f"{MARK} {TRAINED}" if any(text.endswith(MARK) for text in shown) else None
+    figure.legend(shown.values(), shown, loc=where, ncols=columns, title=told)

@@ -15,7 +15,7 @@ from vehiclemor.report.figures.lines import (
     panels,
     styles,
 )
-from vehiclemor.report.labels import axis_label
+from vehiclemor.report.labels import axis_label, marked
 
 DISTANCE = "distance from full order at the same time"
 
@@ -26,10 +26,8 @@ def figure_paths(
     """Path in the plane from equilibrium, a panel for each length (m) shown; distances below."""
     (dataset,) = results.values()
     looks = styles(methods)
-    curves = [
-        Curve(text, looks[method], at_point(dataset, method, start="equilibrium"))
-        for method, text in methods.items()
-    ]
+    runs = {method: at_point(dataset, method, start="equilibrium") for method in methods}
+    curves = [Curve(marked(methods[m], run), looks[m], run) for m, run in runs.items()]
     figure, axes = panels(len(shown) + 1, 1, (6.7, 5.6))
     full = positions(curves[0].run["reference_outputs"])
     for number, (axis, furthest) in enumerate(zip(axes.flat, [*shown, shown[0]], strict=True)):

@@ -34,7 +34,7 @@ from vehiclemor.report.figures.lines import (
 from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
-from vehiclemor.report.labels import label_of, method_text, unit_of
+from vehiclemor.report.labels import label_of, marked, method_text, unit_of
 from vehiclemor.report.result_selection import drawn
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
         raise InputError(f"choose a point of the grid first: {', '.join(left)}")
     reduced = [label for label in points if not label.startswith("full_order")]
     shown = styles(reduced)
-    return first, [Curve(method_text(m), shown[m], points[m]) for m in reduced]
+    return first, [Curve(marked(method_text(m), run := points[m]), shown[m], run) for m in reduced]
 
 
 def figure_histories(dataset: xr.Dataset) -> Figure:
@@ -226,7 +226,8 @@ def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
         ratio = points[label]["rms_error"] / points[label]["signal_range"]
         share = 100.0 * ratio.where(np.isfinite(ratio) & (ratio > 0.0)).values
         look = {"color": style["color"], "marker": marker, "linestyle": "none", "markersize": 5}
-        axis.semilogx(share, places, label=method_text(label), **look)
+        text = marked(method_text(label), points[label])
+        axis.semilogx(share, places, label=text, **look)
     tick_decades(axis.xaxis, *axis.get_xlim())
     axis.set_yticks(places, [label_of(name).words for name in names], fontsize=7)
     axis.set_ylim(len(names) - 0.5, -0.5)

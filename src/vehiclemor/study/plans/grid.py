@@ -96,7 +96,7 @@ class Grid:
         entry, names = study.labelled[label], self._settings[label]
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
         settings = _complete(self.model, entry.method, tuple(given.items()), entry.preset)
-        training, test = scenarios(self._run(place))
+        training, test = scenarios(self.model, self._run(place))
         return make_experiment(self.model, entry.method, settings, training, (test,), study.keep)
 
     def point(self, place: Place) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:
     own = {
         "study": grid.name,
         "model": model.name,
-        "training": definition.training,
+        "training": definition.training_words,
         "configuration": json.dumps(definition.model_dump(), sort_keys=True),
     }
     return dataset.assign_attrs(attributes(definition.title, model.kernel_hash, **own))

@@ -10,12 +10,12 @@ from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.sampling import sampled
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER, Sampling, StudyFile
+from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
     check,
     overrides,
-    training_scenarios,
     with_parameters,
 )
 
@@ -24,13 +24,20 @@ Cars = tuple[Overrides, ...] | None
 
 
 class Run(NamedTuple):
-    """All of a point that determines training and test scenarios."""
+    """All of a point that determines training and test scenarios.
+
+    Attributes
+    ----------
+    learner
+        The method, where the training depends on it.
+    """
 
     maneuver: str
     factors: tuple[float, float]
     start: str
     car: Overrides
-    training: str
+    training: tuple[str, ...]
+    learner: str
     pairs: tuple[tuple[float, float], ...]
     cars: Cars
 
@@ -43,10 +50,11 @@ class Run(NamedTuple):
 
 # As many as stand side by side in a grid, whose settings vary in between.
 @lru_cache(maxsize=1024)
-def scenarios(run: Run) -> tuple[tuple[Scenario, ...], Scenario]:
+def scenarios(model: Model, run: Run) -> tuple[tuple[Scenario, ...], Scenario]:
     """Training and test scenarios of a run."""
     test = run.test
-    return training_scenarios(test, run.training, run.pairs, run.cars), test
+    training = training_set(model, run.learner, run.training, test, run.pairs, run.cars)
+    return training, test
 
 
 def run_at(study: StudyFile, point: Mapping[str, Any], trained: Mapping[str, Cars]) -> Run:
@@ -64,12 +72,14 @@ def run_at(study: StudyFile, point: Mapping[str, Any], trained: Mapping[str, Car
     # To what learns from no car all are the same.
     learns = component("method", entry.method).learns_from != "inputs"
     training = entry.training or point.get("training", study.training)
+    training = tuple(training) if isinstance(training, list) else (training,)
     return Run(
         point["maneuver"],
         (point[FACTORS[0]], point[FACTORS[1]]),
         point["start"],
         overrides(car),
         training,
+        entry.method if "protocol" in training else "",
         tuple((pair[0], pair[1]) for pair in study.training_set),
         trained_on if learns else None,
     )

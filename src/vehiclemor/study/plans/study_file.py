@@ -65,6 +65,7 @@ class Sampling(FileSchema):
 
 
 Car = dict[str, float | list[float]]
+Training = str | Annotated[list[str], Field(min_length=1)]
 
 
 class MethodEntry(FileSchema):
@@ -76,7 +77,7 @@ class MethodEntry(FileSchema):
     settings: dict[str, int | float | str] = Field(
         default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
     )
-    training: str = Field("", description="as of the study, whose it is by default")
+    training: Training = Field("", description="as of the study, whose it is by default")
     cars: str = Field("", description="as of the study, whose it is by default")
 
 
@@ -103,9 +104,11 @@ class StudyFile(FileSchema):
     start: list[str] = Field(
         default_factory=list, description="initial conditions; the model's first by default"
     )
-    training: str = Field(
+    training: Training = Field(
         "matched",
-        description="input that is trained on: matched (the tested one), nominal (factors 1), set",
+        description="input that is trained on: matched (the tested one), nominal (the model's own "
+        "maneuver), the name of a maneuver, protocol (the training of the model's protocol), set, "
+        "or a list of these",
     )
     training_set: list[list[float]] = Field(
         default_factory=list,
@@ -139,6 +142,11 @@ class StudyFile(FileSchema):
     def labelled(self) -> dict[str, MethodEntry]:
         """Label -> method of the study."""
         return {entry.label or entry.method: entry for entry in self.methods}
+
+    @property
+    def training_words(self) -> str:
+        """What is trained on, in one line."""
+        return self.training if isinstance(self.training, str) else ", ".join(self.training)
 
     @property
     def points(self) -> int:

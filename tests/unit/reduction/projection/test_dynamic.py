@@ -9,7 +9,7 @@ from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
-from vehiclemor.reduction.training import training_runs
+from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
@@ -44,7 +44,7 @@ def in_windows(form, edges, mean=0.0, mixing=None):
 def fitted(model, start="equilibrium", maneuver=lane_change, **chosen):
     settings = validated(pod.METHOD, "ode", chosen)
     pod.check(model, settings)
-    return pod.fit(model, training_runs(model, maneuver, start, "matched"), settings)
+    return pod.fit(model, [TrainingRun(model, maneuver, start)], settings)
 
 
 @pytest.mark.parametrize("form", [STATE, COORDINATES])

@@ -1,0 +1,268 @@
+"""What a model is trained on, asked for by the same words everywhere, and told in every result."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.cli.app import main
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.registry import component
+from vehiclemor.report.comparison.study import grid_rows, study_comparison, study_text
+from vehiclemor.report.figures.result_plot import plot_result
+from vehiclemor.report.html.study_table import error_table, places
+from vehiclemor.study.run import run_studies
+from vehiclemor.study.scenario import Scenario
+
+WISHBONE, CAR = "double_wishbone", "independent_suspension_vehicle"
+OWN = component("maneuver", "sine_travel")
+OTHER = component("maneuver", "chirp_travel")
+
+
+def sampled(maneuver, last=1001, scale=1.0, name="log"):
+    """A signal through the first samples of a maneuver."""
+    times = maneuver.times[:last]
+    return vm.Signal.from_samples(times, scale * maneuver.at(times), output_step=0.01, name=name)
+
+
+def replayed(**arguments):
+    return vm.simulate(WISHBONE, "replay", **arguments)
+
+
+@pytest.mark.parametrize("given", [sampled(OTHER), OTHER, "chirp_travel"], ids=str)
+def test_nominal_is_the_models_own_maneuver_whatever_is_tested(given):
+    run = replayed(maneuver=given, training="nominal")
+    own = vm.simulate(WISHBONE)
+    np.testing.assert_array_equal(run["outputs"], own["outputs"])
+    assert run["rms_error"].max() > 1e-4
+    assert not run["in_training"]
+    matched = replayed(maneuver=given)
+    assert matched["in_training"]
+    assert matched["rms_error"].max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "chirp_travel",
+        ["chirp_travel"],
+        OTHER,
+        (OTHER,),
+        vm.maneuver("chirp_travel"),
+        Scenario(OTHER, "equilibrium"),
+        [Scenario(OTHER, "equilibrium"), "sine_travel"],
+    ],
+    ids=str,
+)
+def test_training_is_asked_for_in_the_same_words_everywhere(given):
+    reduced = vm.reduce(WISHBONE, "replay", training=given)
+    assert reduced.training[0] == Scenario(OTHER, "equilibrium")
+    tested = OTHER.perturbed(1.01)
+    found = replayed(maneuver=tested, training=given)
+    np.testing.assert_array_equal(found["outputs"], reduced.simulate(tested).outputs)
+    np.testing.assert_array_equal(
+        found["outputs"], vm.simulate(WISHBONE, maneuver=OTHER)["outputs"]
+    )
+
+
+def test_training_of_the_protocol_is_that_of_reduce():
+    model = vm.model(WISHBONE)
+    reduced = vm.reduce(model, "replay", training="protocol")
+    found = vm.simulate(model, "replay", training=reduced.training, maneuver=OTHER)
+    again = vm.simulate(model, "replay", training="protocol", maneuver=OTHER)
+    assert reduced.training[0].maneuver.name == "travel_and_rack"
+    np.testing.assert_array_equal(found["outputs"], again["outputs"])
+
+
+SAME = {
+    "the same": (OWN, OWN, True),
+    "by name": ("sine_travel", OWN, True),
+    "a signal with its samples": (OWN, sampled(OWN), True),
+    "of a signal with its samples": (sampled(OWN), OWN, True),
+    "a signal of another name": (sampled(OWN, name="a"), sampled(OWN, name="b"), True),
+    "one of several": ([OTHER, OWN], sampled(OWN), True),
+    "its beginning": (OWN, sampled(OWN, 501), True),
+    "that of which it is the beginning": (sampled(OWN, 501), OWN, False),
+    "other samples": (OWN, sampled(OWN, scale=1.0 + 1e-6), False),
+    "another amplitude": (OWN, OWN.perturbed(1.0, 0.9), False),
+    "another name": (OTHER, OWN, False),
+}
+
+
+@pytest.mark.parametrize("case", SAME)
+def test_a_run_of_the_training_is_marked_by_its_content(case):
+    training, tested, marked = SAME[case]
+    assert bool(replayed(training=training, maneuver=tested)["in_training"]) is marked
+    # What learns from no run has none in its training.
+    assert not vm.simulate(WISHBONE, training=training, maneuver=tested)["in_training"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "marked"),
+    [
+        ({}, True),
+        ({"start": "dropped"}, True),
+        ({"training": "step_steer"}, False),
+        ({"training": Scenario(component("maneuver", "lane_change"), "dropped")}, False),
+    ],
+)
+def test_another_start_is_another_run(changed, marked):
+    # From the training alone: what it is tested on has the model's own parameters.
+    given = {"training": "nominal", "rank": 3} | changed
+    assert bool(vm.simulate(CAR, "fixed_basis", errors=False, **given)["in_training"]) is marked
+
+
+@pytest.mark.parametrize("parameters", [{}, {"tie_rod_inner.z": -0.09}])
+def test_another_car_is_another_run(parameters):
+    own = vm.model(WISHBONE).parameters.values()["tie_rod_inner"]
+    runs = [(("tie_rod_inner", tuple(own.tolist())),), (("tie_rod_inner.z", -0.08),)]
+    found = [
+        vm.simulate(
+            vm.model(WISHBONE, parameters),
+            "replay",
+            training=Scenario(OWN, "equilibrium", None, car),
+        )["in_training"].item()
+        for car in runs
+    ]
+    assert found == [not parameters, False]
+
+
+STUDY = """
+title = "Two trainings"
+model = "double_wishbone"
+training = {training}
+
+[grid]
+amplitude_factor = [0.9, 1.0]
+rank = [3]
+
+[[methods]]
+method = "full_order"
+
+[[methods]]
+method = "replay"
+
+[[methods]]
+method = "pod"
+label = "other"
+training = "travel_and_rack"
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A study, its folder and its combined dataset, as read from its file."""
+    folder = tmp_path_factory.mktemp("trained")
+    file = folder / "trained.toml"
+    file.write_text(STUDY.format(training='["nominal"]'))
+    run_studies(str(file), folder)
+    (dataset,) = run_studies(str(file), folder).values()
+    return file, folder, dataset
+
+
+def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys):
+    file, folder, dataset = study
+    trained = dataset["in_training"].squeeze(drop=True).sel({"method": "replay"})
+    assert trained.dtype == bool
+    assert "trained on this very run" in trained.attrs["long_name"]
+    assert trained.to_series().to_dict() == {0.9: False, 1.0: True}
+    assert dataset["in_training"].sum() == 1
+    text = study_text(study_comparison(str(file), folder))
+    assert "replay [a]" in text
+    assert "[a] trained on 1 of its 2 runs" in text
+    assert "other [" not in text
+    told = [row[-1].text for row in error_table(dataset, places(dataset)).rows]
+    assert told.count("ok (trained on this run)") == 1
+    assert main(["run", str(file), "--out", str(folder)]) == 0
+    assert "; 1 trained on the tested run" in " ".join(capsys.readouterr().out.split())
+
+
+def legend(figure):
+    (found,) = figure.legends
+    return [text.get_text() for text in found.get_texts()], found.get_title().get_text()
+
+
+def test_runs_of_the_training_are_marked_in_pictures(study):
+    _, _, dataset = study
+    names, told = legend(vm.plot(dataset))
+    assert {"replay*", "other"} <= set(names)
+    assert told == "* trained on this run"
+    names, told = legend(vm.plot(dataset, amplitude_factor=0.9))
+    assert "replay" in names
+    assert not told
+    assert (
+        "1 of 6 runs were in their own training"
+        in plot_result(dataset, None, "errors").get_suptitle()
+    )
+    assert legend(vm.plot(replayed()))[1] == "* trained on this run"
+
+
+def test_results_that_do_not_tell_are_read(study):
+    _, _, dataset = study
+    old = dataset.drop_vars("in_training")
+    assert {row["trained"] for row in grid_rows(old)} == {0}
+    assert "replay" in legend(vm.plot(old))[0]
+    rows = error_table(old, places(old)).rows
+    assert not [row for row in rows if "trained" in row[-1].text]
+
+
+@pytest.mark.parametrize(
+    ("training", "words"),
+    [
+        ('"nomnal"', "unknown training 'nomnal'; did you mean nominal?"),
+        ('["nominal", "sine_travl"]', "unknown training 'sine_travl'; did you mean sine_travel"),
+        ('"lane_change"', "gives inputs delta, double_wishbone needs z, s0"),
+        ('"set"', "'set' needs training_set"),
+        ("[]", "training"),
+    ],
+)
+def test_wrong_training_of_a_study_is_told_before_its_first_run(training, words, tmp_path):
+    file = tmp_path / "wrong.toml"
+    file.write_text(STUDY.format(training=training))
+    with pytest.raises(FileError, match=words) as error:
+        vm.run_study(file, out=tmp_path / "out")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_training_of_the_command_line(capsys):
+    simulate = ["simulate", WISHBONE, "--method", "replay"]
+    assert main([*simulate, "--training", "chirp_travel", "--training", "nominal"]) == 0
+    assert "(trained on this run): ok" in capsys.readouterr().out
+    assert main([*simulate, "--training", "nominal", "--maneuver", "chirp_travel"]) == 0
+    assert "trained on this run" not in capsys.readouterr().out
+    assert main([*simulate, "--training", "chirp_travl"]) == 2
+    assert "did you mean chirp_travel" in capsys.readouterr().err
+
+
+def test_factors_are_beside_those_of_the_maneuver():
+    given = {"maneuver": vm.maneuver("sine_travel", frequency=1.2, amplitude=0.8)}
+    run = vm.simulate(WISHBONE, frequency=1.5, amplitude=0.5, **given)
+    same = vm.simulate(WISHBONE, frequency=1.2 * 1.5, amplitude=0.8 * 0.5)
+    np.testing.assert_array_equal(run["outputs"], same["outputs"])
+    np.testing.assert_array_equal(run["inputs"], same["inputs"])
+
+
+def test_a_maneuver_by_its_name():
+    found = vm.maneuver("lane_change", frequency=1.2, amplitude=-0.5)
+    assert found == component("maneuver", "lane_change").perturbed(1.2, -0.5)
+    reduced = vm.model(CAR).simulate("lane_change").outputs
+    np.testing.assert_array_equal(
+        reduced, vm.model(CAR).simulate(vm.maneuver("lane_change")).outputs
+    )
+    with pytest.raises(InputError, match="did you mean lane_change"):
+        vm.maneuver("lane_chnge")
+
+
+@pytest.mark.parametrize(
+    "first", ["import vehiclemor.maneuver", "from vehiclemor import maneuver", "vm.maneuver"]
+)
+def test_the_function_and_the_module_of_plug_ins_go_together(first):
+    """In whatever order they are asked for."""
+    rest = (
+        "from vehiclemor.maneuver import Maneuver; assert isinstance(vm.maneuver(NAME), Maneuver)"
+    )
+    code = f"import vehiclemor as vm; NAME = 'sine_travel'; {first}; {rest}; vm.maneuver(NAME)"
+    subprocess.run([sys.executable, "-c", code], check=True)
