@@ -81,7 +81,7 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
         # Before it begins an input is zero.  What has passed one filter and both, of each corner.
         before, once, twice, high_once, high_twice, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         segment, parts, length, span, share = 0, 1, -1.0, 1.0, 1.0
-        decay, high_decay = 1.0, 1.0
+        decay, high_decay, half_decay = 1.0, 1.0, 1.0
         even = (edges[1] - edges[0]) / (first[1] - first[0])
         for piece in range(pieces):
             if piece == first[segment + 1] and segment + 1 < segments:
@@ -95,18 +95,22 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
                 parts = max(PARTS if degree > 1 else 1, math.ceil(long / LONGEST))
                 length, span, share = long, long / parts, 1.0 / parts
                 decay, high_decay = math.exp(-span / CORNER), math.exp(-span / HIGHER)
+                half_decay = math.sqrt(high_decay)
             for part in range(parts + 1):
                 value = coefficients[piece, j, degree]
                 for power in range(degree - 1, -1, -1):
                     value = coefficients[piece, j, power] + part * share * value
                 change, before = value - before, value
                 if part:
-                    left = high_twice * high_twice
+                    left = high_once, high_twice
                     once, twice = passed(once, twice, change, span / CORNER, decay)
                     high_once, high_twice = passed(
                         high_once, high_twice, change, span / HIGHER, high_decay
                     )
-                    squares += 0.5 * span * (left + high_twice * high_twice)
+                    # By Simpson's rule, where half the change has passed.
+                    _, half = passed(*left, 0.5 * change, 0.5 * span / HIGHER, half_decay)
+                    sides = left[1] * left[1] + high_twice * high_twice
+                    squares += span / 6.0 * (sides + 4.0 * half * half)
                 else:
                     once, twice = once + change, twice + change
                     high_once, high_twice = high_once + change, high_twice + change
