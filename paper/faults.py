@@ -270,8 +270,7 @@ def damaged(
     # In a process of its own: libraries may crash on what is damaged.
     wrong = started(subject, out, []).ended(0) + result(subject, out)
     aside = len(list(out.glob(f"*/{ASIDE}/*")))
-    # A bit of a netCDF file may be one that means nothing.
-    if aside != len(paths) and (kind != "combined flipped bit" or aside):
+    if aside != len(paths):
         wrong.append(f"{aside} of {len(paths)} set aside")
     return f"{len(paths)} files", wrong
 

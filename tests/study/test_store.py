@@ -1,9 +1,16 @@
 """What is stored comes back as it was, or is set aside, named and computed again."""
 
+import hashlib
 import json
 import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,9 +19,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from vehiclemor.errors import SpoiledError
-from vehiclemor.study import cell_file, workers
+from vehiclemor.study import cell_file, netcdf_file, workers
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
+from vehiclemor.study.status import status_of
 from vehiclemor.study.store import ASIDE, read_arrays, read_cell, write_cell
 
 GRID = """
@@ -215,6 +223,81 @@ def test_a_spoiled_cell_is_set_aside_and_computed_again(
     assert line.endswith(f"; moved to {aside}, and computed again")
 
 
+def rewritten(cell: bytes, **texts: object) -> bytes:
+    """A cell with other texts in its header, whole by its hash."""
+    end = 8 + int.from_bytes(cell[:8], "little")
+    header = json.loads(cell[8:end])
+    header["__metadata__"] |= texts | {"sha256": cell_file.ZEROS}
+    head = json.dumps(header, separators=(",", ":")).encode()
+    whole = len(head).to_bytes(8, "little") + head + cell[end:]
+    return cell_file._filled(whole, cell_file.ZEROS, hashlib.sha256(whole).hexdigest())
+
+
+def described(change: Callable[[dict[str, Any]], object]) -> Callable[[bytes], bytes]:
+    """Change what a cell says of its dataset."""
+
+    def changed(cell: bytes) -> bytes:
+        found = json.loads(cell[8 : 8 + int.from_bytes(cell[:8], "little")])["__metadata__"]
+        change(dataset := json.loads(found["dataset"]))
+        return rewritten(cell, dataset=json.dumps(dataset))
+
+    return changed
+
+
+def variable(**change: object) -> Callable[[bytes], bytes]:
+    """Change what a cell says of its errors."""
+    return described(lambda dataset: dataset["variables"]["rms_error"].update(change))
+
+
+DEEP = "[" * 200_000
+HEADERS = {
+    "header": lambda _: len(DEEP).to_bytes(8, "little") + DEEP.encode(),
+    "texts": lambda _: (
+        (10**6 + 16).to_bytes(8, "little") + b'{"__metadata__":' + b'{"a":' * 200_000
+    ),
+    "runs": lambda cell: rewritten(cell, runs=DEEP),
+    "runs of lists": lambda cell: rewritten(cell, runs='[[["ok"], "", 1]]'),
+    "runs of texts": lambda cell: rewritten(cell, runs='[["ok", "", "one"]]'),
+    "no text": lambda cell: rewritten(cell, key=[3]),
+}
+DATASETS = {
+    "number": lambda cell: rewritten(cell, dataset="3"),
+    "nested": lambda cell: rewritten(cell, dataset=DEEP),
+    "no status": described(lambda dataset: dataset["variables"].pop("status")),
+    "no errors": described(lambda dataset: dataset["variables"].pop("rms_error")),
+    "no coordinates": described(lambda dataset: dataset.pop("coordinates")),
+    "other coordinates": described(lambda dataset: dataset["coordinates"].pop()),
+    "coordinates that are not there": described(lambda dataset: dataset["coordinates"].append("x")),
+    "attributes": described(lambda dataset: dataset.update(attributes=["title"])),
+    "nested attributes": variable(attributes={"units": {"a": "m"}}),
+    "dimensions": variable(dimensions=["time"]),
+    "more dimensions": variable(dimensions=["output", "output"]),
+    "number of dimensions": variable(dimensions=3),
+    "type": variable(type="<U1000000000"),
+    "no type": variable(type="(2,"),
+    "text": variable(type="<U1000000000", text=["a"] * 4, shape=[4]),
+    "text without place": variable(text=["a"], shape=[10**30]),
+    "text of numbers": variable(text=[1.0] * 4, shape=[4]),
+}
+
+
+@pytest.mark.parametrize("craft", (HEADERS | DATASETS).values(), ids=(HEADERS | DATASETS))
+def test_a_crafted_cell_is_set_aside_and_computed_again(done, place, computed, craft):
+    (first, _), study, out = cells(place), place / "small.toml", place / "out"
+    first.write_bytes(crafted := craft(first.read_bytes()))
+    # How it has ended stands in its header.
+    ended = craft in DATASETS.values()
+    assert status_of(str(study), out)["small"].done == (2 if ended else 1)
+    (out / "studies" / "small.nc").unlink()
+    if ended:
+        for read in (read_cell, read_arrays):
+            with suppress(SpoiledError):
+                read(out, first.stem)
+    xr.testing.assert_identical(run(study, out), reread(done))
+    assert (out / "cells" / ASIDE / first.name).read_bytes() == crafted
+    assert computed == [first.stem]
+
+
 def reread(place: Path) -> xr.Dataset:
     return read_dataset(place / "out" / "studies" / "small.nc", "source", "vehiclemor").drop_vars(
         TIMED
@@ -269,6 +352,85 @@ def test_a_spoiled_combined_dataset_is_set_aside_and_made_again(
     assert computed == []
     assert f"{path}: not a readable result file" in caplog.messages[0]
     xr.testing.assert_identical(reread(place), reread(done))
+
+
+DAMAGED = """
+import sys
+from pathlib import Path
+import numpy as np
+from vehiclemor.errors import SpoiledError
+from vehiclemor.study.netcdf_file import read_dataset
+from vehiclemor.study.run import run_studies
+
+study, path, every = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
+whole, rng = path.read_bytes(), np.random.default_rng(2)
+damaged = [whole[:-1], whole[:-100], whole + b"x"]
+for at in range(0, len(whole), every):
+    damaged.append(whole[:at] + bytes(len(whole[at : at + 334])) + whole[at + 334 :])
+    bit = int(rng.integers(8 * len(whole)))
+    damaged.append(bytearray(whole))
+    damaged[-1][bit // 8] ^= 1 << bit % 8
+damaged = [content for content in damaged if content != whole]
+for content in damaged:
+    path.write_bytes(content)
+    try:
+        read_dataset(path, "source", "vehiclemor")
+    except SpoiledError as error:
+        assert "\\n" not in str(error)
+    else:
+        raise AssertionError("read")
+    if study:
+        assert (run_studies(study, path.parents[1])["small"]["status"] == "ok").all()
+        assert read_dataset(path, "source", "vehiclemor").attrs["study"] == "small"
+print(len(damaged), len(list(path.parent.glob("set-aside/*"))))
+"""
+
+
+def in_a_child(*arguments: object) -> list[int]:
+    """What damaged files give: the library may never come back of them."""
+    command = [sys.executable, "-c", DAMAGED, *map(str, arguments)]
+    ended = subprocess.run(command, capture_output=True, timeout=60, check=True, text=True)
+    return [int(number) for number in ended.stdout.split()]
+
+
+def test_no_damage_of_a_file_reaches_the_library(tmp_path):
+    write_dataset(a_cell().assign_attrs(source="vehiclemor"), path := tmp_path / "a.nc")
+    tries, _ = in_a_child("", path, 61)
+    assert tries > 200
+
+
+def test_combined_datasets_with_any_damage_are_made_again(place):
+    path = place / "out" / "studies" / "small.nc"
+    tries, aside = in_a_child(place / "small.toml", path, 2999)
+    assert tries == aside > 20
+
+
+def test_a_file_of_others_is_read_if_the_library_can(tmp_path, monkeypatch):
+    dataset, path = a_cell().assign_attrs(source="vehiclemor"), tmp_path / "a.nc"
+    dataset.to_netcdf(path)
+    xr.testing.assert_identical(read_dataset(path, "source", "vehiclemor"), dataset)
+    monkeypatch.setattr(netcdf_file, "LIMIT", 1.0)
+    for code, reason in (
+        ("while True: pass", "reading it does not end in 1 s"),
+        ("import os; os.abort()", "damaged, or no netCDF-4 file"),
+    ):
+        monkeypatch.setattr(netcdf_file, "READ", code)
+        with pytest.raises(SpoiledError, match=rf"{path}: not a readable result file .*{reason}"):
+            read_dataset(path, "source", "vehiclemor")
+
+
+def test_other_tools_read_files_that_end_with_their_hash(tmp_path):
+    dataset, path = a_cell().assign_attrs(source="vehiclemor"), tmp_path / "a.nc"
+    write_dataset(dataset, path)
+    with xr.open_dataset(path) as read:
+        xr.testing.assert_identical(read, dataset)
+    renamed = path.rename(tmp_path / "b.nc")
+    xr.testing.assert_identical(read_dataset(renamed, "source", "vehiclemor"), dataset)
+    # The netCDF library drops the hash; what it writes is not ours.
+    with netCDF4.Dataset(renamed, "a") as file:
+        file.title = "another"
+    with pytest.raises(SpoiledError, match="not what was written"):
+        read_dataset(renamed, "source", "vehiclemor")
 
 
 def test_cells_of_an_older_version_are_left_alone(tmp_path, caplog, computed):

@@ -1,7 +1,7 @@
 """Files in the user's cache, addressed by content and checked whenever they are read.
 
-Object code is executed, so a file counts only if it is this user's own and nobody else can write
-it, and if it is as it was written; else it is named once, and made again.
+Object code is executed, so a file counts only if it and its folders are this user's own and nobody
+else can write them, and if it is as it was written; else it is named once, and made again.
 """
 
 import atexit
@@ -76,8 +76,20 @@ def _folders(chosen: str | None) -> list[Path]:
         reason = _distrust(folder.stat())
     except OSError as error:
         reason = error.strerror or "it can't be written"
-    if not reason:
-        return [folder]
+    return _instead(folder, reason) if reason else [folder]
+
+
+def _folders_of(name: str) -> list[Path]:
+    """As `_folders`, of which another is used if others may put a file of this name there."""
+    folders = _folders(_chosen())
+    for part in list(Path(name).parents)[:-1]:
+        with suppress(OSError):
+            if reason := _distrust((folders[0] / part).lstat()):
+                folders[:] = _instead(folders[0] / part, reason)
+    return folders
+
+
+def _instead(folder: Path, reason: str) -> list[Path]:
     _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
     return [_temporary()]
 
@@ -91,6 +103,8 @@ def _temporary() -> Path:
 
 def _distrust(status: os.stat_result) -> str:
     """Why what lies there may be another user's; empty if it can't be."""
+    if stat.S_ISLNK(status.st_mode):
+        return "it is a link"
     if not hasattr(os, "geteuid"):
         return ""
     if status.st_uid != os.geteuid():
@@ -112,7 +126,7 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     make
         Gives the content.
     """
-    folders = _folders(_chosen())
+    folders = _folders_of(name)
     for folder in folders:
         content, reason = _checked(folder / name, name)
         if content is not None:
@@ -153,7 +167,7 @@ def unpacked(name: str, file: bytes) -> bytes | None:
 
 def held(name: str) -> bytes | None:
     """Content of a file, if the cache has it."""
-    found = (_checked(folder / name, name)[0] for folder in _folders(_chosen()))
+    found = (_checked(folder / name, name)[0] for folder in _folders_of(name))
     return next((content for content in found if content is not None), None)
 
 
@@ -177,9 +191,8 @@ def _digest(name: str, content: bytes) -> bytes:
 def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
     """Content of a file, or why it can't be trusted; neither where there is none."""
     try:
-        with path.open("rb") as file:
-            reason = _distrust(os.fstat(file.fileno()))
-            content = unpacked(name, file.read())
+        reason = _distrust(path.lstat())
+        content = None if reason else unpacked(name, path.read_bytes())
     except FileNotFoundError:
         return None, ""
     except OSError as error:

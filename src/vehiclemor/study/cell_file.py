@@ -9,12 +9,16 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
+from pydantic import Field, TypeAdapter
 
 from vehiclemor.errors import SpoiledError
+from vehiclemor.short_repr import shortened
+from vehiclemor.toml_files import FileSchema
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +28,13 @@ ENDING, SCHEMA = ".safetensors", "vehiclemor cell 1"
 HASH, ZEROS = '"sha256":"{}"', "0" * 64
 # Length of the header is told in so many bytes; and a first read that mostly has all of it.
 PREFIX, FIRST = 8, 1 << 14
+# Bytes that a variable may take which takes less in the file: text.
+MOST = 1 << 28
+# Status, message and number of runs.
+RUNS = TypeAdapter(list[tuple[str, str, int]])
+# Coordinates; and variable -> dimensions, shape, whether it is text, and all its attributes are.
+Layout = tuple[set[str], dict[str, tuple[list[str], tuple[int, ...], bool, bool]]]
+Made = TypeVar("Made")
 
 
 class End(NamedTuple):
@@ -39,6 +50,24 @@ class End(NamedTuple):
 
     runs: dict[tuple[str, str], int]
     seconds: float
+
+
+class Variable(FileSchema):
+    """What the header says of a variable, and its text if it is that."""
+
+    dimensions: list[str]
+    attributes: dict[str, Any]
+    type: str = Field(pattern=r"^[<>|][A-Za-z]\d*$")
+    shape: tuple[int, ...] = ()
+    text: list[str] | None = None
+
+
+class Description(FileSchema):
+    """What the header says of a dataset."""
+
+    variables: dict[str, Variable]
+    coordinates: list[str]
+    attributes: dict[str, Any]
 
 
 def encoded(dataset: xr.Dataset, key: str, seconds: float = np.nan) -> bytes:
@@ -92,25 +121,39 @@ def arrays_of(content: bytes, key: str) -> dict[str, np.ndarray]:
     SpoiledError
         If the content is not what was written for this key.
     """
-    return {name: array[()] for name, array in _arrays(content, _described(content, key)).items()}
+    return _decoded(content, key, lambda _, arrays: {n: array[()] for n, array in arrays.items()})
 
 
 def dataset_of(content: bytes, key: str) -> xr.Dataset:
     """The dataset of a cell; `SpoiledError` as of `arrays_of`."""
     import xarray as xr
 
-    described = _described(content, key)
-    arrays = _arrays(content, described)
-    variables = {
-        name: (
-            entry["dimensions"],
-            arrays[name].astype(entry["type"], copy=False),
-            entry["attributes"],
-        )
-        for name, entry in described["variables"].items()
-    }
-    dataset = xr.Dataset(variables, attrs=described["attributes"])
-    return dataset.set_coords(described["coordinates"])
+    def made(described: Description, arrays: dict[str, np.ndarray]) -> xr.Dataset:
+        variables = {
+            name: (entry.dimensions, arrays[name].astype(entry.type, copy=False), entry.attributes)
+            for name, entry in described.variables.items()
+        }
+        dataset = xr.Dataset(variables, attrs=described.attributes)
+        return dataset.set_coords(described.coordinates)
+
+    return _decoded(content, key, made)
+
+
+def layout(content: bytes, key: str) -> Layout:
+    """What a cell holds, whatever the values; `SpoiledError` as of `arrays_of`."""
+
+    def made(described: Description, arrays: dict[str, np.ndarray]) -> Layout:
+        return set(described.coordinates), {
+            name: (
+                entry.dimensions,
+                arrays[name].shape,
+                entry.text is not None,
+                all(isinstance(value, str) for value in entry.attributes.values()),
+            )
+            for name, entry in described.variables.items()
+        }
+
+    return _decoded(content, key, made)
 
 
 def check(content: bytes, key: str) -> dict[str, str]:
@@ -128,9 +171,12 @@ def end_of(path: Path, key: str) -> End:
         content = file.read(FIRST)
         if PREFIX + int.from_bytes(content[:PREFIX], "little") > len(content):
             content += file.read()
-    header = _header(content, key)
+    return _end(_header(content, key))
+
+
+def _end(header: dict[str, str]) -> End:
     try:
-        runs = {(status, text): n for status, text, n in json.loads(header["runs"])}
+        runs = {(status, text): n for status, text, n in RUNS.validate_json(header["runs"])}
         return End(runs, float(header["seconds"]))
     except (ValueError, KeyError, TypeError):
         raise SpoiledError("damaged") from None
@@ -142,8 +188,8 @@ def _header(content: bytes, key: str) -> dict[str, str]:
         raise SpoiledError("truncated, or no result of this package")
     try:
         header = json.loads(content[PREFIX : PREFIX + size])["__metadata__"]
-        schema, found = header["schema"], header["key"]
-    except (ValueError, KeyError, TypeError):
+        schema, found = shortened(header["schema"]), shortened(header["key"])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise SpoiledError("damaged, or no result of this package") from None
     if schema != SCHEMA:
         raise SpoiledError(f"{schema!r}, where this version writes {SCHEMA!r}")
@@ -152,18 +198,26 @@ def _header(content: bytes, key: str) -> dict[str, str]:
     return header
 
 
-def _described(content: bytes, key: str) -> dict[str, Any]:
-    return json.loads(check(content, key)["dataset"])
-
-
-def _arrays(content: bytes, described: dict[str, Any]) -> dict[str, np.ndarray]:
+def _decoded(
+    content: bytes, key: str, make: Callable[[Description, dict[str, np.ndarray]], Made]
+) -> Made:
+    """What is made of the arrays of a file, text as objects, and of what it says of them."""
+    from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    arrays = load(content)
-    for name, entry in described["variables"].items():
-        if "text" in entry:
-            arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
-    return arrays
+    header = check(content, key)
+    _end(header)
+    try:
+        described, arrays = Description.model_validate_json(header["dataset"]), load(content)
+        for name, entry in described.variables.items():
+            if entry.text is not None:
+                arrays[name] = np.array(entry.text, dtype=object).reshape(entry.shape)
+            size, stored = arrays[name].size, arrays[name].nbytes
+            if np.dtype(entry.type).itemsize * size > max(stored, MOST):
+                raise ValueError
+        return make(described, arrays)
+    except (ArithmeticError, LookupError, SafetensorError, TypeError, ValueError):
+        raise SpoiledError("what it holds is no result") from None
 
 
 def _filled(content: bytes, old: str, new: str) -> bytes:

@@ -22,6 +22,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.study.cell_file import Layout, encoded, layout
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.input_range import input_range
@@ -154,6 +155,19 @@ def _failed(experiment: Experiment, model: Model, failure: Failure) -> xr.Datase
     if experiment.keep == "errors":
         return errors_dataset(model, experiment, outcomes, fit_cost(failure))
     return metrics_dataset(model, experiment, failure, failure)
+
+
+def layout_of(experiment: Experiment) -> Layout:
+    """What the result of an experiment holds, whatever becomes of it."""
+    test = experiment.test
+    like = experiment.model, experiment.keep, len(test), test[0].maneuver.samples
+    if like not in _LAYOUTS:
+        failed = _failed(experiment, model_of(experiment), Failure("error", ""))
+        _LAYOUTS[like] = layout(encoded(failed, ""), "")
+    return _LAYOUTS[like]
+
+
+_LAYOUTS: dict[tuple[str, str, int, int], Layout] = {}
 
 
 def model_of(experiment: Experiment) -> Model:

@@ -1,12 +1,16 @@
 """Datasets as whole netCDF-4 files: combined results, single runs, saved models.
 
-Each holds a hash of its content, which is checked whenever it is read.
+Each ends with the hash of its bytes, which is checked before the library reads them: of damaged
+ones it may never come back.  Other files are first read in a process that can be ended.
 """
 
 from __future__ import annotations
 
 import hashlib
 import itertools
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -20,8 +24,20 @@ if TYPE_CHECKING:
     import netCDF4
     import xarray as xr
 
-# Group of a file with the hash of all that stands outside of it.
-INTEGRITY = "integrity"
+# Group of a file that ends with the hash of its bytes, and what stands before that hash: behind the
+# data, where no reader of netCDF looks.
+INTEGRITY, SEAL = "integrity", b"\nvehiclemor sha256 "
+HASH = "the last 64 bytes: of all before the line that they are on"
+# What reads a file of others, and the seconds that it may take.
+READ = """
+import sys, netCDF4
+with netCDF4.Dataset(sys.argv[1]) as file:
+    for owner in (file, *file.variables.values()):
+        owner.__dict__
+    for variable in file.variables.values() if int(sys.argv[2]) else ():
+        variable[...]
+"""
+LIMIT = 10.0
 # Bytes of the largest part of a dataset that is made, written or checked at a time, and of the
 # smallest file that is read only where it is asked for.
 PART, LARGE = 1 << 24, 1 << 28
@@ -85,7 +101,8 @@ def _write(path: Path, fill: Callable[[netCDF4.Dataset], object], size: int) -> 
         try:
             with netCDF4.Dataset(temporary, "w") as file:
                 fill(file)
-                file.createGroup(INTEGRITY).sha256 = _digest(file)
+                file.createGroup(INTEGRITY).sha256 = HASH
+            _seal(temporary)
         except (OSError, RuntimeError):
             # The library hides the reason; plain writing of as much as there is tells it.
             temporary.write_bytes(bytes(size + (1 << 16)))
@@ -147,13 +164,15 @@ def regions(sizes: Sequence[int], at_once: int) -> Iterator[Region]:
 
 
 def global_attributes(path: Path) -> dict[str, Any]:
-    """Attributes of a file, unchecked; none if it is missing or can't be read."""
+    """Attributes of a file of this package that is whole; of no other."""
     import netCDF4
 
     try:
+        if not _sealed(path):
+            return {}
         with netCDF4.Dataset(path) as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}
-    except (OSError, RuntimeError):
+    except (OSError, ValueError):
         return {}
 
 
@@ -169,7 +188,7 @@ def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Datas
 
 @contextmanager
 def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
-    """A netCDF file that is whole.
+    """A netCDF file that is as it was written; of others, one that the library can read.
 
     Parameters
     ----------
@@ -183,10 +202,13 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
             raise SpoiledError(f"is a folder, not a {kind}", path)
         raise FileError(f"{path}: no such {kind}")
     try:
+        sealed = _sealed(path)
+        if not sealed:
+            _read_elsewhere(path)
         with netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
-            if INTEGRITY in file.groups and file[INTEGRITY].sha256 != _digest(file):
-                raise ValueError("what it holds is not what was written")
+            if INTEGRITY in file.groups and not sealed:
+                raise ValueError("not what was written, or of an older version")
             yield file
     except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
         if machine := machine_reason(error):
@@ -199,24 +221,37 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
         raise SpoiledError(f"not a readable {kind} ({detail})", path, mend) from None
 
 
-def _digest(file: netCDF4.Dataset) -> str:
-    """Hash of the variables and attributes of a file."""
-    import numpy as np
+def _seal(path: Path) -> None:
+    """Append the hash of its bytes to a file."""
+    with path.open("r+b") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(SEAL + digest.encode())
 
+
+def _sealed(path: Path) -> bool:
+    """Whether a file ends with the hash of its bytes; `ValueError` if with another one."""
     digest = hashlib.sha256()
-    for owner in (file, *file.variables.values()):
-        described = {name: str(owner.getncattr(name)) for name in sorted(owner.ncattrs())}
-        digest.update(repr(described).encode())
-    file.set_auto_maskandscale(False)
-    for name, variable in file.variables.items():
-        kind = np.dtype(object if variable.dtype is str else variable.dtype)
-        digest.update(f"{name} {variable.dimensions} {kind} {variable.shape}".encode())
-        if variable.shape:
-            variable.set_var_chunk_cache(size=1)
-        for number, region in enumerate(regions(variable.shape, PART // kind.itemsize)):
-            values = np.asarray(variable[region] if region else variable[...])
-            if kind.kind in "OUS":
-                digest.update(b"\n" * (number > 0) + "\n".join(map(str, values.ravel())).encode())
-            else:
-                digest.update(np.ascontiguousarray(values).data)
-    return digest.hexdigest()
+    with path.open("rb") as file:
+        size = max(file.seek(0, os.SEEK_END) - len(SEAL) - 2 * digest.digest_size, 0)
+        file.seek(size)
+        end = file.read()
+        if not end.startswith(SEAL):
+            return False
+        file.seek(0)
+        for begin in range(0, size, PART):
+            digest.update(file.read(min(size - begin, PART)))
+    if end.removeprefix(SEAL) != digest.hexdigest().encode():
+        raise ValueError("what it holds is not what was written")
+    return True
+
+
+def _read_elsewhere(path: Path) -> None:
+    """Raise `ValueError` if the library can't read a file, crashes, or does not come to an end."""
+    whole = path.stat().st_size < LARGE
+    command = [sys.executable, "-P", "-c", READ, str(path.absolute()), str(int(whole))]
+    try:
+        ended = subprocess.run(command, capture_output=True, timeout=LIMIT, check=False)  # noqa: S603
+    except subprocess.TimeoutExpired:
+        raise ValueError(f"damaged: reading it does not end in {LIMIT:g} s") from None
+    if ended.returncode:
+        raise ValueError("damaged, or no netCDF-4 file")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -157,15 +157,24 @@ def _unreadable(path: Path, error: OSError) -> FileError | MachineError:
     return kind(f"{path}: can't be read ({machine or error.strerror})")
 
 
-def finished_cells(folder: Path, keys: Iterable[str]) -> set[str]:
-    """Those of some experiments that are stored; cells that are not as written are set aside."""
+def finished_cells(
+    folder: Path, keys: Iterable[str], expected: Callable[[str], cell_file.Layout]
+) -> set[str]:
+    """Those of some experiments that are stored; cells that are not as written are set aside.
+
+    Parameters
+    ----------
+    expected
+        Gives what the cell of a key holds.
+    """
     finished, spoiled = set(), 0
     for key in keys:
         path = cell_path(folder, key)
         if not path.exists():
             continue
         try:
-            cell_file.check(_content(path), key)
+            if cell_file.layout(_content(path), key) != expected(key):
+                raise SpoiledError("what it holds is no result of its experiment")
             finished.add(key)
         except SpoiledError as error:
             spoiled += 1

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vehiclemor.codegen.object_cache import cache_folder
 from vehiclemor.errors import MachineError, machine_reason
-from vehiclemor.study.evaluate import evaluate
+from vehiclemor.study.evaluate import evaluate, layout_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
@@ -69,9 +69,11 @@ class Workers:
             If the machine has failed again and again; what was finished is stored.
         """
         remove_partial(self.folder)
-        keys = {e.key for group in groups for e in group}
-        self.asked |= keys
-        self.finished |= finished_cells(self.folder, keys - self.finished)
+        wanted = {e.key: e for group in groups for e in group}
+        self.asked |= wanted.keys()
+        self.finished |= finished_cells(
+            self.folder, wanted.keys() - self.finished, lambda key: layout_of(wanted[key])
+        )
         if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)

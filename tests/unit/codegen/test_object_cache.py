@@ -173,6 +173,56 @@ def test_a_folder_that_others_can_write_is_refused(folder, fetch, caplog, mode):
     assert len(caplog.messages) == 1
 
 
+def other_files(folder: Path, fetch: Callable[..., bytes]) -> Path:
+    """A folder as of the cache, with a whole file of another content."""
+    fetch(content=b"foreign content")
+    return (folder / "kernels").rename(folder.parent / "foreign")
+
+
+def linked_file(folder: Path, fetch: Callable[..., bytes]) -> None:
+    foreign = other_files(folder, fetch)
+    (folder / "kernels").mkdir(mode=0o700)
+    (folder / NAME).symlink_to(foreign / Path(NAME).name)
+
+
+def linked_folder(folder: Path, fetch: Callable[..., bytes]) -> None:
+    (folder / "kernels").symlink_to(other_files(folder, fetch))
+
+
+def folder_of_all(folder: Path, fetch: Callable[..., bytes]) -> None:
+    other_files(folder, fetch).rename(folder / "kernels").chmod(0o777)
+
+
+def folder_of_another(folder: Path, fetch: Callable[..., bytes]) -> None:
+    os.chown(other_files(folder, fetch).rename(folder / "kernels"), 12345, -1)
+
+
+@pytest.mark.parametrize(
+    ("plant", "told"),
+    [
+        (linked_file, f"{NAME} is made again: it is a link"),
+        (linked_folder, "kernels is not used (it is a link): every process compiles for itself"),
+        (folder_of_all, f"kernels is not used ({OTHERS}): every process compiles for itself"),
+        pytest.param(
+            folder_of_another, "kernels is not used (it belongs to another user)", marks=needs_root
+        ),
+    ],
+)
+def test_what_others_may_have_planted_on_the_way_is_not_read(
+    folder, fetch, made, caplog, plant, told
+):
+    plant(folder, fetch)
+    assert object_cache.held(NAME) is None
+    for _ in range(2):
+        assert fetch() == b"some content"
+    assert len(made) == 2
+    (message,) = caplog.messages
+    assert told in message
+    # Nothing is written where others may be.
+    kept = [p for p in folder.parent.rglob("*.o") if p.read_bytes().endswith(b"some content")]
+    assert kept == ([folder / NAME] if plant is linked_file else [])
+
+
 def test_a_folder_made_by_a_generous_user_is_trusted(folder, fetch, made):
     # Where users have groups of their own, files that are made can be written by the group.
     before = os.umask(0o002)
