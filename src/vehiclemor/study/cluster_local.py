@@ -32,7 +32,7 @@ class _Connector(TCPConnector):
 class _Listener(TCPListener):
     prefix = f"{PROTOCOL}://"
 
-    async def _prepare_stream(self, stream: IOStream, *_: Any) -> IOStream | None:
+    async def _prepare_stream(self, stream: IOStream, address: str) -> IOStream | None:  # noqa: ARG002
         """The stream, before anything of it is unpacked; none if it begins with another word."""
         with suppress(StreamClosedError):
             if compare_digest(await stream.read_bytes(len(WORD)), WORD.encode()):
