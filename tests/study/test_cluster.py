@@ -4,6 +4,7 @@ import logging
 import os
 import runpy
 import signal
+import subprocess
 import sys
 import time
 from concurrent.futures import CancelledError, Future
@@ -151,6 +152,30 @@ def test_workers_that_see_another_folder_send_their_results(
     assert_same(alone, run(study, tmp_path, client))
     assert len(written) == len(set(written)) == CELLS
     assert len(cells_in(tmp_path)) == CELLS
+
+
+STRANGER = """
+import sys
+from distributed import Client
+from vehiclemor.study import cluster_local
+
+Client(sys.argv[1], timeout=2).run_on_scheduler(print, "came in")
+"""
+
+
+def test_nobody_else_reaches_the_workers_of_this_machine():
+    with engine.reached("local", 1) as elsewhere:
+        client = elsewhere.keywords["client"]
+        own = [client.scheduler.address, *client.nthreads()]
+        plain = [f"tcp://{address.partition('://')[2]}" for address in own]
+        # Of the same package, but with another word.
+        for address in own + plain:
+            command = [sys.executable, "-c", STRANGER, address]
+            ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+            assert ended.returncode == 1
+            assert "came in" not in ended.stdout
+            assert "Stream is closed" in ended.stderr or "Timed out" in ended.stderr
+        assert client.submit(sum, [1, 2]).result() == 3
 
 
 # Kernels

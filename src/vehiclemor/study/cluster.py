@@ -68,6 +68,9 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
         stack.enter_context(silence_logging_cmgr(logging.CRITICAL))
         address: Any = scheduler
         if scheduler == LOCAL:
+            from vehiclemor.study import cluster_local
+
+            word = {cluster_local.VARIABLE: cluster_local.WORD}
             address = stack.enter_context(
                 distributed.LocalCluster(
                     n_workers=jobs,
@@ -75,8 +78,9 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
                     processes=True,
                     dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL,
-                    preload=[NO_INTERRUPT],
-                    env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"},
+                    protocol=cluster_local.PROTOCOL,
+                    preload=[NO_INTERRUPT, cluster_local.__name__],
+                    env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"} | word,
                 )
             )
         client = stack.enter_context(_client(address))
