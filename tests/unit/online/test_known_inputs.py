@@ -9,7 +9,6 @@ import vehiclemor as vm
 from vehiclemor.simulation.input_polynomials import extent_of
 from vehiclemor.study.plans.boxes import boxes_of, drawn
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.scenario import start_of
 
 CAR = "independent_suspension_vehicle"
 # Steering (rad) that the 14-DOF vehicle allows, and about the largest that its model has learnt.

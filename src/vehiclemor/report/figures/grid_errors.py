@@ -15,7 +15,13 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.error_map import figure_error_map
 from vehiclemor.report.figures.lines import CROSS, Style, legend_outside, letter, panels, styles
-from vehiclemor.report.figures.places import FEW_DECADES, Places, places_of, tick_decades
+from vehiclemor.report.figures.places import (
+    FEW_DECADES,
+    Places,
+    axis_unit,
+    places_of,
+    tick_decades,
+)
 from vehiclemor.report.labels import (
     error_label,
     method_text,
@@ -88,9 +94,13 @@ def _lines(
     """A line for each combination of what this method's errors depend on."""
     own = [d for d in others if not bool((errors == errors.isel({d: 0})).all())]
     errors = errors.isel({d: 0 for d in others if d not in own}, drop=True)
+    units = [axis_unit(errors, d) for d in own]
     found = {}
     for place in itertools.product(*(errors[d].values.tolist() for d in own)):
-        values = [f"{_words([name])} {v}" for name, v in zip(own, place, strict=True)]
+        shown = [v if isinstance(v, str) else f"{v:g}" for v in place]
+        values = [
+            f"{_words([d])} {v} {u}".rstrip() for d, v, u in zip(own, shown, units, strict=True)
+        ]
         chosen = errors.sel(dict(zip(own, place, strict=True)), drop=True)
         name, text = (", ".join([m, *values]) for m in (method, method_text(method)))
         found[name] = text, chosen
@@ -209,7 +219,9 @@ def _map(
     written = math.prod(dataset.sizes[d] for d in axes) <= WRITTEN
     options = {"outputs": outputs, "methods": texts, "values": written, "axes": axes}
     figure = figure_error_map({"": largest}, **options)
-    figure.suptitle(titled(dataset, largest_over(dataset, rest).removeprefix(", ")))
+    crosses = ", a cross where a run has failed" if bool(np.isinf(errors).any()) else ""
+    words = f"{largest_over(dataset, rest)}{crosses}".removeprefix(", ")
+    figure.suptitle(titled(dataset, words))
     return figure
 
 
