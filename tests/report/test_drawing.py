@@ -102,7 +102,8 @@ def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(results,
         run = data.sel({"method": label}).squeeze()
         run = run.sel(frequency_factor=1.0) if "frequency_factor" in run.dims else run
         status = str(run["status"].item())
-        text = label.replace("_", " ") + (f" ({status})" if status != "ok" else "")
+        mark = "*" if run["in_training"] else ""
+        text = label.replace("_", " ") + mark + (f" ({status})" if status != "ok" else "")
         shown = lines[text].get_ydata()
         np.testing.assert_array_equal(shown, 1e3 * run["outputs"].sel(output="second_euler_angle"))
         assert np.isfinite(shown[-1]) == (status in ("ok", "untrusted"))
@@ -150,7 +151,7 @@ def test_paths_of_runs_that_have_failed(results):
     data = data.sel(output=["spindle_x", "spindle_y"]).assign_coords(output=list(PATH))
     figure = vm.plot(data.squeeze(), "paths")
     figure.draw_without_rendering()
-    assert "diverged 2 (diverged)" in said(figure)[0]
+    assert "diverged 2* (diverged)" in said(figure)[0]
     assert len(figure.axes) == 2
 
 
@@ -228,4 +229,4 @@ def test_counts_agree(results, capsys):
     assert main(["status", path, "--out", str(results)]) == 0
     assert f" {counts};" in " ".join(capsys.readouterr().out.split())
     page = vm.write_report([path], results / "page.html", results)
-    assert f": {told}." in page.read_text(encoding="utf-8")
+    assert f": {told}" in page.read_text(encoding="utf-8")

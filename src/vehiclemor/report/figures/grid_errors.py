@@ -15,13 +15,7 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.error_map import figure_error_map
 from vehiclemor.report.figures.lines import CROSS, Style, legend_outside, letter, panels, styles
-from vehiclemor.report.figures.places import (
-    FEW_DECADES,
-    Places,
-    axis_unit,
-    places_of,
-    tick_decades,
-)
+from vehiclemor.report.figures.places import FEW_DECADES, Places, places_of, tick_decades
 from vehiclemor.report.labels import (
     error_label,
     method_text,
@@ -94,13 +88,12 @@ def _lines(
     """A line for each combination of what this method's errors depend on."""
     own = [d for d in others if not bool((errors == errors.isel({d: 0})).all())]
     errors = errors.isel({d: 0 for d in others if d not in own}, drop=True)
-    units = [axis_unit(errors, d) for d in own]
+    units = [str(errors[d].attrs.get("units", "")).removesuffix("1") for d in own]
     found = {}
     for place in itertools.product(*(errors[d].values.tolist() for d in own)):
         shown = [v if isinstance(v, str) else f"{v:g}" for v in place]
-        values = [
-            f"{_words([d])} {v} {u}".rstrip() for d, v, u in zip(own, shown, units, strict=True)
-        ]
+        parts = zip(map(_words, zip(own)), shown, units, strict=True)
+        values = [" ".join(filter(None, part)) for part in parts]
         chosen = errors.sel(dict(zip(own, place, strict=True)), drop=True)
         name, text = (", ".join([m, *values]) for m in (method, method_text(method)))
         found[name] = text, chosen

@@ -74,20 +74,16 @@ def places_of(dataset: xr.Dataset, name: str) -> Places:
         return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
     if not np.issubdtype(values.dtype, np.number):
         return Places(np.arange(len(values)), words, [str(value) for value in values])
-    unit = axis_unit(dataset, name)
-    return Places(values, f"{words} ({unit})" if unit else words)
-
-
-def axis_unit(dataset: xr.Dataset | xr.DataArray, name: str) -> str:
-    """Unit of a dimension of a grid, empty where it has none."""
     unit = str(dataset[name].attrs.get("units", UNITS.get(name, "")))
-    return "" if unit == "1" else unit
+    return Places(values, f"{words} ({unit})" if unit not in ("", "1") else words)
 
 
-def tick_decades(axis: Axis, low: float, high: float) -> None:
-    """Ticks of a logarithmic axis: 1, 2, 5 of each decade where there are few decades."""
+def tick_decades(
+    axis: Axis, low: float, high: float, subs: Sequence[float] = (1.0, 2.0, 5.0)
+) -> None:
+    """Ticks of a logarithmic axis: some of each decade where there are few decades."""
     if np.log10(high / low) < FEW_DECADES:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_locator(LogLocator(subs=subs))
         powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
         axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
         axis.set_minor_formatter(NullFormatter())

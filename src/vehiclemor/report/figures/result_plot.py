@@ -104,7 +104,7 @@ def _model(dataset: xr.Dataset) -> str:
 
 def _title(dataset: xr.Dataset) -> str:
     """Title of the result; of one run with its input and how it has ended."""
-    title = str(dataset.attrs.get("title", ""))
+    title = str(dataset.attrs.get("title", _model(dataset)))
     (test,) = _configuration(dataset).get("test", [None])
     if test:
         factors = "".join(
@@ -135,13 +135,6 @@ def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
     given = dataset.coords.get("method")
     label = _configuration(dataset).get("method", "run") if given is None else given.item()
     return {str(label): without_single(dataset)}
-
-
-def kinds_of(dataset: xr.Dataset) -> list[str]:
-    """Kinds of pictures that a study holds the data for."""
-    kinds = ["histories"] if dataset.sizes.get("time") and "outputs" in dataset else []
-    kinds += ["paths"] if kinds and set(PATH) <= set(dataset["output"].values) else []
-    return [*kinds, "errors"]
 
 
 def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve], bool]:
@@ -203,7 +196,7 @@ def _draw_differences(axis: Axes, panel: Panel) -> None:
     else:
         period = float(panel.full["time"][-1]) / 50.0
         draw_largest_errors(axis, panel, period)
-        tick_decades(axis.yaxis, *axis.get_ylim())
+        tick_decades(axis.yaxis, *axis.get_ylim(), subs=(1.0, 3.0))
         axis.set_ylabel(f"largest error\nper {period:.2g} s ({unit_of(panel.full, panel.output)})")
 
 

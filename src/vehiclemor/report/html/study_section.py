@@ -7,7 +7,8 @@ from pathlib import Path
 import xarray as xr
 
 from vehiclemor.report.errors import counted_ends
-from vehiclemor.report.figures.result_plot import kinds_of, plot_result
+from vehiclemor.report.figures.curves import PATH
+from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
 from vehiclemor.report.html.cells import UNNAMED, stored_cell
 from vehiclemor.report.html.interactive import available
@@ -69,7 +70,9 @@ def _pictures(dataset: xr.Dataset, name: str, left_out: dict[str, str]) -> list[
     """Every kind of picture that the dataset has the data for; histories from every start."""
     starts = [str(start) for start in dataset["start"].values]
     found: list[Picture] = []
-    for kind in kinds_of(dataset):
+    held = {"histories": bool(dataset.sizes.get("time")), "errors": True}
+    held["paths"] = held["histories"] and set(PATH) <= set(dataset["output"].values)
+    for kind in filter(held.get, PICTURES):
         for start in starts if kind != "errors" else [""]:
             picture = partial(_picture, dataset, kind, start, f"{name}-{kind}-{len(found)}")
             found += attempt_apart(f"{kind} of {name}", left_out, picture)

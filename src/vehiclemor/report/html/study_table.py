@@ -75,9 +75,9 @@ def _every(rows: Sequence[Place], outputs: dict[str, str], grid: list[str]) -> T
         line += [count(int(row[name]), anchor) for name in counts]
         status = str(row["status"])
         said = row["message"] if status != "ok" else row["remark"] if row["warned"] else ""
+        kind = "missed" if status not in FINISHED else "other" if said else "met"
         status += f" ({TRAINED})" if row.get("in_training") else ""
         told = f"{status}: {said}" if said else status
-        kind = "missed" if status not in FINISHED else "other" if said else "met"
         entries.append([*line, Entry(told, None, anchor, kind)])
     return Table("Every place of the grid", _words(heads), entries, NOTE)
 
