@@ -146,10 +146,11 @@ def test_progress_without_a_terminal_is_lines(capsys, monkeypatch):
 def test_every_long_command_tells_of_cells(capsys, monkeypatch, tmp_path, command):
     def long(*_, **__):
         Workers("mine", tmp_path, asked={"a", "b", "c"}, finished={"a"})._report()
-        return pd.DataFrame({"verdict": []}) if command == "compare" else {}
+        given = {"compare": pd.DataFrame({"verdict": []}), "figures": ([], {}), "run": {}}
+        return given[command]
 
     monkeypatch.setattr(kinds, "compare", long)
-    monkeypatch.setattr(regenerate, "figures", long)
+    monkeypatch.setattr(regenerate, "regenerate_figures", long)
     monkeypatch.setattr(study_run, "run_studies", long)
     arguments = {"run": ["figure-6"], "compare": ["--json"], "figures": []}
     assert main([command, *arguments[command]]) == 0
@@ -159,7 +160,7 @@ def test_every_long_command_tells_of_cells(capsys, monkeypatch, tmp_path, comman
 def test_run_prints_statuses_and_resumes(tmp_path, capsys):
     for _ in range(2):
         assert main(["run", "figures-6-7", "--out", str(tmp_path)]) == 0
-        assert "12 ok" in capsys.readouterr().out
+        assert "12 grid points, 9 cells: 9 ok" in capsys.readouterr().out
     assert (tmp_path / "studies" / "figures-6-7.nc").exists()
 
 

@@ -334,7 +334,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
     for turn, comparison in comparisons.items():
         monkeypatch.setattr(tables, "paper_comparison", comparison)
         out = tmp_path / turn
-        paths = regenerate_figures(results_folder, out, names)
+        paths, _ = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)
         contents.append({path.name: path.read_bytes() for path in paths})
     assert len(contents[0]) == 3 * len(names) + 3 * 19

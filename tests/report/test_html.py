@@ -256,7 +256,7 @@ def test_paths_and_runs_can_be_looked_into(read):
 def test_without_the_extra_it_says_what_is_missing(made, undrawn, monkeypatch):
     monkeypatch.setattr(interactive, "find_spec", lambda _: None)
     folder, with_plots = made
-    text = page([study_section(dataset_of(folder, "hostile"), folder)], {})
+    text = page([study_section(dataset_of(folder, "hostile"), folder, {})], {})
     assert "vehiclemor[html]" in text
     assert "vehiclemor[html]" not in with_plots
     assert "plot-" not in text
@@ -267,7 +267,7 @@ def test_a_large_grid_is_summed_up_with_links(made, undrawn, monkeypatch):
     monkeypatch.setattr(study_table, "MOST_ROWS", 5)
     folder = made[0]
     dataset = dataset_of(folder, "hostile")
-    found = Page(page([study_section(dataset, folder)], {}))
+    found = Page(page([study_section(dataset, folder, {})], {}))
     assert_linked(found)
     (row,) = numbers_of(found, "POD")
     errors = dataset["rms_error"].sel({"method": "pod", "output": "spindle_y"}).values.ravel()
@@ -283,7 +283,7 @@ def test_a_study_that_is_read_in_parts_gives_the_same(made, undrawn, monkeypatch
     sections = []
     for large in (netcdf_file.LARGE, 0):
         monkeypatch.setattr(netcdf_file, "LARGE", large)
-        sections.append(study_section(dataset_of(folder, "hostile"), folder))
+        sections.append(study_section(dataset_of(folder, "hostile"), folder, {}))
     one, other = sections
     assert one._replace(plots=[]) == other._replace(plots=[])
 
@@ -291,7 +291,7 @@ def test_a_study_that_is_read_in_parts_gives_the_same(made, undrawn, monkeypatch
 def test_results_of_before_cells_were_named_are_shown(made, undrawn):
     folder = made[0]
     found = Page(
-        page([study_section(dataset_of(folder, "hostile").drop_vars("cell_key"), folder)], {})
+        page([study_section(dataset_of(folder, "hostile").drop_vars("cell_key"), folder, {})], {})
     )
     assert_linked(found)
     assert "did not name the cells" in found.texts["place-hostile-0"]

@@ -248,6 +248,13 @@ def test_a_method_that_refuses_the_model_is_reported(tmp_path, protocol_text):
 
 def test_several_protocols_from_python(tmp_path, protocol_text):
     end = protocol_text.index("[[contestants]]", protocol_text.index("[[contestants]]") + 1)
-    study = study_of(tmp_path, protocol_text[:end], protocol_text[:end])
-    dataset = vm.run_study(study, out=tmp_path)
+    one, other = protocol_text[:end], protocol_text[:end].replace("runs = 5", "runs = 4")
+    study = study_of(tmp_path, one, other)
+    told = []
+    dataset = vm.run_study(study, out=tmp_path, progress=lambda *part: told.append(part))
     assert set(dataset["study"].values) == {"predictive-small0", "predictive-small1"}
+    # Progress never goes back, that of the times neither.
+    assert sum("rounds" in work for work in {work for work, _, _ in told}) == 2
+    for work in {work for work, _, _ in told}:
+        parts = [done for name, done, _ in told if name == work]
+        assert parts == sorted(parts)

@@ -61,7 +61,9 @@ def test_a_study_is_followed_from_nothing_to_its_end(study, tmp_path, capsys, no
     assert REACH in message
     assert found.ends["ok", ""] == 6
     text = told(capsys, study, out)
-    assert text.startswith(f"small: 12 of 12 cells done; {out}/studies/small.nc 6 unreachable: ")
+    assert text.startswith(
+        f"small: 12 of 12 cells done; 6 ok, 6 unreachable; {out}/studies/small.nc "
+    )
     for path in sorted((out / "cells").glob("??/*"))[:3]:
         path.unlink()
     (cell,) = sorted((out / "cells").glob("??/*"))[:1]

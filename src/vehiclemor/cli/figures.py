@@ -1,15 +1,17 @@
 """`vehiclemor figures`: the paper's figures, and those of any study, from stored results."""
 
+import sys
 from pathlib import Path
 
 from vehiclemor import api
+from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.cli.progress import shown_progress
 from vehiclemor.errors import InputError
 
 
 def figures(
     *,
-    only: str = "",
+    only: str | None = None,
     out: Path = api.RESULTS / "figures",
     results: Path = api.RESULTS,
     jobs: int = 1,
@@ -36,18 +38,19 @@ def figures(
     dpi
         Dots an inch of PNG files; 200 by default.
     """
-    chosen = [name.strip() for name in only.split(",") if name.strip()]
-    if only and not chosen:
+    chosen = [name.strip() for name in (only or "").split(",") if name.strip()]
+    if only is not None and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    from vehiclemor.report.regenerate import figures as drawn
-    from vehiclemor.report.regenerate import left_out
+    from vehiclemor.report.regenerate import left_out, regenerate_figures
 
     with shown_progress():
-        written = drawn(chosen, out, results, jobs, style=style, dpi=dpi)
+        written, failed = regenerate_figures(results, out, chosen, jobs, style=style, dpi=dpi)
     for path in written:
         print(path)
+    for name, why in failed.items():
+        print(f"figure {name} can't be drawn: {why}", file=sys.stderr)
     missing = {} if chosen else left_out(results)
     if missing:
         made = "vehiclemor run predictive makes their studies"
         print(f"left out: {', '.join(missing)} ({made})")
-    return 0
+    return FAILED if failed else 0

@@ -2,7 +2,6 @@
 
 import sys
 import time
-from collections import Counter
 from pathlib import Path
 
 from vehiclemor import api
@@ -28,8 +27,7 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
     out
         Results folder.
     """
-    from vehiclemor.report.errors import warned_runs
-    from vehiclemor.report.labels import trained_runs
+    from vehiclemor.report.errors import counted_ends
     from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
@@ -45,18 +43,10 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
             results = run_studies(study, out, jobs, scheduler)
     errors = 0
     for name, dataset in results.items():
-        status = dataset["status"]
-        if "remark" in dataset:
-            # What a protocol would not trust is no plain success.
-            doubted = (status == "ok") & warned_runs(dataset)
-            status = status.where(~doubted, "untrusted")
-        count = Counter(str(one) for one in status.values.ravel())
-        counts = ", ".join(f"{n} {status}" for status, n in sorted(count.items()))
-        if trained := int(trained_runs(dataset).sum()):
-            counts += f"; {trained} trained on the tested run"
-        places = f"{cells[name]} cells, {count.total()} grid points: {counts}"
-        print(wrapped(f"{name}: {places}; {dataset.encoding['source']}", 0, 2))
-        errors += count["error"]
+        places = f"{dataset['status'].size} grid points, {cells[name]} cells"
+        ends = counted_ends(dataset)
+        print(wrapped(f"{name}: {places}: {ends}; {dataset.encoding['source']}", 0, 2))
+        errors += int((dataset["status"] == "error").sum())
     print(f"{time.perf_counter() - began:.1f} s")
     if errors:
         print("cells with the status error are tried again by the next run", file=sys.stderr)

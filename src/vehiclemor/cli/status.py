@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vehiclemor import api
-from vehiclemor.report.printing import wrapped
+from vehiclemor.report.printing import ends_text, wrapped
 
 # Reasons that are printed of each study.
 REASONS = 10
@@ -26,6 +26,8 @@ def status(study: str, *, out: Path = api.RESULTS) -> None:
             left = f"about {found.seconds_left:.3g} s in one process" if known else "time unknown"
             text += f", {found.to_do} to do ({left})"
         text += f", {found.later}" if found.later and not found.result else ""
+        if found.ends:
+            text += f"; {ends_text(kind for kind, _ in found.ends.elements())}"
         combined = found.result or "not combined yet"
         older = " is older" if found.result and found.to_do else ""
         print(wrapped(f"{text}; {combined}{older}", 0, 2))

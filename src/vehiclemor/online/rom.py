@@ -164,7 +164,7 @@ class ReducedOrderModel(ShortRepr):
         """A run as a labelled dataset, with units."""
         from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 
-        return trajectory_dataset(self.model, run)
+        return trajectory_dataset(self.model, run).assign_attrs(model=self.model.name)
 
     def state(self, start: Start | None = None, inputs: Any = None) -> np.ndarray:
         """State (dim,) of a start of the full model, as `simulate` begins with it.

@@ -3,12 +3,16 @@
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import nominal, perturbed
+from vehiclemor.report.labels import trained_runs
+from vehiclemor.report.printing import ends_text
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
@@ -89,6 +93,22 @@ def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
     A study leaves the second to its remarks, so that errors of such runs are still shown.
     """
     return (dataset["status"] == "untrusted") | dataset["remark"].str.contains(UNTRUSTED)
+
+
+def counted_ends(dataset: xr.Dataset) -> str:
+    """How the runs of a study have ended; a cell that stands at several places counts once."""
+    status = dataset["status"]
+    # A protocol's runs have no remarks and no cells of their own.
+    warned = (status == "ok") & (warned_runs(dataset) if "remark" in dataset else False)
+    once: Any = slice(None)
+    if "cell_key" in dataset:
+        once = np.unique(dataset["cell_key"].values.astype(str), return_index=True)[1]
+    ends, doubted, trained = (
+        found.transpose(*status.dims).values.ravel()[once]
+        for found in (status, warned, trained_runs(dataset))
+    )
+    told = f"; {trained.sum()} trained on the tested run" if trained.any() else ""
+    return ends_text(ends.tolist(), int(doubted.sum())) + told
 
 
 def by_cars(dataset: xr.Dataset, kept: Sequence[str]) -> xr.Dataset:

@@ -49,6 +49,12 @@ def label_of(output: str) -> Label:
     return LABELS.get(output, Label(words, words, words))
 
 
+def full_label(output: str, between: str = " ") -> str:
+    """Words and symbol of an output; words alone may be those of two."""
+    label = label_of(output)
+    return label.words if label.symbol == label.words else f"{label.words}{between}{label.symbol}"
+
+
 def unit_of(dataset: xr.Dataset, output: str) -> str:
     """SI unit of an output."""
     return str(dataset["output_unit"].sel(output=output).values)
@@ -79,11 +85,8 @@ def readable_unit(largest: float, unit: str) -> tuple[float, str]:
 
 def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
     """Words, symbol and unit (the output's own by default) of an output."""
-    label = label_of(output)
-    symbol = "" if label.symbol == label.words else f" {label.symbol}"
-    if len(label.words) > LONG:
-        symbol = f"\n{symbol.strip()}"
-    return f"{label.words}{symbol} ({unit or unit_of(dataset, output)})"
+    text = full_label(output, "\n" if len(label_of(output).words) > LONG else " ")
+    return f"{text} ({unit or unit_of(dataset, output)})"
 
 
 def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> str:

@@ -3,6 +3,7 @@
 import shutil
 import string
 import textwrap
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from typing import NamedTuple
@@ -43,6 +44,12 @@ class Footnotes:
         return "\n".join(
             wrapped(f"[{letter}] {phrase}", TABLE, NOTE) for phrase, letter in self._letters.items()
         )
+
+
+def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
+    """How runs have ended, such as `2 diverged, 12 ok (9 not to be trusted)`."""
+    text = ", ".join(f"{n} {status}" for status, n in sorted(Counter(statuses).items()))
+    return text.replace(" ok", f" ok ({warned} not to be trusted)") if warned else text
 
 
 def alphabetic(index: int) -> str:

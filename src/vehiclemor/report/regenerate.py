@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import count, file_path, quoted
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import InputError
 from vehiclemor.files import make_folder, write_text
+from vehiclemor.study.failure import attempt_apart
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from vehiclemor.report.figures.catalogue import Entry
 
 
 def regenerate_figures(
@@ -24,10 +28,11 @@ def regenerate_figures(
     *,
     style: str = "",
     dpi: int | None = None,
-) -> list[Path]:
-    """Draw figures, by default all but those `left_out`, and an index of captions; files written.
+) -> tuple[list[Path], dict[str, str]]:
+    """Draw figures, by default all but those `left_out`, and an index of captions.
 
-    Studies that the results folder lacks are run, but for those of minutes: see `left_out`.
+    Studies that the results folder lacks are run, but for those of minutes: see `left_out`.  Gives
+    the files that were written, and figures that could not be drawn -> why: they stop no other.
 
     Parameters
     ----------
@@ -40,10 +45,11 @@ def regenerate_figures(
         If a name is unknown or a folder can't be written.
     """
     from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
-    from vehiclemor.report.figures.saving import FORMATS, save_figure, styled
+    from vehiclemor.report.figures.saving import FORMATS, styled
 
     # What is wrong is named before anything is computed.
     styled(style, dpi)
+    jobs = count("jobs", jobs)
     missing = left_out(results)
     wanted = only or [name for name in FIGURES if name not in missing]
     chosen = {entry.name: entry for name in wanted for entry in find(name, results)}
@@ -51,34 +57,40 @@ def regenerate_figures(
     data: dict[str, xr.Dataset] = {}
     for entry in chosen.values():
         for study in entry.studies:
-            if not only and not entry.default:
-                data[study] = read_dataset(_stored(results, study), "study", study)
-            elif not data.keys() >= set(entry.names):
+            if (only or entry.default) and not data.keys() >= set(entry.names):
                 data |= run_studies(study, results, jobs)
     written: list[Path] = []
+    failed: dict[str, str] = {}
     index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
+        stored = {} if only or entry.default else {n: _stored(results, n) for n in entry.names}
+        pictures = [out / f"figure-{name}.{suffix}" for suffix in FORMATS]
         with styled(style, dpi):
-            try:
-                figure = entry.draw(data)
-            except KeyError as error:
-                if only or entry.default:
-                    raise
-                # Read as it was stored, perhaps by other source.
-                raise FileError(
-                    f"{_stored(results, entry.names[0])}: lacks {error}; vehiclemor figures "
-                    f"--only {name} makes it again"
-                ) from None
-            files = [out / f"figure-{name}.{suffix}" for suffix in FORMATS]
-            written += [save_figure(figure, path) for path in files]
-        origin = ""
-        if entry.studies:
-            hashes = sorted({str(data[study].attrs["kernel_hash"]) for study in entry.names})
-            origin = f"Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
-        index.append(f"- figure-{name}: {entry.caption} {origin}".rstrip())
+            caption = attempt_apart(name, failed, partial(_drawn, entry, data, stored, pictures))
+        index += [f"- figure-{name}: {text}" for text in caption]
+        written += pictures if caption else []
+        if stored and not caption:
+            # Perhaps by other source.
+            failed[name] += f"; vehiclemor figures --only {name} makes its study again"
     if not only:
         written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
-    return written
+    return written, failed
+
+
+def _drawn(
+    entry: Entry, data: dict[str, xr.Dataset], stored: dict[str, Path], files: list[Path]
+) -> str:
+    """Draw a figure of datasets or of those that are stored; its caption and where it is from."""
+    from vehiclemor.report.figures.saving import save_figure
+
+    data = data | {name: read_dataset(path, "study", name) for name, path in stored.items()}
+    figure = entry.draw(data)
+    for path in files:
+        save_figure(figure, path)
+    if not entry.studies:
+        return entry.caption
+    hashes = sorted({str(data[name].attrs["kernel_hash"]) for name in entry.names})
+    return f"{entry.caption} Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
 
 
 def figures(
@@ -110,12 +122,20 @@ def figures(
     -------
     list of Path
         Files written.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name or file is wrong; at last if a figure can't be drawn, when all others are written.
     """
     folders = file_path("results", results), file_path("out", out)
     chosen = [only] if isinstance(only, str) else only
     if not (isinstance(chosen, Sequence) and all(isinstance(name, str) for name in chosen)):
         raise InputError(f"only is {quoted(only)}, not a list of names of figures")
-    return regenerate_figures(*folders, chosen, count("jobs", jobs), style=style, dpi=dpi)
+    written, failed = regenerate_figures(*folders, chosen, jobs, style=style, dpi=dpi)
+    if failed:
+        raise InputError("; ".join(f"figure {name}: {why}" for name, why in failed.items()))
+    return written
 
 
 def left_out(results: Path) -> dict[str, str]:
@@ -138,5 +158,5 @@ def regenerate_all(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     """All figures into `out`/figures and all tables into `out`/tables."""
     from vehiclemor.report.tables import regenerate_tables
 
-    written = regenerate_figures(results, out / "figures", (), jobs)
-    return written + regenerate_tables(results, out / "tables", jobs)
+    written = regenerate_tables(results, out / "tables", jobs)
+    return figures((), out / "figures", results, jobs) + written

@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
+from vehiclemor.resources import data_names
+from vehiclemor.study.combined import combined_path
 from vehiclemor.study.netcdf_file import read_dataset
-from vehiclemor.study.plans.study_file import FACTORS, load_studies, study_path
+from vehiclemor.study.plans.study_file import FACTORS, owner, studies_and_files
 
 if TYPE_CHECKING:
     import xarray as xr
 
+KINDS = ("histories", "paths", "errors")
+
 
 def stored_result(name: str, results: Path) -> xr.Dataset:
-    """A netCDF file, or the stored result of a study.
+    """A netCDF file, or the stored result of a study, by its name or by that of the result.
 
     Raises
     ------
@@ -25,9 +29,13 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
     """
     path = Path(name)
     if path.suffix != ".nc":
-        if len(load_studies(name)) > 1:
-            raise InputError(f"{name} is a collection: name one of {', '.join(load_studies(name))}")
-        path = results / "studies" / f"{study_path(name).stem}.nc"
+        path = results / "studies" / f"{name}.nc"
+        if name.endswith(".toml") or name in data_names("studies") or not path.exists():
+            members = studies_and_files(name)
+            if len(members) > 1:
+                raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
+            ((study, found),) = members.items()
+            path = combined_path(results, owner(study, *found, results))
         if not path.exists():
             raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
     return read_dataset(path, "source", "vehiclemor")
@@ -44,7 +52,9 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
     InputError
         If the result has no such dimension or value.
     """
-    if "status" not in dataset or "configuration" not in dataset.attrs:
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise unknown("kind of plot", kind, KINDS)
+    if "status" not in dataset:
         raise InputError("neither a run nor a study that can be drawn")
     grid = [str(d) for d in dataset["status"].dims]
     for key in chosen:

@@ -60,5 +60,19 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
         return Failure("error", whose + one_line(error))
 
 
+def attempt_apart(name: str, failed: dict[str, str], run: Callable[[], Result]) -> list[Result]:
+    """What a call gives; nothing, and why in `failed`, if it fails, its own files included."""
+    try:
+        found = attempt(run)
+    except MachineError:
+        raise
+    except VehiclemorError as error:
+        found = Failure("error", _line(error))
+    if isinstance(found, Failure):
+        failed[name] = found.message
+        return []
+    return [found]
+
+
 def _line(error: Exception) -> str:
     return " ".join(str(error).split())

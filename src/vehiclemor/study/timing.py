@@ -134,7 +134,7 @@ def timed_cases(
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
     every = rounds or CASE_ROUNDS
-    seconds, offline = _rounds(list(experiments.values()), (every, every))
+    seconds, offline = _rounds(list(experiments.values()), (every, every), f"from {start}")
     points = f"{maneuver.samples} time points"
     times = _dataset(experiments, seconds, offline, points).isel(scenario=0, drop=True)
     dataset = dataset.merge(times)
@@ -155,7 +155,10 @@ def timed_cases(
 
 
 def timed_tests(
-    experiments: Mapping[str, Experiment], finished: np.ndarray, rounds: int | None = None
+    experiments: Mapping[str, Experiment],
+    finished: np.ndarray,
+    rounds: int | None = None,
+    what: str = "test set",
 ) -> xr.Dataset:
     """Time experiments on their test scenarios, which are the same for all.
 
@@ -163,6 +166,8 @@ def timed_tests(
     ----------
     finished
         Whether a run is timed (experiments, scenarios): one that has failed is not.
+    what
+        What the scenarios are.
 
     Returns
     -------
@@ -171,8 +176,8 @@ def timed_tests(
         not timed; `offline_seconds` on `case`.
     """
     every = rounds or PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
-    seconds, offline = _rounds(list(experiments.values()), every, finished)
-    return _dataset(experiments, seconds, offline, "test set")
+    seconds, offline = _rounds(list(experiments.values()), every, what, finished)
+    return _dataset(experiments, seconds, offline, what)
 
 
 def _dataset(
@@ -199,6 +204,7 @@ def _dataset(
 def _rounds(
     experiments: Sequence[Experiment],
     rounds: tuple[int, int],
+    what: str,
     finished: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[float]]:
     """Seconds of runs (rounds, experiments, scenarios, 2), NaN where one fails, and of fits.
@@ -212,7 +218,8 @@ def _rounds(
     tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
-    work = f"rounds of times on {model.name}"
+    # Each has a name of its own, so that progress never goes back.
+    work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
     fits = [_warm_fits(model, e, wanted[index]) for index, e in enumerate(experiments)]
     seconds = np.full((rounds[0] + 1, *shape, 2), np.nan)

@@ -9,8 +9,10 @@ from matplotlib.axes import Axes
 
 from vehiclemor.report.figures.lines import CROSS, FULL, Style
 from vehiclemor.report.labels import axis_label, error_label, readable_unit, unit_of
+from vehiclemor.simulation.trajectory import FINISHED
 
 LARGEST = "largest error in each {period:.2g} s"
+DIVERGED = "has diverged"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # Longer labels need two lines beside a low panel.
 LONG = 22
@@ -42,6 +44,13 @@ class Panel(NamedTuple):
     scale: float | None = None
 
 
+def compared(runs: Iterable[xr.Dataset]) -> xr.Dataset:
+    """The first run that stands beside its full order; a failed one may have none."""
+    first, *others = runs
+    known = (run for run in (first, *others) if bool(run["reference_outputs"].notnull().any()))
+    return next(known, first)
+
+
 def errors(panel: Panel, curve: Curve) -> xr.DataArray:
     """Error (time,) of a reduced run."""
     return (curve.run["outputs"] - curve.run["reference_outputs"]).sel(output=panel.output)
@@ -54,11 +63,14 @@ def draw_history(axis: Axes, panel: Panel, reach: float = 0.25) -> dict[str, str
     range around it.
     """
     full = panel.full["reference_outputs"].sel(output=panel.output)
-    own = unit_of(panel.full, panel.output)
-    factor, unit = readable_unit(panel.scale or float(abs(full).max()), own)
-    axis.plot(full.time, factor * full, label="full order", **FULL)
+    histories = [curve.run["outputs"].sel(output=panel.output) for curve in panel.curves]
+    known = [float(abs(signal).max()) for signal in (full, *histories) if signal.notnull().any()]
+    largest, own = panel.scale or (known or [0.0])[0], unit_of(panel.full, panel.output)
+    factor, unit = readable_unit(largest, own)
+    if bool(full.notnull().any()):
+        axis.plot(full.time, factor * full, label="full order", **FULL)
     axis.set_ylabel(axis_label(panel.full, panel.output, unit))
-    histories = [factor * curve.run["outputs"].sel(output=panel.output) for curve in panel.curves]
+    histories = [factor * history for history in histories]
     limits = _surroundings(factor * full, histories, reach)
     if limits:
         axis.set_ylim(*limits)
@@ -66,8 +78,8 @@ def draw_history(axis: Axes, panel: Panel, reach: float = 0.25) -> dict[str, str
     for (text, style, _), history in zip(panel.curves, histories, strict=True):
         if not limits:
             axis.plot(full.time, history, label=text, **style)
-        elif _plot_until_it_leaves(axis, history, text, style):
-            left["leaves the axes"] = style["color"]
+        elif ended := _plot_until_it_leaves(axis, history, text, style):
+            left[ended] = style["color"]
     axis.ticklabel_format(style="plain")
     axis.locator_params(axis="y", nbins=6)
     return left
@@ -79,7 +91,7 @@ def _surroundings(
     """Limits that hold the full-order signal and of the others what is near it."""
     low, high = float(full.min()), float(full.max())
     span = high - low
-    if span == 0.0:
+    if not span > 0.0:
         return None
     near = [v for h in histories for v in (float(h.min()), float(h.max())) if np.isfinite(v)]
     lowest = max(min([low, *near]), low - reach * span)
@@ -87,26 +99,29 @@ def _surroundings(
     return lowest - 0.05 * span, highest + 0.05 * span
 
 
-def _plot_until_it_leaves(axis: Axes, history: xr.DataArray, text: str, style: Style) -> bool:
-    """Draw a history up to the first point outside the axes, and a cross there."""
+def _plot_until_it_leaves(axis: Axes, history: xr.DataArray, text: str, style: Style) -> str:
+    """Draw a history up to the first point outside the axes; what the cross there means."""
     low, high = axis.get_ylim()
     time, values = history["time"].values, history.values.copy()
     outside = np.flatnonzero(~((values >= low) & (values <= high)))
-    if outside.size:
+    ended = ""
+    # What has failed before its first value has no end.
+    if outside.size and np.isfinite(values[0]):
         first = int(outside[0])
         # A run that has diverged ends without a value.
-        seen = first if np.isfinite(values[first]) else max(first - 1, 0)
+        diverged = not np.isfinite(values[first])
+        seen, ended = first - diverged, DIVERGED if diverged else "leaves the axes"
         place = (time[seen], np.clip(values[seen], low, high))
         axis.plot(*place, color=style["color"], clip_on=False, **CROSS)
         values[first + 1 :] = np.nan
     axis.plot(time, values, label=text, **style)
-    return bool(outside.size)
+    return ended
 
 
 def draw_errors(axis: Axes, panel: Panel, kind: str = "error", floor: bool = True) -> None:
     """Errors over the time, and the RMS error of the best approximation by the first method."""
     found = [errors(panel, curve) for curve in panel.curves]
-    largest = np.nanmax([float(abs(error).max()) for error in found])
+    largest = np.fmax.reduce([float(abs(error).max()) for error in found])
     factor, unit = readable_unit(float(largest), unit_of(panel.full, panel.output))
     for curve, error in zip(panel.curves, found, strict=True):
         axis.plot(error.time, factor * error, label=curve.text, **curve.style)
@@ -132,15 +147,15 @@ def draw_largest_errors(
         largest[largest == 0.0] = np.nan
         shown = {"label": curve.text, "drawstyle": "steps-post", **curve.style}
         axis.semilogy(edges, largest, **shown)
-        color = curve.style["color"]
-        if str(curve.run["status"].item()) == "ok":
+        color, status = curve.style["color"], str(curve.run["status"].item())
+        if status in FINISHED:
             rms = curve.run["rms_error"].sel(output=panel.output).item()
             edge = axis.get_yaxis_transform()
             place = 1.0 + min(0.03, 0.12 / len(panel.curves)) * number
             axis.plot(place, rms or np.nan, color=color, transform=edge, clip_on=False, **RMS_MARK)
-        else:
-            last = int(np.flatnonzero(np.isfinite(largest))[-1])
-            ended["has diverged"] = color
+        elif status == "diverged" and np.isfinite(largest).any():
+            last = int(np.flatnonzero(np.isfinite(largest[:-1]))[-1])
+            ended[DIVERGED] = color
             axis.plot(edges[last + 1], largest[last], color=color, **CROSS)
     axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
     if limits:

@@ -42,14 +42,15 @@ def figure_error_map(
         Dimensions, across and upwards: by default the perturbations.
     """
     (dataset,) = results.values()
-    columns = min(len(methods), COLUMNS)
-    each = -(-len(methods) // columns)
+    each = -(-len(methods) // COLUMNS)
+    columns = -(-len(methods) // each)
     size = (3.35 * columns, 2.8 * each * len(outputs))
     figure, grid = panels(each * len(outputs), columns, size, sharex=True, sharey=True)
     published = rms_numbers(str(dataset.attrs["model"]))
     across, up = (places_of(dataset, name).even() for name in axes)
     nominal = np.isclose(up.at, 0.0)[:, None] & np.isclose(across.at, 0.0)
     nominal &= tuple(axes) == FACTORS
+    spare: list[Axes] = []
     for row, output in enumerate(outputs):
         block = grid[row * each : (row + 1) * each]
         errors = np.array([_errors(dataset, method, output, axes) for method in methods])
@@ -76,12 +77,13 @@ def figure_error_map(
             up.tick(axis.yaxis)
         for number, text in enumerate(methods.values()):
             block.flat[number].set_title(f"{letter(row * len(methods) + number)} {text}")
-        for axis in block.flat[len(methods) :]:
-            axis.remove()
-    last = grid.flat if each > 1 else grid[-1]
-    for axis in last:
+        spare += block.flat[len(methods) :].tolist()
+    for axis in grid.flat if each > 1 else grid[-1]:
         across.tick(axis.xaxis)
         axis.tick_params(labelbottom=True)
+    # They share the ticks of the others until these are set.
+    for axis in spare:
+        axis.remove()
     return figure
 
 
@@ -113,7 +115,8 @@ def _outline(
     if np.sum(values < bound) < ENCLOSED:
         return
     fine = [np.linspace(a[0], a[-1], FINE * len(a)) for a in (amplitude, frequency)]
-    smooth = RectBivariateSpline(amplitude, frequency, np.log(values), kx=2, ky=2)(*fine)
+    degrees = {f"k{axis}": min(2, n - 1) for axis, n in zip("xy", values.shape, strict=True)}
+    smooth = RectBivariateSpline(amplitude, frequency, np.log(values), **degrees)(*fine)
     lines: Style = {"colors": "white", "linewidths": 1.2, "linestyles": "solid"}
     axis.contour(fine[1], fine[0], smooth, levels=[np.log(bound)], **lines)
 

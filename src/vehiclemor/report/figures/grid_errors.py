@@ -88,9 +88,12 @@ def _lines(
     """A line for each combination of what this method's errors depend on."""
     own = [d for d in others if not bool((errors == errors.isel({d: 0})).all())]
     errors = errors.isel({d: 0 for d in others if d not in own}, drop=True)
+    units = [str(errors[d].attrs.get("units", "")).removesuffix("1") for d in own]
     found = {}
     for place in itertools.product(*(errors[d].values.tolist() for d in own)):
-        values = [f"{_words([name])} {v}" for name, v in zip(own, place, strict=True)]
+        shown = [v if isinstance(v, str) else f"{v:g}" for v in place]
+        parts = zip(map(_words, zip(own)), shown, units, strict=True)
+        values = [" ".join(filter(None, part)) for part in parts]
         chosen = errors.sel(dict(zip(own, place, strict=True)), drop=True)
         name, text = (", ".join([m, *values]) for m in (method, method_text(method)))
         found[name] = text, chosen
@@ -209,7 +212,9 @@ def _map(
     written = math.prod(dataset.sizes[d] for d in axes) <= WRITTEN
     options = {"outputs": outputs, "methods": texts, "values": written, "axes": axes}
     figure = figure_error_map({"": largest}, **options)
-    figure.suptitle(titled(dataset, largest_over(dataset, rest).removeprefix(", ")))
+    crosses = ", a cross where a run has failed" if bool(np.isinf(errors).any()) else ""
+    words = f"{largest_over(dataset, rest)}{crosses}".removeprefix(", ")
+    figure.suptitle(titled(dataset, words))
     return figure
 
 

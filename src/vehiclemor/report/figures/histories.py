@@ -13,6 +13,7 @@ from vehiclemor.report.figures.curves import (
     BREAK,
     Curve,
     Panel,
+    compared,
     draw_errors,
     draw_history,
     draw_largest_errors,
@@ -106,8 +107,8 @@ def _panel(dataset: xr.Dataset, methods: Mapping[str, str], start: str, output: 
     shown = styles(known)
     points = {m: at_point(runs, m) for m in known}
     curves = [Curve(marked(methods[m], run), shown[m], run) for m, run in points.items()]
-    of_all = at_point(dataset, known[0])["reference_outputs"].sel(output=output)
-    return Panel(output, curves[0].run, curves, float(abs(of_all).max()))
+    of_all = abs(dataset["reference_outputs"].sel(output=output)).max()
+    return Panel(output, compared(points.values()), curves, float(of_all))
 
 
 def _draw(axis: Axes, content: str, panel: Panel, look: Look) -> dict[str, str]:

@@ -66,6 +66,16 @@ def letter(number: int) -> str:
     return f"({alphabetic(number)})"
 
 
+def tell_empty(figure: Figure) -> None:
+    """Say in panels of lines that there is nothing that could be drawn."""
+    for axis in figure.axes:
+        lines = [line for line in axis.lines if line.get_transform() == axis.transData]
+        points = [found for line in lines if np.size(found := line.get_xydata())]
+        if points and not any(np.isfinite(found).all(axis=1).any() for found in points):
+            words = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
+            axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)
+
+
 def legend_outside(
     figure: Figure,
     axes: Iterable[Axes],

@@ -69,7 +69,8 @@ def _draw_full_order(axis: Axes, rows: Sequence[Row]) -> None:
         style: Style = {"marker": mark, "markersize": 4, "linewidth": 0.8, "linestyle": line}
         times, scores, spreads = np.array(points).reshape(-1, 3).T
         bars = {"xerr": 0.5 * spreads * times, "elinewidth": 0.8, "capsize": 1.5}
-        axis.errorbar(times, scores, color=color, label=f"full order, {family}", **style, **bars)
+        label = f"full order, {family.removeprefix('full order')}".removesuffix(", ")
+        axis.errorbar(times, scores, color=color, label=label, **style, **bars)
 
 
 def _draw_reduced(axis: Axes, row: Row, look: tuple[str, str], top: float) -> None:

@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vehiclemor.report.figures.grid_errors import draw_edges, scale_errors
 from vehiclemor.report.figures.lines import Results, Style, legend_outside, letter, panels, styles
 from vehiclemor.report.figures.places import places_of
 from vehiclemor.report.labels import error_label
@@ -15,7 +16,6 @@ from vehiclemor.study.plans.study_file import FACTORS
 
 MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
-NOTHING: Style = {"marker": 7, "markersize": 7, "linestyle": "none", "clip_on": False}
 
 
 def figure_error_curves(
@@ -42,7 +42,7 @@ def figure_error_curves(
 
 
 def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], factor: str) -> None:
-    """Errors of one output; a triangle below the logarithmic axis where the error is 0."""
+    """Errors of one output; failures and errors that are 0 stand at the edges of the axis."""
     where = places_of(chosen, factor)
     where.tick(axis.xaxis)
     places = where.at
@@ -51,17 +51,9 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
         shown = np.where(errors > 0.0, errors, np.nan)
         marked = {"label": methods[method], "marker": MARKERS.get(method, "^")}
         axis.semilogy(places, shown, markersize=3, **marked, **style)
-        none = places[errors == 0.0]
-        if none.size:
-            below = {"color": style["color"], "transform": axis.get_xaxis_transform()}
-            axis.plot(
-                none,
-                np.zeros(none.size),
-                label=f"{methods[method]}: error 0, off the log axis",
-                **below,
-                **NOTHING,
-            )
+        draw_edges(axis, places, errors[:, None], style["color"])
     if "pod" in methods:
         floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
         if np.isfinite(floor).any():
             axis.semilogy(places, floor, label="best approximation, control periods", **FLOOR)
+    scale_errors(axis)

@@ -7,14 +7,15 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 UNITS = {"control_period": "s"}
 # Ratio of the largest to the smallest number from which on an axis is logarithmic; names that there
-# is room for, or half of them where they are long; decades up to which an axis has 1, 2 and 5.
-WIDE, MOST_NAMES, LONG, FEW_DECADES = 30.0, 12, 6, 2.5
+# is room for, or half of them where they are long; decades up to which an axis has 1, 2 and 5; what
+# is below is written with a power of ten.
+WIDE, MOST_NAMES, LONG, FEW_DECADES, SMALL = 30.0, 12, 6, 2.5, 1e-4
 
 
 class Places(NamedTuple):
@@ -62,7 +63,7 @@ class Places(NamedTuple):
         steps = np.diff(self.at)
         if self.names or np.allclose(steps, steps.mean(), rtol=1e-6):
             return self
-        names = [f"{value:.4g}" for value in self.at]
+        names = [f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for value in self.at]
         return Places(np.arange(len(names)), self.label, names)
 
 
@@ -77,9 +78,12 @@ def places_of(dataset: xr.Dataset, name: str) -> Places:
     return Places(values, f"{words} ({unit})" if unit not in ("", "1") else words)
 
 
-def tick_decades(axis: Axis, low: float, high: float) -> None:
-    """Ticks of a logarithmic axis: 1, 2, 5 of each decade where there are few decades."""
+def tick_decades(
+    axis: Axis, low: float, high: float, subs: Sequence[float] = (1.0, 2.0, 5.0)
+) -> None:
+    """Ticks of a logarithmic axis: some of each decade where there are few decades."""
     if np.log10(high / low) < FEW_DECADES:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter("{x:g}")
+        axis.set_major_locator(LogLocator(subs=subs))
+        powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
+        axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
         axis.set_minor_formatter(NullFormatter())

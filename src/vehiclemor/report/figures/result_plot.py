@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.registry import component, unknown
+from vehiclemor.registry import component
 from vehiclemor.report.criteria.finding import at_point, without_single
 from vehiclemor.report.figures.curves import (
     PATH,
     Curve,
     Panel,
+    compared,
     draw_distances,
     draw_errors,
     draw_history,
@@ -30,11 +31,12 @@ from vehiclemor.report.figures.lines import (
     legend_outside,
     panels,
     styles,
+    tell_empty,
 )
 from vehiclemor.report.figures.places import tick_decades
 from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
-from vehiclemor.report.labels import label_of, marked, method_text, unit_of
+from vehiclemor.report.labels import full_label, marked, method_text, unit_of
 from vehiclemor.report.result_selection import drawn
 
 if TYPE_CHECKING:
@@ -66,8 +68,6 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
         If the kind is unknown, the dataset does not hold what is to be drawn, or the
         picture can't be written.
     """
-    if kind not in KINDS:
-        raise unknown("kind of plot", kind, KINDS)
     with styled():
         figure = _drawn(dataset, kind)
         if path is not None:
@@ -76,11 +76,11 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
 
 
 def _drawn(dataset: xr.Dataset, kind: str) -> Figure:
-    errors = {"rms_error", "signal_range"} <= set(dataset)
-    if not dataset.sizes.get("output") or not errors or "row" in dataset.dims:
+    if not dataset.sizes.get("output") or "row" in dataset.dims:
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     figure = DRAWINGS[kind](dataset)
     figure.suptitle(figure.get_suptitle() or _title(dataset), fontsize="medium", wrap=True)
+    tell_empty(figure)
     return figure
 
 
@@ -93,15 +93,19 @@ def figure_result(results: Results, *, kind: str) -> Figure:
     return _drawn(shown, kind)
 
 
+def _configuration(dataset: xr.Dataset) -> dict[str, Any]:
+    """What determines the result; a run that is no experiment has none."""
+    return json.loads(dataset.attrs.get("configuration", "{}"))
+
+
 def _model(dataset: xr.Dataset) -> str:
-    given = dataset.attrs.get("model") or json.loads(dataset.attrs["configuration"])["model"]
-    return str(given)
+    return str(dataset.attrs.get("model") or _configuration(dataset).get("model", "it"))
 
 
 def _title(dataset: xr.Dataset) -> str:
     """Title of the result; of one run with its input and how it has ended."""
-    title = str(dataset.attrs.get("title", ""))
-    (test,) = json.loads(dataset.attrs["configuration"]).get("test", [None])
+    title = str(dataset.attrs.get("title", _model(dataset)))
+    (test,) = _configuration(dataset).get("test", [None])
     if test:
         factors = "".join(
             f", {k} {test[k]:g}" for k in ("frequency", "amplitude") if test[k] != 1.0
@@ -129,32 +133,41 @@ def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
     if "method" in dataset.dims:
         return {str(label): at_point(dataset, label) for label in dataset["method"].values}
     given = dataset.coords.get("method")
-    label = json.loads(dataset.attrs["configuration"])["method"] if given is None else given.item()
+    label = _configuration(dataset).get("method", "run") if given is None else given.item()
     return {str(label): without_single(dataset)}
 
 
-def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve]]:
-    """A run with the full-order histories, and the reduced runs."""
-    if not dataset.sizes.get("time") or not {"outputs", "reference_outputs"} <= set(dataset):
+def _runs(dataset: xr.Dataset) -> tuple[xr.Dataset, list[Curve], bool]:
+    """A run with the full-order histories, the reduced runs, and whether they can be compared."""
+    if not dataset.sizes.get("time") or "outputs" not in dataset:
         raise InputError("no histories in this result (keep = metrics); choose the kind `errors`")
+    if alone := "reference_outputs" not in dataset:
+        dataset = dataset.assign(reference_outputs=np.nan * dataset["outputs"])
     points = _points(dataset)
-    first = next(iter(points.values()))
+    first = compared(points.values())
     left = [str(name) for name in first["status"].dims]
     if left:
         raise InputError(f"choose a point of the grid first: {', '.join(left)}")
-    reduced = [label for label in points if not label.startswith("full_order")]
+    reduced = [label for label in points if alone or not label.startswith("full_order")]
     shown = styles(reduced)
-    return first, [Curve(marked(method_text(m), run := points[m]), shown[m], run) for m in reduced]
+    curves = [Curve(_run_text(m, points[m]), shown[m], points[m]) for m in reduced]
+    return first, curves, bool(curves) and bool(first["reference_outputs"].notnull().any())
+
+
+def _run_text(label: str, run: xr.Dataset) -> str:
+    """What a legend says of a run: its method, and how it has ended if not well."""
+    status = str(run["status"].item())
+    return marked(method_text(label), run) + ("" if status == "ok" else f" ({status})")
 
 
 def figure_histories(dataset: xr.Dataset) -> Figure:
     """Outputs over the time, the differences from full order below each."""
-    full, curves = _runs(dataset)
+    full, curves, differences = _runs(dataset)
     outputs = shown_outputs(dataset)
     # Up to three panels beside each other, four in two rows.
     columns = len(outputs) if len(outputs) < 4 else 2
-    blocks, each = -(-len(outputs) // columns), 2 if curves else 1
-    size = (2.0 + 2.8 * columns, (3.4 if curves else 2.4) * blocks + 0.7)
+    blocks, each = -(-len(outputs) // columns), 2 if differences else 1
+    size = (2.0 + 2.8 * columns, (3.4 if differences else 2.4) * blocks + 0.7)
     heights = {"height_ratios": [2.0, 1.2][:each] * blocks}
     figure, axes = panels(blocks * each, columns, size, sharex=True, gridspec_kw=heights)
     ended: dict[str, str] = {}
@@ -162,7 +175,7 @@ def figure_histories(dataset: xr.Dataset) -> Figure:
         block, column = divmod(number, columns)
         panel = Panel(output, full, curves)
         ended |= draw_history(axes[each * block, column], panel, reach=1.0)
-        if curves:
+        if differences:
             _draw_differences(axes[each * block + 1, column], panel)
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
@@ -178,26 +191,30 @@ def _draw_differences(axis: Axes, panel: Panel) -> None:
     if len(panel.curves) == 1:
         draw_errors(axis, panel, floor=False)
         rms = panel.curves[0].run["rms_error"].sel(output=panel.output).item()
-        axis.set_title(f"RMS error {rms:.2g} {unit_of(panel.full, panel.output)}")
+        if np.isfinite(rms):
+            axis.set_title(f"RMS error {rms:.2g} {unit_of(panel.full, panel.output)}")
     else:
         period = float(panel.full["time"][-1]) / 50.0
         draw_largest_errors(axis, panel, period)
+        tick_decades(axis.yaxis, *axis.get_ylim(), subs=(1.0, 3.0))
         axis.set_ylabel(f"largest error\nper {period:.2g} s ({unit_of(panel.full, panel.output)})")
 
 
 def figure_paths(dataset: xr.Dataset) -> Figure:
     """Paths in the plane, and the distances from full order at the same time below."""
-    full, curves = _runs(dataset)
+    full, curves, differences = _runs(dataset)
     missing = set(PATH) - set(dataset["output"].values)
     if missing:
         raise InputError(f"{_model(dataset)} has no path: no output {', '.join(sorted(missing))}")
-    figure, axes = panels(2 if curves else 1, 1, (7.6, 5.4 if curves else 3.6), sharex=True)
+    size = (7.6, 5.4 if differences else 3.6)
+    figure, axes = panels(2 if differences else 1, 1, size, sharex=True)
     upper = axes[0, 0]
-    upper.plot(*positions(full["reference_outputs"]), label="full order", **FULL)
+    if differences or not curves:
+        upper.plot(*positions(full["reference_outputs"]), label="full order", **FULL)
     for text, style, run in curves:
         upper.plot(*positions(run["outputs"]), label=text, **style)
     upper.set_ylabel("Y (m)")
-    if curves:
+    if differences:
         draw_distances(axes[1, 0], curves)
     axes[-1, 0].set_xlabel("X (m), not to the scale of Y")
     legend_outside(figure, [upper], 0, place="lower")
@@ -206,6 +223,8 @@ def figure_paths(dataset: xr.Dataset) -> Figure:
 
 def figure_errors(dataset: xr.Dataset) -> Figure:
     """RMS errors: over the grid where there is one, else of all outputs of one point."""
+    if not {"rms_error", "signal_range"} <= set(dataset):
+        raise InputError("no errors in this result: it was not compared with full order")
     if "method" not in dataset.dims:
         (label,) = _points(dataset)
         dataset = dataset.expand_dims(method=[label])
@@ -226,10 +245,10 @@ def _errors_of_a_point(dataset: xr.Dataset) -> Figure:
         ratio = points[label]["rms_error"] / points[label]["signal_range"]
         share = 100.0 * ratio.where(np.isfinite(ratio) & (ratio > 0.0)).values
         look = {"color": style["color"], "marker": marker, "linestyle": "none", "markersize": 5}
-        text = marked(method_text(label), points[label])
-        axis.semilogx(share, places, label=text, **look)
+        exact = " (error 0)" if bool((points[label]["rms_error"] == 0.0).all()) else ""
+        axis.semilogx(share, places, label=_run_text(label, points[label]) + exact, **look)
     tick_decades(axis.xaxis, *axis.get_xlim())
-    axis.set_yticks(places, [label_of(name).words for name in names], fontsize=7)
+    axis.set_yticks(places, map(full_label, names), fontsize=7)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlabel("RMS error (% of the output's range)")
     legend_outside(figure, [axis], 0, place="lower")
@@ -241,4 +260,3 @@ DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
     "paths": figure_paths,
     "errors": figure_errors,
 }
-KINDS = tuple(DRAWINGS)

@@ -1,11 +1,11 @@
 """Which results a report is of: sections of studies and protocols, and of the paper's verdicts."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
-from pydantic import ValidationError
 
 from vehiclemor.arguments import count, file_path, quoted
 from vehiclemor.errors import FileError, InputError
@@ -20,6 +20,7 @@ from vehiclemor.report.html.protocol_section import protocol_section
 from vehiclemor.report.html.provenance import name_of
 from vehiclemor.report.html.study_section import study_section
 from vehiclemor.report.html.verdict_section import verdict_section
+from vehiclemor.study.failure import attempt_apart
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.run import run_studies
@@ -74,15 +75,16 @@ def write_report(
     left_out = dict(found.left_out)
     sections: list[Section] = []
     if found.timings and set(load_studies(PAPER)) <= set(found.studies):
-        sections.append(verdict_section(found.studies, found.timings))
+        made = partial(verdict_section, found.studies, found.timings)
+        sections += attempt_apart("comparison with the paper", left_out, made)
     for name, dataset in found.studies.items():
-        try:
-            section = protocol_section if "row" in dataset.dims else study_section
-            sections.append(section(dataset, folder))
-        except (KeyError, ValidationError):
-            if studies:
-                raise
-            left_out[name] = "stored by other source: vehiclemor run makes it again"
+        section = protocol_section if "row" in dataset.dims else study_section
+        made = attempt_apart(name, left_out, partial(section, dataset, folder, left_out))
+        sections += made
+        if not made and not studies:
+            left_out[name] += "; if other source has stored it, vehiclemor run makes it again"
+    if not sections:
+        raise InputError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
     return write_text(path, page(sections, left_out))
 
 
@@ -102,20 +104,16 @@ def _studies_of(name: str, folder: Path) -> list[str]:
 
 def _stored(folder: Path) -> Found:
     """All combined datasets that are stored, and the timings of the paper's models if all are."""
-    found = Found({}, {}, {})
-    paths = {path.stem: path for path in sorted((folder / "studies").glob("*.nc"))}
-    for name, path in paths.items():
+    every: dict[str, xr.Dataset] = {}
+    left_out: dict[str, str] = {}
+    for path in sorted((folder / "studies").glob("*.nc")):
         try:
-            dataset = read_dataset(path, "source", "vehiclemor")
+            every[path.stem] = read_dataset(path, "source", "vehiclemor")
         except FileError as error:
-            found.left_out[str(path)] = str(error).removeprefix(f"{path}: ")
-            continue
-        if "status" in dataset and "study" in dataset.attrs:
-            found.studies[name] = dataset
-    if not found.studies:
+            left_out[str(path)] = str(error).removeprefix(f"{path}: ")
+    studies = {n: d for n, d in every.items() if "status" in d and "study" in d.attrs}
+    if not studies:
         raise InputError(f"{folder}: no results of a study; vehiclemor run STUDY makes them")
-    models = printed_models()
-    if {f"timing-{model}" for model in models} <= set(paths):
-        timed = {m: read_dataset(paths[f"timing-{m}"], "source", "vehiclemor") for m in models}
-        found.timings.update(timed)
-    return found
+    timings = {model: f"timing-{model}" for model in printed_models()}
+    known = set(timings.values()) <= set(every)
+    return Found(studies, {m: every[n] for m, n in timings.items()} if known else {}, left_out)

@@ -30,6 +30,7 @@ from vehiclemor.report.labels import label_of, unit_of
 from vehiclemor.report.leaderboard import RULE, rank
 from vehiclemor.report.predictive.rows import draws_of, method_rows, protocol_of
 from vehiclemor.report.predictive.targets import Row, chosen, error_columns, target_rows
+from vehiclemor.study.failure import attempt_apart
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.ledger import Drawn
 from vehiclemor.study.plans.protocol_file import ProtocolFile
@@ -40,8 +41,8 @@ WORST_RUNS = 20
 COUNTS = ("misses", "silent", "flagged")
 
 
-def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
-    """Everything that a combined dataset of a protocol holds, within a bounded size."""
+def protocol_section(dataset: xr.Dataset, folder: Path, left_out: dict[str, str]) -> Section:
+    """What a combined dataset of a protocol holds; `left_out` is told what can't be drawn."""
     name, protocol = name_of(dataset), protocol_of(dataset)
     draws = draws_of(dataset, folder)
     rows = sorted(method_rows(dataset, protocol, draws), key=rank)
@@ -54,14 +55,18 @@ def protocol_section(dataset: xr.Dataset, folder: Path) -> Section:
     tables.append(_draws([draw for draw in draws if draw.rules == dataset.attrs["rules"]]))
     cells = {anchors[r["method"]]: _cell(r, anchors[r["method"]], dataset, folder) for r in rows}
     caption = "Worst error over its bound on the judged runs, over the time of a whole call."
-    with styled():
-        svg = svg_element(figure_pareto({name: dataset}), f"{name}-pareto", caption)
+
+    def picture() -> Picture:
+        with styled():
+            svg = svg_element(figure_pareto({name: dataset}), f"{name}-pareto", caption)
+        return Picture(caption, svg)
+
     return Section(
         f"study-{name}",
         str(dataset.attrs["title"]),
         _intro(dataset, rows, winner),
         [table for table in tables if table.rows],
-        [Picture(caption, svg)],
+        attempt_apart(f"errors over times of {name}", left_out, picture),
         runs_plot(name, judged_part(dataset), protocol) if available() else [],
         facts(dataset, cells),
         cells,

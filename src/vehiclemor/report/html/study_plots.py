@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.report.criteria.finding import at_point
+from vehiclemor.report.figures.curves import PATH, compared
 from vehiclemor.report.figures.lines import FULL, styles
 from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.interactive import (
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 # Points of a path, maps beside one another, and points of a map or of all curves.
 ON_A_PATH, MAPS, POINTS = 500, 6, 20_000
-PATH = ["longitudinal_position", "lateral_position"]
 
 
 def study_plots(dataset: xr.Dataset, name: str) -> list[Plot]:
@@ -53,12 +53,15 @@ def _paths(dataset: xr.Dataset) -> tuple[list[Any], str]:
     methods = [str(m) for m in point["method"].values]
     reduced = [m for m in methods if not m.startswith("full_order")]
     looks = styles(reduced)
-    curves = {"full order": (at_point(point, methods[0])["reference_outputs"], FULL)}
-    curves |= {method_text(m): (at_point(point, m)["outputs"], looks[m]) for m in reduced}
+    runs = {m: at_point(point, m) for m in methods}
+    curves = {"full order": (compared(runs.values())["reference_outputs"], FULL)}
+    curves |= {method_text(m): (runs[m]["outputs"], looks[m]) for m in reduced}
     every = slice(None, None, -(-point.sizes["time"] // ON_A_PATH))
     times = point["time"].values[every].astype("f4")
     for label, (outputs, style) in curves.items():
-        x, y = outputs.sel(output=PATH).transpose("output", "time").values[:, every].astype("f4")
+        x, y = (
+            outputs.sel(output=list(PATH)).transpose("output", "time").values[:, every].astype("f4")
+        )
         data: dict[str, Any] = {"x": x, "y": y, "time": times, "name": [label] * len(x)}
         made.line("x", "y", source=data, legend_label=legend_name(label), **look(style))
     at = f" at {words}" if words else ""
@@ -163,7 +166,9 @@ def _maps(tables: dict[str, Any], axes: list[str]) -> list[Any]:
         figure = new_figure(
             x.replace("_", " "), y.replace("_", " "), told, height=320, title=method_text(method)
         )
-        sizes = [np.ptp(source.data[a]) / max(len(set(source.data[a])) - 1, 1) or 1.0 for a in axes]
+        steps = [np.diff(np.unique(source.data[a])) for a in axes]
+        # At unequal steps there are gaps, and no cell lies on another.
+        sizes = [step.min() if step.size else 1.0 for step in steps]
         figure.rect(
             x, y, *sizes, source=source, fill_color=transform("error", colors), line_color=None
         )

@@ -1,12 +1,13 @@
 """A study on a grid as a section: errors of every cell, figures, paths and errors to look into."""
 
 import json
-from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import xarray as xr
 
-from vehiclemor.errors import InputError
+from vehiclemor.report.errors import counted_ends
+from vehiclemor.report.figures.curves import PATH
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
 from vehiclemor.report.html.cells import UNNAMED, stored_cell
@@ -17,6 +18,7 @@ from vehiclemor.report.html.study_plots import study_plots
 from vehiclemor.report.html.study_table import Place, error_table, places
 from vehiclemor.report.html.vector import svg_element
 from vehiclemor.report.result_selection import drawn
+from vehiclemor.study.failure import attempt_apart
 
 PICTURES = {
     "histories": "Outputs over the time, differences from full order below",
@@ -25,8 +27,8 @@ PICTURES = {
 }
 
 
-def study_section(dataset: xr.Dataset, folder: Path) -> Section:
-    """What a combined dataset of a grid holds, within a bounded size."""
+def study_section(dataset: xr.Dataset, folder: Path, left_out: dict[str, str]) -> Section:
+    """What a combined dataset of a grid holds; `left_out` is told what can't be drawn."""
     name, definition = name_of(dataset), json.loads(dataset.attrs["configuration"])
     rows = places(dataset)
     table = error_table(dataset, rows)
@@ -37,17 +39,17 @@ def study_section(dataset: xr.Dataset, folder: Path) -> Section:
         for row in reversed(rows)
         if row["anchor"] in linked
     }
-    ends = Counter(str(row["status"]) for row in rows)
-    told = ", ".join(f"{n} {status}" for status, n in sorted(ends.items()))
     what = f"Study {dataset.attrs['study']} of {dataset.attrs['model']}"
     size = f"{len(rows)} places of the grid, {len({row['anchor'] for row in rows})} cells"
+    plots = partial(study_plots, dataset, name)
+    plots = attempt_apart(f"plots of {name}", left_out, plots) if available() else []
     return Section(
         f"study-{name}",
         str(dataset.attrs["title"]),
-        [f"{what}, trained on: {definition['training']}. {size}: {told}."],
+        [f"{what}, trained on: {definition['training']}. {size}: {counted_ends(dataset)}."],
         [table],
-        _pictures(dataset, name),
-        study_plots(dataset, name) if available() else [],
+        _pictures(dataset, name, left_out),
+        plots[0] if plots else [],
         facts(dataset, cells),
         dict(reversed(cells.items())),
         source_text(dataset, folder),
@@ -64,29 +66,29 @@ def _cell(row: Place, dims: list[str], definition: dict, folder: Path) -> Cell:
     return Cell(f"place {', '.join(map(str, place.values()))}", known, UNNAMED)
 
 
-def _pictures(dataset: xr.Dataset, name: str) -> list[Picture]:
+def _pictures(dataset: xr.Dataset, name: str, left_out: dict[str, str]) -> list[Picture]:
     """Every kind of picture that the dataset has the data for; histories from every start."""
     starts = [str(start) for start in dataset["start"].values]
     found: list[Picture] = []
-    for kind, words in PICTURES.items():
+    held = {"histories": bool(dataset.sizes.get("time")), "errors": True}
+    held["paths"] = held["histories"] and set(PATH) <= set(dataset["output"].values)
+    for kind in filter(held.get, PICTURES):
         for start in starts if kind != "errors" else [""]:
-            chosen = {"start": start} if start else {}
-            try:
-                part = drawn(dataset, kind, chosen)[0]
-                if kind == "errors":
-                    part = part.drop_dims([d for d in ("time", "input") if d in part.dims])
-                # Of a large study only this is read.
-                figure = plot_result(part.load(), None, kind)
-            except InputError:
-                # The study has nothing of that kind.
-                break
-            at = figure.get_suptitle().removeprefix(str(dataset.attrs["title"])).strip("; ")
-            at = ", ".join(
-                filter(None, (at, f"start {start}" if len(starts) > 1 and start else ""))
-            )
-            caption = f"{words}{f': {at}' if at else ''}."
-            figure.suptitle("")
-            with styled():
-                svg = svg_element(figure, f"{name}-{kind}-{len(found)}", caption)
-            found.append(Picture(caption, svg))
+            picture = partial(_picture, dataset, kind, start, f"{name}-{kind}-{len(found)}")
+            found += attempt_apart(f"{kind} of {name}", left_out, picture)
     return found
+
+
+def _picture(dataset: xr.Dataset, kind: str, start: str, name: str) -> Picture:
+    part = drawn(dataset, kind, {"start": start} if start else {})[0]
+    if kind == "errors":
+        part = part.drop_dims([d for d in ("time", "input") if d in part.dims])
+    # Of a large study only this is read.
+    figure = plot_result(part.load(), None, kind)
+    at = figure.get_suptitle().removeprefix(str(dataset.attrs["title"])).strip("; ")
+    several = f"start {start}" if start and dataset.sizes["start"] > 1 else ""
+    at = ", ".join(filter(None, (at, several)))
+    caption = f"{PICTURES[kind]}{f': {at}' if at else ''}."
+    figure.suptitle("")
+    with styled():
+        return Picture(caption, svg_element(figure, name, caption))

@@ -10,6 +10,7 @@ from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.html.parts import MISSING, Entry, Table, count, quantity
 from vehiclemor.report.html.provenance import name_of
 from vehiclemor.report.labels import TRAINED, label_of, method_text, unit_of
+from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_file import PARAMETER
 
 # A table with more rows is summed up.
@@ -74,9 +75,10 @@ def _every(rows: Sequence[Place], outputs: dict[str, str], grid: list[str]) -> T
         line += [count(int(row[name]), anchor) for name in counts]
         status = str(row["status"])
         said = row["message"] if status != "ok" else row["remark"] if row["warned"] else ""
+        kind = "missed" if status not in FINISHED else "other" if said else "met"
         status += f" ({TRAINED})" if row.get("in_training") else ""
         told = f"{status}: {said}" if said else status
-        entries.append([*line, Entry(told, None, anchor, "missed" if said else "met")])
+        entries.append([*line, Entry(told, None, anchor, kind)])
     return Table("Every place of the grid", _words(heads), entries, NOTE)
 
 

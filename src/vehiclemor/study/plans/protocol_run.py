@@ -170,7 +170,8 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
         sample = protocol.sets["validation"][:TIMED]
         experiments = {rows[i].label: _experiment(protocol, rows[i], sample) for i in fitting}
         every = np.ones((len(experiments), len(sample)), dtype=bool)
-        timed = _timed(_beside("timing-validation", path), experiments, every)
+        what = f"validation set of {protocol.study}"
+        timed = _timed(_beside("timing-validation", path), experiments, every, what)
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda i: results[i].score)
@@ -196,7 +197,8 @@ def timed_rows(
     experiments = {row.label: _experiment(protocol, row, sample) for row in rows}
     ends = [found["status"].values[: len(sample)] for found in tested[name]]
     finished = np.isin(np.array(ends), FINISHED)
-    return _timed(_beside("timing", path), experiments, finished)
+    what = f"test set of {protocol.study}"
+    return _timed(_beside("timing", path), experiments, finished, what)
 
 
 def _beside(what: str, path: Path) -> Path:
@@ -208,12 +210,14 @@ def _experiment(protocol: Protocol, row: Row, scenarios: tuple[Scenario, ...]) -
     return row.contestant.experiment(protocol.model, row.candidate, scenarios)
 
 
-def _timed(path: Path, experiments: dict[str, Experiment], finished: np.ndarray) -> xr.Dataset:
+def _timed(
+    path: Path, experiments: dict[str, Experiment], finished: np.ndarray, what: str
+) -> xr.Dataset:
     content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(
         path,
         [content, timing.PROTOCOL_ROUNDS],
-        lambda: timing.timed_tests(experiments, finished),
+        lambda: timing.timed_tests(experiments, finished, what=what),
     )
 
 
