@@ -311,7 +311,8 @@ def plot(
     Parameters
     ----------
     result
-        Dataset of `simulate` or `run_study`, a netCDF file, or the name of a study that was run.
+        Dataset of `simulate`, `run_study` or a reduced model, a netCDF file, or the name of a study
+        that was run.
     kind
         `histories` of outputs, `paths`, or `errors`.
     path

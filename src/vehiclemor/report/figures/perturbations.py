@@ -14,7 +14,8 @@ from vehiclemor.report.labels import error_label
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.study.plans.study_file import FACTORS
 
-MARKERS = {"pod": "o", "pod_literal": "x", "fixed_basis": "s", "replay": "."}
+# None is a mark of what a logarithmic axis can't show.
+MARKERS = {"pod": "o", "pod_literal": "D", "fixed_basis": "s", "replay": "."}
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5}
 
 
