@@ -117,10 +117,10 @@ def test_a_bug_in_a_check_ends_no_study(run, monkeypatch):
 def test_a_bug_after_a_run_that_went_well_ends_no_study(run, monkeypatch):
     measured = evaluate.metrics_dataset
 
-    def broken(model, experiment, outcome, reduced):
+    def broken(model, experiment, outcome, *more):
         if experiment.method == "pod" and not isinstance(outcome, Failure):
             raising()
-        return measured(model, experiment, outcome, reduced)
+        return measured(model, experiment, outcome, *more)
 
     monkeypatch.setattr(evaluate, "metrics_dataset", broken)
     assert run("pod") == ["error", "error"]

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 # Group of a file that ends with the hash of its bytes, and what stands before that hash: behind the
 # data, where no reader of netCDF looks.
 INTEGRITY, SEAL = "integrity", b"\nvehiclemor sha256 "
-HASH = "the last 64 bytes: of all before the line that they are on"
 # What reads a file of others, and the seconds that it may take.
 READ = """
 import sys, netCDF4
@@ -101,7 +100,7 @@ def _write(path: Path, fill: Callable[[netCDF4.Dataset], object], size: int) -> 
         try:
             with netCDF4.Dataset(temporary, "w") as file:
                 fill(file)
-                file.createGroup(INTEGRITY).sha256 = HASH
+                file.createGroup(INTEGRITY)
             _seal(temporary)
         except (OSError, RuntimeError):
             # The library hides the reason; plain writing of as much as there is tells it.
@@ -131,7 +130,11 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
-    with _opened(path, attribute, expected) as file:
+    mend = "; move it away and run again"
+    with opened(path, "result file", mend) as file:
+        if getattr(file, attribute, None) != expected:
+            reason = f"not the result that belongs here ({attribute} is not {expected})"
+            raise SpoiledError(reason, path, mend)
         if path.stat().st_size < LARGE:
             file.set_auto_maskandscale(True)
             return xr.open_dataset(NetCDF4DataStore(file)).load()
@@ -174,16 +177,6 @@ def global_attributes(path: Path) -> dict[str, Any]:
             return {name: file.getncattr(name) for name in file.ncattrs()}
     except (OSError, ValueError):
         return {}
-
-
-@contextmanager
-def _opened(path: Path, attribute: str, expected: str) -> Iterator[netCDF4.Dataset]:
-    """A result file that is whole and the expected one."""
-    with opened(path, "result file", "; move it away and run again") as file:
-        if getattr(file, attribute, None) != expected:
-            reason = f"not the result that belongs here ({attribute} is not {expected})"
-            raise SpoiledError(reason, path, "; move it away and run again")
-        yield file
 
 
 @contextmanager
