@@ -160,7 +160,7 @@ def _failed(experiment: Experiment, model: Model, failure: Failure) -> xr.Datase
 def layout_of(experiment: Experiment) -> Layout:
     """What the result of an experiment holds, whatever becomes of it."""
     test = experiment.test
-    like = experiment.model, experiment.keep, len(test), test[0].maneuver.samples
+    like = experiment.kernel, experiment.keep, len(test), test[0].maneuver.samples
     if like not in _LAYOUTS:
         failed = _failed(experiment, model_of(experiment), Failure("error", ""))
         _LAYOUTS[like] = layout(encoded(failed, ""), "")
