@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, number, quoted, real_array
-from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.errors import InputError, UnreachableError, VehiclemorError
 from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def _summaries(kind: str, attribute: str) -> dict[str, str]:
     for name in names(kind):
         try:
             lines[name] = str(getattr(component(kind, name), attribute))
-        except InputError as error:
+        except VehiclemorError as error:
             lines[name] = f"broken: {error}"
     return lines
 

@@ -10,7 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError, did_you_mean, one_line
+from vehiclemor.errors import InputError, PlugInError, blame, did_you_mean
 
 GROUPS = {
     "model": "vehiclemor.models",
@@ -37,7 +37,7 @@ def component(kind: str, name: str) -> Any:
     ------
     InputError
         If no component of that kind has the name (the nearest names are listed), or if it is a
-        plug-in that can't be imported, or is something else.
+        plug-in that can't be imported, or is something else (`PlugInError`).
     """
     entries = _entries(kind)
     if not isinstance(name, str) or name not in entries:
@@ -46,15 +46,15 @@ def component(kind: str, name: str) -> Any:
     try:
         loaded = entries[name].load()
     # A module may even end the interpreter.
-    except (Exception, SystemExit) as error:
-        raise InputError(f"{where} can't be imported: {one_line(error)}") from error
+    except BaseException as error:
+        raise blame(f"{where} can't be imported", entries[name].module, error) from error
     wanted = _class(kind)
     if not isinstance(loaded, wanted):
         found = type(loaded).__name__
-        raise InputError(f"{where} is of type {found}: it must be a {wanted.__name__}")
+        raise PlugInError(f"{where} is of type {found}: it must be a {wanted.__name__}")
     # Models are built again by their own names.
     if kind == "model" and loaded.name != name:
-        raise InputError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
+        raise PlugInError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
     return loaded
 
 

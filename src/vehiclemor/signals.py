@@ -230,7 +230,7 @@ class Signal(Maneuver):
         """
         within("duration of a signal", number("duration", duration), (0.0, LONGEST_DURATION), " s")
         times = np.linspace(0.0, duration, _output_samples(duration, step))
-        with blamed("function of a signal"):
+        with blamed("function of a signal", function):
             values = function(times)
         return cls.from_samples(times, values, hold, inputs=inputs, **further)
 

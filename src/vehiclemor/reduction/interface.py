@@ -143,13 +143,13 @@ class Method(ShortRepr):
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")
-        with blamed(f"method {self.name!r}: settings"):
+        with blamed(f"method {self.name!r}: settings", self.fit):
             wrong = [kind for kind, s in self.settings.items() if not issubclass(s, Settings)]
         if wrong:
             raise InputError(
                 f"method {self.name!r}: settings of {wrong[0]} are no class of Settings"
             )
-        with blamed(f"method {self.name!r}: presets"):
+        with blamed(f"method {self.name!r}: presets", self.fit):
             for kind, presets in self.presets.items():
                 for preset, name in ((p, n) for p, values in presets.items() for n in values):
                     if name not in self.names_of(kind):
@@ -164,7 +164,7 @@ class Method(ShortRepr):
             kinds = " or ".join(self.settings)
             return False, f"{self.name} reduces kind {kinds}; {model.name} is of kind {model.kind}"
         try:
-            with blamed(f"method {self.name!r}: refusal"):
+            with blamed(f"method {self.name!r}: refusal", self.refusal):
                 reason = self.refusal(model)
         except InputError as error:
             reason = str(error)
