@@ -16,6 +16,13 @@ def quoted(value: object) -> str:
     return shortened(repr(value))
 
 
+def line_of_text(name: str, value: object) -> str:
+    """A text in one line without control characters; `InputError` if it is none."""
+    if not isinstance(value, str) or not value.isprintable():
+        raise InputError(f"{name} is {quoted(value)}, not a line of text")
+    return value
+
+
 def real_array(value: Any) -> np.ndarray:
     """Floats of a number or of nested lists of numbers.
 

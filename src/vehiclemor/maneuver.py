@@ -11,7 +11,7 @@ from types import ModuleType
 
 import numpy as np
 
-from vehiclemor.arguments import count, number, quoted, real_array, within
+from vehiclemor.arguments import count, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, PlugInError, blamed
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
@@ -69,8 +69,8 @@ class Maneuver(ShortRepr):
 
     def __post_init__(self) -> None:
         """Refuse what is no maneuver, so that its author reads one clear line."""
-        if not isinstance(self.name, str) or not isinstance(self.summary, str):
-            raise InputError("name and summary of a maneuver must be text")
+        for text in ("name", "summary"):
+            line_of_text(f"{text} of a maneuver", getattr(self, text))
         for function in ("signal", "corners"):
             if not callable(getattr(self, function)):
                 raise InputError(f"{self}: {function} is not a function")

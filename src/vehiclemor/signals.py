@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, number, quoted, real_array, within
+from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
@@ -107,8 +107,8 @@ class Signal(Maneuver):
             raise unknown("hold", hold, HOLDS)
         times, values = _samples(t, u)
         names = _names(inputs, values.shape[1])
-        if not isinstance(name, str) or not name:
-            raise InputError(f"name is {quoted(name)}, not a text")
+        if not line_of_text("name", name):
+            raise InputError("name is empty")
         (pieces,) = through(times, values[None], hold)
         duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
         return _template()._with(

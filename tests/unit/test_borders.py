@@ -162,7 +162,7 @@ GOOD = {
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"name": 3}, ["name and summary of a maneuver must be text"]),
+        ({"name": 3}, ["name of a maneuver is 3, not a line of text"]),
         ({"duration": -1.0}, ["duration is -1 s, not positive"]),
         ({"duration": "5"}, ["duration: '5' is not a number"]),
         ({"duration": 1e300}, ["duration: 1e+300 s is above 100000 s"]),

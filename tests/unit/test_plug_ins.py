@@ -235,7 +235,8 @@ def test_a_broken_refusal_refuses(faulty, tmp_path, change, words):
         ("settings={'ae': dict}", "method 'faulty': settings of ae are no class of Settings"),
         ("presets=None", "method 'faulty': presets: AttributeError"),
         ("presets={'ae': {'mine': {'rnk': 3}}}", "preset 'mine' sets 'rnk', which is no setting"),
-        ("summary=None", "method 'faulty': summary is not text"),
+        ("summary=None", "method 'faulty': summary is None, not a line"),
+        ("summary='\\x1b[2Jgone'", r"summary is '\x1b[2Jgone', not a line of text"),
         ("fit=3", "method 'faulty': fit is not a function"),
     ],
 )
@@ -298,7 +299,7 @@ def car(plug_in, plug_in_package, tmp_path):
         ("faulty(starts=lambda p: {'a': [0.0]})", r"start 'a' has shape \(1,\), faulty needs"),
         ("faulty(starts=lambda p: {'a': [np.nan] * 4})", r"start 'a'\[0\] is not finite"),
         ("faulty(solved=('a',))", "model 'faulty': solve_equilibrium: KeyError: 'a'"),
-        ("faulty(summary=None)", "name and summary of a model must be text"),
+        ("faulty(summary=None)", "summary of a model is None, not a line of text"),
         ("faulty(coordinates=('a', 'b'))", "coordinates must be quantities with units"),
         ("faulty(outputs=())", "outputs are missing or named twice"),
         ("faulty(parameters={'a': 3})", "parameter 'a' is not declared by a unit"),

@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
@@ -138,8 +138,7 @@ class Method(ShortRepr):
     def __post_init__(self) -> None:
         """Refuse what is no method, so that its author reads one clear line."""
         for name in ("name", "summary", "reference"):
-            if not isinstance(getattr(self, name), str):
-                raise InputError(f"method {quoted(self.name)}: {name} is not text")
+            line_of_text(f"method {quoted(self.name)}: {name}", getattr(self, name))
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")

@@ -92,7 +92,7 @@ def check_boxes(model: Model, definition: ProtocolFile) -> None:
             try:
                 _check_corners(model, box)
             except InputError as error:
-                raise InputError(f"{purpose}, box {number}: {error}") from None
+                raise type(error)(f"{purpose}, box {number}: {error}") from None
 
 
 def _check_corners(model: Model, box: Box) -> None:

@@ -4,7 +4,7 @@ import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vehiclemor.errors import FileError, GeometryError, InputError
+from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, unknown
@@ -103,6 +103,8 @@ def load_protocol(protocol: str) -> Protocol:
     definition = read_toml(path, ProtocolFile)
     try:
         return _resolved(path, definition)
+    except PlugInError:
+        raise
     except (GeometryError, InputError) as error:
         raise FileError(f"{path}: {error}") from None
 
@@ -138,7 +140,7 @@ def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenar
             runs = _of_group(model, group)
             found += by_cars(model, runs, definition.cars) if group.cars else runs
         except InputError as error:
-            raise InputError(f"{key}, group {number}: {error}") from None
+            raise type(error)(f"{key}, group {number}: {error}") from None
     return tuple(found)
 
 

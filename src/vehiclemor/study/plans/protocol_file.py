@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from vehiclemor.toml_files import FileSchema
+from vehiclemor.toml_files import FileSchema, Line
 
 
 class Bound(FileSchema):
@@ -28,7 +28,9 @@ class Group(FileSchema):
         default_factory=list, description="initial conditions; the model's first by default"
     )
     points: list[list[float]] = Field(
-        default_factory=list, description="[frequency, amplitude] or [frequency, amplitude, speed]"
+        default_factory=list,
+        min_length=1,
+        description="[frequency, amplitude] or [frequency, amplitude, speed]",
     )
     frequency: list[float] = Field(default_factory=list, description="factors, 1 by default")
     amplitude: list[float] = Field(default_factory=list, description="factors, 1 by default")
@@ -97,7 +99,7 @@ class Draw(FileSchema):
 class ContestantEntry(FileSchema):
     """One method with candidates for its settings."""
 
-    label: str = Field(min_length=1, description="name of its row")
+    label: Line = Field(description="name of its row")
     method: str = Field(description="registered name")
     role: Literal["full order", "baseline", "contender"] = Field(
         "contender", description="of full order every candidate has a row; a contender chooses one"
@@ -138,7 +140,7 @@ class Straight(FileSchema):
 class ProtocolFile(FileSchema):
     """Schema of `data/protocols/*.toml`."""
 
-    title: str = Field(description="one line")
+    title: Line = Field(description="one line")
     model: str = Field(description="registered name")
     bounds: dict[str, Bound] = Field(min_length=1, description="output -> largest allowed error")
     reported: list[str] = Field(

@@ -14,7 +14,7 @@ from vehiclemor.registry import unknown
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.toml_files import FileSchema, has_table, read_toml
+from vehiclemor.toml_files import FileSchema, Line, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
@@ -72,7 +72,7 @@ class MethodEntry(FileSchema):
     """One method of a study: settings that differ from a preset, under a label of its own."""
 
     method: str = Field(description="registered name")
-    label: str = Field("", description="name of its results; the method's by default")
+    label: Line = Field("", description="name of its results; the method's by default")
     preset: str = Field("recommended", description="preset that its settings differ from")
     settings: dict[str, int | float | str] = Field(
         default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
@@ -88,7 +88,7 @@ class StudyFile(FileSchema):
     `study/plans/protocol.py`).
     """
 
-    title: str = Field(description="one line")
+    title: Line = Field(description="one line")
     studies: list[str] = Field(
         default_factory=list, description="of a collection: names of studies, or TOML files"
     )
