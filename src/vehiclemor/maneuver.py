@@ -81,7 +81,7 @@ class Maneuver(ShortRepr):
         if number(f"{self}: duration", self.duration) <= 0.0:
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
-        within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
+        count(f"{self}: samples", self.samples, most=MOST_SAMPLES)
         for name in FACTORS:
             factor = checked_factor(name, getattr(self, f"{name}_factor"))
             object.__setattr__(self, f"{name}_factor", factor)

@@ -179,7 +179,7 @@ def overridden(
         If an override names no parameter or has a wrong shape or value.
     """
     if not isinstance(overrides, Mapping):
-        raise InputError(f"parameters must be a mapping of names to values, not {overrides!r}")
+        raise InputError(f"parameters is {quoted(overrides)}, not a mapping of names to values")
     model, entries = parameters.model, dict(parameters.entries)
     for given, value in overrides.items():
         name, axis = parameter_and_axis(model, expected, given)
@@ -207,7 +207,7 @@ def parameter_and_axis(
     InputError
         If the model has no such parameter.
     """
-    whole, _, axis = name.partition(".")
+    whole, _, axis = str(name).partition(".")
     declared = expected.get(name, expected.get(whole))
     if declared is None:
         hint = did_you_mean(whole, expected) or f"it has {', '.join(expected)}"

@@ -4,7 +4,7 @@ An entry point of the group `vehiclemor.models` names a `ModelDefinition`, one o
 `vehiclemor.methods` a `Method`, one of `vehiclemor.maneuvers` a `Maneuver`.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -40,8 +40,7 @@ def component(kind: str, name: str) -> Any:
         plug-in that can't be imported, or is something else (`PlugInError`).
     """
     entries = _entries(kind)
-    if not isinstance(name, str) or name not in entries:
-        raise unknown(kind, name, entries)
+    choice(kind, name, entries)
     where = f"{kind} {name!r} ({entries[name].value})"
     try:
         loaded = entries[name].load()
@@ -58,6 +57,13 @@ def component(kind: str, name: str) -> Any:
     return loaded
 
 
+def choice(kind: str, name: Any, known: Collection[str]) -> str:
+    """The name; `InputError` if it is none of the known ones."""
+    if isinstance(name, str) and name in known:
+        return name
+    raise unknown(kind, name, known)
+
+
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     """Error for an unknown name, with the nearest known ones."""
     known = sorted(known)
@@ -72,8 +78,7 @@ def _class(kind: str) -> type:
 
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
-    if kind not in GROUPS:
-        raise unknown("kind of component", kind, GROUPS)
+    choice("kind of component", kind, GROUPS)
     found: dict[str, EntryPoint] = {}
     # Sorted so that a built-in comes last: no plug-in takes its name away.
     for entry in sorted(entry_points(group=GROUPS[kind]), key=_is_built_in):

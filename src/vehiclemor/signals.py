@@ -14,7 +14,7 @@ from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_a
 from vehiclemor.errors import InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.sample_loops import Pieces
 from vehiclemor.signal_columns import array_columns, csv_columns
 from vehiclemor.units import base_units
@@ -103,8 +103,7 @@ class Signal(Maneuver):
         InputError
             If times don't increase, a value isn't finite, or shapes don't fit.
         """
-        if hold not in HOLDS:
-            raise unknown("hold", hold, HOLDS)
+        choice("hold", hold, HOLDS)
         times, values = _samples(t, u)
         names = _names(inputs, values.shape[1])
         if not line_of_text("name", name):
@@ -151,12 +150,13 @@ class Signal(Maneuver):
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
+        frequency = checked_factor("frequency", frequency)
+        amplitude = checked_factor("amplitude", amplitude)
         if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
             return self
-        frequency = checked_factor("frequency", frequency)
         return self._with(
             frequency_factor=frequency,
-            amplitude_factor=checked_factor("amplitude", amplitude),
+            amplitude_factor=amplitude,
             duration=float(self.pieces.edges[-1]) / frequency,
         )
 
@@ -369,6 +369,7 @@ def _output_samples(duration: float, step: Any) -> int:
     """Number of times about so many seconds apart."""
     if number("step", step) <= 0.0:
         raise InputError(f"step: {step:g} s is not positive")
+    within("step", step, (0.0, LONGEST_DURATION), " s")
     samples = max(round(duration / step), 1) + 1
     return int(within("number of samples", samples, (2, MOST_SAMPLES)))
 

@@ -45,8 +45,10 @@ def result_file(option: str, path: Path) -> Path:
     Raises
     ------
     InputError, FileError
-        If it can't be written, or what stands there is something else.
+        If it has another ending, can't be written, or what stands there is something else.
     """
+    if path.suffix.lower() != ".nc":
+        raise InputError(f"{option} {path}: the file ends with .nc")
     from vehiclemor.study.netcdf_file import read_dataset
 
     if _exists(option, path):

@@ -10,7 +10,7 @@ import numpy as np
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
@@ -64,8 +64,7 @@ def selected(model: Model, outputs: Any, times: Any) -> Selection:
         raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
     columns = []
     for name in chosen:
-        if name not in known:
-            raise unknown("output", name, known)
+        choice("output", name, known)
         states = len(model.definition.states)
         if name in model.outputs:
             columns.append(states + model.outputs.index(name))

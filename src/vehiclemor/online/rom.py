@@ -216,8 +216,11 @@ class ReducedOrderModel(ShortRepr):
         return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
-        """Time derivative (dim,) of a state."""
-        return self.state_space.rates(self._state(state), self._inputs(inputs), time)
+        """Time derivative (dim,) of a state; `InputError` if it isn't finite."""
+        rates = self.state_space.rates(self._state(state), self._inputs(inputs), time)
+        if not np.isfinite(rates).all():
+            raise InputError(f"the derivative of {self._name} is not finite at this state")
+        return rates
 
     def jacobian(
         self,

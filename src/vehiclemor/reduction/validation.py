@@ -13,7 +13,7 @@ from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.training import Training
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
 
@@ -43,12 +43,10 @@ def validated(
         If a name is not declared, or a value has the wrong kind or is out of bounds.
     """
     presets = method.presets_of(kind)
-    if not isinstance(preset, str) or preset not in presets:
-        raise unknown(f"preset of {method.name}", preset, presets)
+    choice(f"preset of {method.name}", preset, presets)
     declared = method.settings.get(kind, Settings)
     for name in given:
-        if name not in declared.model_fields:
-            raise unknown(f"setting of {method.name}", name, declared.model_fields)
+        choice(f"setting of {method.name}", name, declared.model_fields)
     chosen: dict[str, Any] = dict(presets[preset])
     with blamed(f"method {method.name!r}: settings", declared):
         for name, field in declared.model_fields.items():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.codegen.tangent import tangent
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
     from vehiclemor.codegen.derivation import Derivation
@@ -61,8 +61,7 @@ def components(definition: ModelDefinition, name: str) -> range:
     InputError
         If it is no parameter of the model.
     """
-    if name not in definition.parameters:
-        raise unknown("parameter", name, definition.parameters)
+    choice("parameter", name, definition.parameters)
     place = 0
     for known, declared in definition.parameters.items():
         if known == name:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vehiclemor.arguments import number
 from vehiclemor.codegen.loops import Prepared, Ready, cache_lines, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
@@ -211,11 +212,11 @@ class DynamicModel(Model):
             maneuver,
             self.start(start),
             whole_space(2 * len(self.coordinates)),
-            solver or "dopri5",
+            "dopri5" if solver is None else solver,
             REFERENCE_TOLERANCE if tolerance is None else tolerance,
             times,
             longest_step,
-            begin,
+            begin if type(begin) is float else number("begin", begin),
         )
         if trajectory.status != "ok":
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import component, unknown
+from vehiclemor.registry import choice, component
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol_file import Box, Draw, ProtocolFile
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
@@ -98,8 +98,7 @@ def check_boxes(model: Model, definition: ProtocolFile) -> None:
 def _check_corners(model: Model, box: Box) -> None:
     maneuver: Maneuver = component("maneuver", box.maneuver)
     for start in box.start:
-        if start not in model.starts:
-            raise unknown(f"start of {model.name}", start, model.starts)
+        choice(f"start of {model.name}", start, model.starts)
     for frequency in box.frequency:
         for speed in box.speed or [None]:
             for amplitude in box.amplitude:

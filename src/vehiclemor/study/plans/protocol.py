@@ -7,7 +7,7 @@ from pathlib import Path
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.registry import component, unknown
+from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -115,8 +115,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     if definition.straight:
         outputs.append(definition.straight.output)
     for output in outputs:
-        if output not in model.outputs:
-            raise unknown(f"output of {model.name}", output, model.outputs)
+        choice(f"output of {model.name}", output, model.outputs)
     sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
     check_boxes(model, definition)
@@ -127,8 +126,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
             raise InputError(f"label {label!r} is used twice")
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
-        if target.against not in known:
-            raise unknown("row that a target is against", target.against, known)
+        choice("row that a target is against", target.against, known)
     return Protocol(path, definition, model, sets, contestants)
 
 
@@ -191,8 +189,7 @@ def _contestant(
         candidates.append(complete)
     known = {scenario.maneuver.name for scenario in sets["training"]}
     for name in entry.train_on:
-        if name not in known:
-            raise unknown(f"maneuver in the training of {where}", name, known)
+        choice(f"maneuver in the training of {where}", name, known)
     training = tuple(
         s for s in sets["training"] if not entry.train_on or s.maneuver.name in entry.train_on
     )
