@@ -93,9 +93,8 @@ def file_path(name: str, value: object) -> Path:
     InputError
         If it is no path, or an empty one.
     """
-    text = str(value) if isinstance(value, str | os.PathLike) and os.fspath(value) else "\0"
     # Control characters, "\0" among them, would break an error into several lines.
-    if min(text) < " ":
+    if not isinstance(value, str | os.PathLike) or min(str(value), default="\0") < " ":
         raise InputError(f"{name}: {quoted(value)} is not a path")
     path = Path(value)
     try:

@@ -179,7 +179,7 @@ def overridden(
         If an override names no parameter or has a wrong shape or value.
     """
     if not isinstance(overrides, Mapping):
-        raise InputError(f"parameters is {quoted(overrides)}, not a mapping of names to values")
+        raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     model, entries = parameters.model, dict(parameters.entries)
     for given, value in overrides.items():
         name, axis = parameter_and_axis(model, expected, given)

@@ -14,6 +14,7 @@ from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -151,11 +152,7 @@ class Method(ShortRepr):
         with blamed(f"method {self.name!r}: presets", self.fit):
             for kind, presets in self.presets.items():
                 for preset, name in ((p, n) for p, values in presets.items() for n in values):
-                    if name not in self.names_of(kind):
-                        raise InputError(
-                            f"method {self.name!r}: preset {preset!r} sets {name!r}, "
-                            f"which is no setting of kind {kind}"
-                        )
+                    choice(f"setting in preset {preset!r} of {kind}", name, self.names_of(kind))
 
     def accepts(self, model: Model) -> tuple[bool, str]:
         """Whether the method can reduce a model, and why not; a broken refusal refuses."""

@@ -1,6 +1,6 @@
 """The border of methods: settings that come in, and what a fit and its runs give back."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,9 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
+
+# Pydantic's word for a bound -> ours.
+BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
 
 
 def validated(
@@ -126,14 +129,12 @@ def checked_run(model: Model, maneuver: Maneuver, start: Start, reduced: Any) ->
     whose += " gives"
     if not isinstance(run, Trajectory):
         raise PlugInError(f"{whose} {quoted(run)}, no Trajectory")
-    samples = maneuver.samples
-    for name in ("coordinates", "speeds", "outputs"):
-        shape = (samples, len(getattr(model, name)))
+    columns = {name: (len(getattr(model, name)),) for name in ("coordinates", "speeds", "outputs")}
+    for name, size in {"time": (), **columns}.items():
+        shape = (maneuver.samples, *size)
         found = np.asarray(getattr(run, name))
         if found.shape != shape or found.dtype != float:
             raise PlugInError(f"{whose} {name} {found.shape} of {found.dtype}, not {shape} floats")
-    if np.shape(run.time) != (samples,):
-        raise PlugInError(f"{whose} {np.size(run.time)} times, not the {samples} of the maneuver")
     if run.status not in STATUSES or not isinstance(run.seconds, float | int):
         raise PlugInError(f"{whose} status {run.status!r} and seconds {quoted(run.seconds)}")
     if not isinstance(run.counts, Mapping):
@@ -144,19 +145,12 @@ def checked_run(model: Model, maneuver: Maneuver, start: Start, reduced: Any) ->
 def _wrong(error: Any) -> str:
     """What is wrong with a value, in the words of this package."""
     value, limits = error["input"], error.get("ctx", {})
-    words: dict[str, Callable[[], str]] = {
-        "greater_than_equal": lambda: f"is {value:g}; it must be at least {limits['ge']:g}",
-        "greater_than": lambda: f"is {value:g}; it must be above {limits['gt']:g}",
-        "less_than_equal": lambda: f"is {value:g}; it must be at most {limits['le']:g}",
-        "less_than": lambda: f"is {value:g}; it must be below {limits['lt']:g}",
-        "int_type": lambda: f"is {quoted(value)}, not an integer",
-        "float_type": lambda: f"is {quoted(value)}, not a number",
-        "string_type": lambda: f"is {quoted(value)}; allowed: text",
-        "literal_error": lambda: f"is {quoted(value)}; allowed: {_listed(limits['expected'])}",
-    }
-    return words.get(error["type"], lambda: error["msg"].removeprefix("Value error, "))()
-
-
-def _listed(expected: str) -> str:
-    """Pydantic's "'a', 'b' or 'c'" as "a, b, c"."""
-    return expected.replace(" or ", ", ").replace("'", "")
+    for limit, words in BOUNDS.items():
+        if limit in limits:
+            return f"is {value:g}; it must be {words} {limits[limit]:g}"
+    allowed = limits.get("expected", "text").replace(" or ", ", ").replace("'", "")
+    kinds = {"int_type": ", not an integer", "float_type": ", not a number"}
+    kinds |= dict.fromkeys(("string_type", "literal_error"), f"; allowed: {allowed}")
+    if error["type"] in kinds:
+        return f"is {quoted(value)}{kinds[error['type']]}"
+    return error["msg"].removeprefix("Value error, ")

@@ -61,13 +61,10 @@ def components(definition: ModelDefinition, name: str) -> range:
     InputError
         If it is no parameter of the model.
     """
-    choice("parameter", name, definition.parameters)
-    place = 0
-    for known, declared in definition.parameters.items():
-        if known == name:
-            break
-        place += declared.size
-    return range(place, place + definition.parameters[name].size)
+    declared = definition.parameters
+    place = [*declared].index(choice("parameter", name, declared))
+    first = sum(before.size for before in [*declared.values()][:place])
+    return range(first, first + declared[name].size)
 
 
 def constants_along(

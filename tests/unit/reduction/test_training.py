@@ -37,7 +37,7 @@ def test_run_is_exact_at_any_times(
 def test_a_run_has_the_histories_of_its_trajectory(
     model: AlgebraicModel, nominal: Maneuver
 ) -> None:
-    [run] = training_runs(model, nominal, model.starts[0], "matched")
+    [run] = training_runs(model, nominal)
     recorded = run.recorded()
     for name in ("time", "inputs", "states", "outputs"):
         np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))

@@ -50,9 +50,7 @@ LINEARITY_TOLERANCE = 1e-12
 class PolynomialResidualSettings(Settings):
     """Settings for a kinematic model."""
 
-    rank: Annotated[int, AT_MOST_COORDINATES] = Field(
-        3, ge=1, description="number of reduced coordinates"
-    )
+    rank: Annotated[int, AT_MOST_COORDINATES] = Field(3, ge=1, description="reduced coordinates")
     degree: int = Field(3, ge=1, description="total degree of the polynomials")
     snapshots: int = Field(101, ge=2, description="snapshots in each training run")
     solver: Literal["chord", "newton"] = Field(

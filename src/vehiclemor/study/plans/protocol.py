@@ -135,6 +135,9 @@ def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenar
     found: list[Scenario] = []
     for number, group in enumerate(getattr(definition, key), start=1):
         try:
+            # What is stored lists them where there are none.
+            if "points" in group.model_fields_set and not group.points:
+                raise InputError("points is empty")
             runs = _of_group(model, group)
             found += by_cars(model, runs, definition.cars) if group.cars else runs
         except InputError as error:

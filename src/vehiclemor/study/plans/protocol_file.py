@@ -28,9 +28,7 @@ class Group(FileSchema):
         default_factory=list, description="initial conditions; the model's first by default"
     )
     points: list[list[float]] = Field(
-        default_factory=list,
-        min_length=1,
-        description="[frequency, amplitude] or [frequency, amplitude, speed]",
+        default_factory=list, description="[frequency, amplitude] or [frequency, amplitude, speed]"
     )
     frequency: list[float] = Field(default_factory=list, description="factors, 1 by default")
     amplitude: list[float] = Field(default_factory=list, description="factors, 1 by default")

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.errors import FileError
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.protocol_file import ProtocolFile
@@ -228,9 +228,7 @@ def named_file(kind: str, folder: str, name: str) -> Path:
     """
     if name.endswith(".toml"):
         return Path(name)
-    if name not in data_names(folder):
-        raise unknown(kind, name, data_names(folder))
-    return data_folder() / folder / f"{name}.toml"
+    return data_folder() / folder / f"{choice(kind, name, data_names(folder))}.toml"
 
 
 def study_path(study: str) -> Path:
