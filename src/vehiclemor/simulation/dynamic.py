@@ -21,6 +21,7 @@ from vehiclemor.simulation.checks import (
     loop_array,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.integrators.catalogue import integrator
 from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.kernel_derivatives import By, chosen
 from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
@@ -208,11 +209,13 @@ class DynamicModel(Model):
         ConvergenceError
             If the integration fails or leaves the model's range of validity.
         """
+        if solver is not None:
+            integrator(solver)
         trajectory = self.integrate(
             maneuver,
             self.start(start),
             whole_space(2 * len(self.coordinates)),
-            "dopri5" if solver is None else solver,
+            solver or "dopri5",
             REFERENCE_TOLERANCE if tolerance is None else tolerance,
             times,
             longest_step,

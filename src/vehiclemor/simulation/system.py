@@ -305,7 +305,6 @@ class System(ShortRepr):
             check_positive("longest_step", longest)
         if times is not None or begin:
             return self._plan(maneuver, windows, solver, direct_until)
-        catalogue.integrator(name)
         length = maneuver.duration, maneuver.samples
         key = length, id(windows), name, tolerance, longest, direct_until
         plan = self._plans.get(key)
