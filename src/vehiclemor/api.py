@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, number, quoted, real_array
-from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.errors import InputError, UnreachableError, VehiclemorError
 from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def _summaries(kind: str, attribute: str) -> dict[str, str]:
     for name in names(kind):
         try:
             lines[name] = str(getattr(component(kind, name), attribute))
-        except InputError as error:
+        except VehiclemorError as error:
             lines[name] = f"broken: {error}"
     return lines
 
@@ -83,7 +83,8 @@ def describe(
     """
     from vehiclemor.report.description.describe import description
 
-    return description(name, parameters, Path(parameter_file) if parameter_file else None)
+    path = None if parameter_file is None else file_path("parameter_file", parameter_file)
+    return description(name, parameters, path)
 
 
 def model(
@@ -181,6 +182,8 @@ def simulate(
     from vehiclemor.study.plans.training import training_set as training_of
 
     ready = model if isinstance(model, Model) else kept_build(model)
+    if not isinstance(errors, bool | np.bool_):
+        raise InputError(f"errors is {quoted(errors)}, neither True nor False")
     if rtol is not None:
         if "tolerance" in settings:
             raise InputError("rtol and tolerance are the same setting: give one of them")

@@ -16,6 +16,13 @@ def quoted(value: object) -> str:
     return shortened(repr(value))
 
 
+def line_of_text(name: str, value: object) -> str:
+    """A text in one line without control characters; `InputError` if it is none."""
+    if not isinstance(value, str) or not value.isprintable():
+        raise InputError(f"{name} is {quoted(value)}, not a line of text")
+    return value
+
+
 def real_array(value: Any) -> np.ndarray:
     """Floats of a number or of nested lists of numbers.
 
@@ -60,8 +67,11 @@ def within(name: str, value: float, bounds: tuple[float, float], unit: str = "")
     return value
 
 
-def count(name: str, value: object, least: int = 1) -> int:
-    """A whole number, at least so large.
+MOST_JOBS = 1024
+
+
+def count(name: str, value: object, least: int = 1, most: int | None = None) -> int:
+    """A whole number within bounds.
 
     Raises
     ------
@@ -69,8 +79,9 @@ def count(name: str, value: object, least: int = 1) -> int:
         If it is anything else.
     """
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or int(value) < least:  # type: ignore[arg-type]
-        raise InputError(f"{name} is {quoted(value)}; it must be a whole number, at least {least}")
+    if not whole or int(value) < least or (most and int(value) > most):  # type: ignore[arg-type]
+        bounds = f"at least {least}" + (f", at most {most}" if most else "")
+        raise InputError(f"{name} is {quoted(value)}; it must be a whole number, {bounds}")
     return int(value)  # type: ignore[arg-type]
 
 
@@ -82,7 +93,8 @@ def file_path(name: str, value: object) -> Path:
     InputError
         If it is no path, or an empty one.
     """
-    if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in str(value):
+    # Control characters, "\0" among them, would break an error into several lines.
+    if not isinstance(value, str | os.PathLike) or min(str(value), default="\0") < " ":
         raise InputError(f"{name}: {quoted(value)} is not a path")
     path = Path(value)
     try:

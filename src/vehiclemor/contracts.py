@@ -14,7 +14,7 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.validation import checked_run, validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
@@ -111,17 +111,11 @@ def check_method(name: str, model_name: str) -> None:
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)
             trained = TrainingRun(model, test if policy == "matched" else maneuver, model.starts[0])
             reduced = method.fit(model, (trained,), settings)
-            first = reduced.simulate(test, model.starts[0])
-            again = reduced.simulate(test, model.starts[0])
             where = f"{name} ({preset}, {policy}) on {model_name}"
-            samples = len(test.times)
-            for history, labels in (
-                (first.coordinates, model.coordinates),
-                (first.speeds, model.speeds),
-                (first.outputs, model.outputs),
-            ):
-                shape = (samples, len(labels))
-                assert history.shape == shape, f"{where}: a history has a wrong shape"
+            try:
+                first, again = (checked_run(model, test, model.starts[0], reduced) for _ in "12")
+            except InputError as error:
+                raise AssertionError(f"{where}: {error}") from None
             assert first.status in (*FINISHED, "diverged"), f"{where}: status {first.status!r}"
             if first.finished:
                 assert np.isfinite(first.states).all(), f"{where}: finished, but not finite"

@@ -1,9 +1,10 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
+import dis
 import errno
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
+from traceback import walk_tb
 from typing import Any
 
 # Names of which all are listed where none is near.
@@ -22,6 +23,10 @@ class VehiclemorError(Exception):
 
 class InputError(VehiclemorError):
     """A name, value or setting is not one that is allowed."""
+
+
+class PlugInError(InputError):
+    """The code of a plug-in has failed, or gives what is refused.  Exit status 1."""
 
 
 class FileError(VehiclemorError):
@@ -80,25 +85,67 @@ def machine_reason(error: BaseException) -> str:
     return ""
 
 
+def printable(text: str) -> str:
+    """A text in one line, without what would act on a terminal."""
+    line = " ".join(text.split())
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+
+
 def one_line(error: BaseException) -> str:
     """Kind and text of an error in one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+    return printable(f"{type(error).__name__}: {error}").removesuffix(":")
 
 
-@contextmanager
-def blamed(whose: str) -> Iterator[None]:
-    """Turn what the code of a plug-in raises into one line that names it.
+def interrupted(error: BaseException) -> bool:
+    """Whether the user stops the program: by Ctrl-C, which no `raise` of a plug-in stands for."""
+    if type(error) is not KeyboardInterrupt:
+        return isinstance(error, KeyboardInterrupt)
+    place = error.__traceback__
+    while place and place.tb_next:
+        place = place.tb_next
+    # An interrupt comes between two instructions, or in one that calls.
+    assert place
+    return dis.opname[place.tb_frame.f_code.co_code[place.tb_lasti]] != "RAISE_VARARGS"
 
-    What the user can mend and what the machine does passes.
+
+def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
+    """What to raise for an error of a plug-in's code: one line with file and line.
+
+    Parameters
+    ----------
+    code
+        The function, class or object that was used, or the name of a module.
     """
-    try:
-        yield
-    except VehiclemorError:
-        raise
-    except Exception as error:
-        if machine_reason(error):
-            raise
-        raise InputError(f"{whose}: {one_line(error)}") from error
+    if interrupted(error):
+        raise error
+    of = code if isinstance(code, str) else getattr(code, "__module__", type(code).__module__)
+    package = of.partition(".")[0]
+    places = [
+        f" ({frame.f_code.co_filename}:{line})"
+        for frame, line in walk_tb(error.__traceback__)
+        if frame.f_globals.get("__name__", "").partition(".")[0] == package
+    ]
+    place = places[-1] if places else ""
+    if reason := machine_reason(error):
+        return MachineError(printable(f"{whose}: {reason}{place}"))
+    return PlugInError(printable(f"{whose}: {one_line(error)}{place}"))
+
+
+class blamed:  # noqa: N801
+    """Turn what the code of a plug-in raises into one line that names it, see `blame`.
+
+    What is an error of this package already passes.
+    """
+
+    def __init__(self, whose: str, code: Any) -> None:
+        self.of = whose, code
+
+    def __enter__(self) -> None:
+        """Nothing: a context of a generator would cost whole calls five times as much."""
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        if error is not None and not isinstance(error, VehiclemorError):
+            raise blame(*self.of, error) from error
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

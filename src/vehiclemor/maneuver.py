@@ -6,12 +6,13 @@ The module can be called: `vehiclemor.maneuver("lane_change")` gives a maneuver 
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import islice
 from types import ModuleType
 
 import numpy as np
 
-from vehiclemor.arguments import count, number, quoted, real_array, within
-from vehiclemor.errors import InputError, blamed
+from vehiclemor.arguments import count, line_of_text, number, quoted, real_array, within
+from vehiclemor.errors import InputError, PlugInError, blamed
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 
@@ -68,8 +69,8 @@ class Maneuver(ShortRepr):
 
     def __post_init__(self) -> None:
         """Refuse what is no maneuver, so that its author reads one clear line."""
-        if not isinstance(self.name, str) or not isinstance(self.summary, str):
-            raise InputError("name and summary of a maneuver must be text")
+        for text in ("name", "summary"):
+            line_of_text(f"{text} of a maneuver", getattr(self, text))
         for function in ("signal", "corners"):
             if not callable(getattr(self, function)):
                 raise InputError(f"{self}: {function} is not a function")
@@ -80,7 +81,7 @@ class Maneuver(ShortRepr):
         if number(f"{self}: duration", self.duration) <= 0.0:
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
-        within(f"{self}: samples", count(f"{self}: samples", self.samples), (1, MOST_SAMPLES))
+        count(f"{self}: samples", self.samples, most=MOST_SAMPLES)
         for name in FACTORS:
             factor = checked_factor(name, getattr(self, f"{name}_factor"))
             object.__setattr__(self, f"{name}_factor", factor)
@@ -100,21 +101,23 @@ class Maneuver(ShortRepr):
     @property
     def break_points(self) -> tuple[float, ...]:
         """Times in s inside the run at which the inputs are not smooth."""
-        with blamed(f"{self}: corners"):
-            times = real_array([*self.corners(self.frequency_factor)] or np.zeros(0))
+        with blamed(f"{self}: corners", self.corners):
+            found = self.corners(self.frequency_factor)
+            times = real_array([*islice(found, MOST_CORNERS + 1)] or np.zeros(0))
         if times.ndim != 1 or not np.isfinite(times).all():
-            raise InputError(f"{self}: corners are {quoted(times)}, not a list of times in s")
-        within(f"{self}: number of corners", len(times), (0, MOST_CORNERS))
+            raise PlugInError(f"{self}: corners are {quoted(times)}, not a list of times in s")
+        if len(times) > MOST_CORNERS:
+            raise PlugInError(f"{self}: there are more than {MOST_CORNERS} corners")
         return tuple(times.tolist())
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at the given times (n,) in s."""
         times = np.asarray(times, dtype=float)
-        with blamed(f"{self}: signal"):
+        with blamed(f"{self}: signal", self.signal):
             values = self.signal(times, self.frequency_factor, self.amplitude_factor)
             values = real_array(values)
         if values.shape != (*times.shape, len(self.inputs)):
-            raise InputError(
+            raise PlugInError(
                 f"{self}: signal gives an array of shape {values.shape} at {times.size} times, "
                 f"not ({times.size}, {len(self.inputs)}): one column for each input"
             )

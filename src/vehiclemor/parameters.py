@@ -13,7 +13,7 @@ from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.toml_files import FileSchema, read_toml
+from vehiclemor.toml_files import FileSchema, Line, read_toml
 
 # No road vehicle has a part farther than this from its origin (m).
 LARGEST_LENGTH = 20.0
@@ -79,7 +79,7 @@ class ParameterFile(FileSchema):
     """Schema of `data/parameters/*.toml`."""
 
     model: str = Field(description="registered name")
-    title: str = Field(description="one line")
+    title: Line = Field(description="one line")
     sources: dict[str, Source] = Field(description="key -> where values come from")
     parameters: dict[str, Parameter] = Field(description="name -> value; all that the model needs")
 
@@ -179,7 +179,7 @@ def overridden(
         If an override names no parameter or has a wrong shape or value.
     """
     if not isinstance(overrides, Mapping):
-        raise InputError(f"parameters must be a mapping of names to values, not {overrides!r}")
+        raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     model, entries = parameters.model, dict(parameters.entries)
     for given, value in overrides.items():
         name, axis = parameter_and_axis(model, expected, given)
@@ -207,7 +207,7 @@ def parameter_and_axis(
     InputError
         If the model has no such parameter.
     """
-    whole, _, axis = name.partition(".")
+    whole, _, axis = str(name).partition(".")
     declared = expected.get(name, expected.get(whole))
     if declared is None:
         hint = did_you_mean(whole, expected) or f"it has {', '.join(expected)}"

@@ -4,13 +4,13 @@ An entry point of the group `vehiclemor.models` names a `ModelDefinition`, one o
 `vehiclemor.methods` a `Method`, one of `vehiclemor.maneuvers` a `Maneuver`.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError, did_you_mean, one_line
+from vehiclemor.errors import InputError, PlugInError, blame, did_you_mean
 
 GROUPS = {
     "model": "vehiclemor.models",
@@ -37,25 +37,31 @@ def component(kind: str, name: str) -> Any:
     ------
     InputError
         If no component of that kind has the name (the nearest names are listed), or if it is a
-        plug-in that can't be imported, or is something else.
+        plug-in that can't be imported, or is something else (`PlugInError`).
     """
     entries = _entries(kind)
-    if not isinstance(name, str) or name not in entries:
-        raise unknown(kind, name, entries)
+    choice(kind, name, entries)
     where = f"{kind} {name!r} ({entries[name].value})"
     try:
         loaded = entries[name].load()
     # A module may even end the interpreter.
-    except (Exception, SystemExit) as error:
-        raise InputError(f"{where} can't be imported: {one_line(error)}") from error
+    except BaseException as error:
+        raise blame(f"{where} can't be imported", entries[name].module, error) from error
     wanted = _class(kind)
     if not isinstance(loaded, wanted):
         found = type(loaded).__name__
-        raise InputError(f"{where} is of type {found}: it must be a {wanted.__name__}")
+        raise PlugInError(f"{where} is of type {found}: it must be a {wanted.__name__}")
     # Models are built again by their own names.
     if kind == "model" and loaded.name != name:
-        raise InputError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
+        raise PlugInError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
     return loaded
+
+
+def choice(kind: str, name: Any, known: Collection[str]) -> str:
+    """The name; `InputError` if it is none of the known ones."""
+    if isinstance(name, str) and name in known:
+        return name
+    raise unknown(kind, name, known)
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
@@ -72,8 +78,7 @@ def _class(kind: str) -> type:
 
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
-    if kind not in GROUPS:
-        raise unknown("kind of component", kind, GROUPS)
+    choice("kind of component", kind, GROUPS)
     found: dict[str, EntryPoint] = {}
     # Sorted so that a built-in comes last: no plug-in takes its name away.
     for entry in sorted(entry_points(group=GROUPS[kind]), key=_is_built_in):

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, number, quoted, real_array, within
+from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
 from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.sample_loops import Pieces
 from vehiclemor.signal_columns import array_columns, csv_columns
 from vehiclemor.units import base_units
@@ -103,12 +103,11 @@ class Signal(Maneuver):
         InputError
             If times don't increase, a value isn't finite, or shapes don't fit.
         """
-        if hold not in HOLDS:
-            raise unknown("hold", hold, HOLDS)
+        choice("hold", hold, HOLDS)
         times, values = _samples(t, u)
         names = _names(inputs, values.shape[1])
-        if not isinstance(name, str) or not name:
-            raise InputError(f"name is {quoted(name)}, not a text")
+        if not line_of_text("name", name):
+            raise InputError("name is empty")
         (pieces,) = through(times, values[None], hold)
         duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
         return _template()._with(
@@ -151,12 +150,13 @@ class Signal(Maneuver):
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
+        frequency = checked_factor("frequency", frequency)
+        amplitude = checked_factor("amplitude", amplitude)
         if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
             return self
-        frequency = checked_factor("frequency", frequency)
         return self._with(
             frequency_factor=frequency,
-            amplitude_factor=checked_factor("amplitude", amplitude),
+            amplitude_factor=amplitude,
             duration=float(self.pieces.edges[-1]) / frequency,
         )
 
@@ -230,7 +230,7 @@ class Signal(Maneuver):
         """
         within("duration of a signal", number("duration", duration), (0.0, LONGEST_DURATION), " s")
         times = np.linspace(0.0, duration, _output_samples(duration, step))
-        with blamed("function of a signal"):
+        with blamed("function of a signal", function):
             values = function(times)
         return cls.from_samples(times, values, hold, inputs=inputs, **further)
 
@@ -369,6 +369,7 @@ def _output_samples(duration: float, step: Any) -> int:
     """Number of times about so many seconds apart."""
     if number("step", step) <= 0.0:
         raise InputError(f"step: {step:g} s is not positive")
+    within("step", step, (0.0, LONGEST_DURATION), " s")
     samples = max(round(duration / step), 1) + 1
     return int(within("number of samples", samples, (2, MOST_SAMPLES)))
 

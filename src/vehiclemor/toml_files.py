@@ -2,13 +2,22 @@
 
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from vehiclemor.errors import FileError
 
 Schema = TypeVar("Schema", bound="FileSchema")
+
+
+def _line(text: str) -> str:
+    if not (text.strip() and text.isprintable()):
+        raise ValueError(f"{text!r} is not a line of text")
+    return text
+
+
+Line = Annotated[str, AfterValidator(_line)]
 
 
 class FileSchema(BaseModel):

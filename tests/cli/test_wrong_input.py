@@ -61,6 +61,7 @@ POD = (*SIMULATE, "--method", "pod")
         ([*POD, "--set", "control_period=1e-9"], ["control_period"]),
         ([*SIMULATE, "--frequency", "1e308"], ["frequency factor", "above"]),
         (["figures", "--only", ","], ["names no figure"]),
+        ([*SIMULATE, "--out", "run.txt"], ["run.txt", "ends with .nc"]),
         ([*POD, "--set", "rank=0"], ["rank is 0", "at least 1"]),
         ([*POD, "--set", "rank=2.5"], ["rank", "integer"]),
         ([*POD, "--set", "rank=9", "--set", "snapshots=20"], ["rank 9", "8 coordinates"]),

@@ -16,6 +16,9 @@ contestants = [{ label = "newton", method = "full_order", role = "full order" }]
 WRONG = [
     ("points = [[0.9, 1.0]]", "points = [[1.0, 1.2]]", ["test", "a 1.2", "is in training too"]),
     ("points = [[0.9, 1.0]]", "points = [[1.3, 1.0]]", ["test", "f 1.3", "is in validation too"]),
+    ("points = [[0.9, 1.0]]", "points = []", ["test, group 1: points is empty"]),
+    ('"for the tests"', '""', ["title: '' is not a line of text"]),
+    ('label = "newton"', 'label = "a\\nb"', [r"label: 'a\nb' is not a line of text"]),
     ("points = [[0.9, 1.0]]", "points = [[0.9]]", ["a point is [frequency, amplitude]"]),
     ("points = [[0.9, 1.0]]", "points = [[0.9, 1.0, 20.0]]", ["has no initial_speed"]),
     ("points = [[0.9, 1.0]]", "points = [[-0.9, 1.0]]", ["test, group 1", "not positive"]),

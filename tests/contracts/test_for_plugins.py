@@ -47,7 +47,7 @@ class Altered:
 @pytest.mark.parametrize(
     ("alter", "message"),
     [
-        (lambda run, _: replace(run, coordinates=run.coordinates[1:]), "wrong shape"),
+        (lambda run, _: replace(run, coordinates=run.coordinates[1:]), r"coordinates \(\d+, 8\)"),
         (lambda run, k: replace(run, coordinates=run.coordinates + 1e-15 * k), "two runs differ"),
         (lambda run, k: replace(run, counts=run.counts | {"iterations": k}), "counts of two runs"),
         (lambda run, _: replace(run, counts={}), "counts are incomplete"),

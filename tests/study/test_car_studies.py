@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from vehiclemor.cli import main
 from vehiclemor.errors import FileError
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.report.figures.sampled_errors import figure_samples
@@ -211,6 +212,21 @@ def test_training_policies_and_maneuvers_are_axes():
 )
 def test_wrong_cars_are_told_before_the_first_cell(tmp_path, text, words):
     refused(tmp_path, SUSPENSION + text, words)
+
+
+def test_a_run_says_why_cells_are_rejected(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        HEAD.format("independent_suspension_vehicle")
+        + """
+cars = "nominal"
+methods = [{ method = "slow_manifold" }]
+grid = { "parameters.sprung_mass" = [900.0] }
+"""
+    )
+    assert main(["run", str(path), "--out", str(tmp_path)]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "1 rejected: slow_manifold must be trained on the car it is tested on" in printed
 
 
 SAMPLED = """

@@ -25,11 +25,12 @@ RAISED = [
     (InputError("asks for too much"), "rejected", "asks for too much"),
     (UnreachableError("too high"), "unreachable", "too high"),
     (ConvergenceError("after 9\niterations"), "diverged", "after 9 iterations"),
-    (ZeroDivisionError("in a plug-in"), "error", "ZeroDivisionError: in a plug-in"),
+    (ZeroDivisionError("in a plug-in"), "error", f"ZeroDivisionError: in a plug-in ({__file__}:"),
+    (SystemExit(0), "error", f"SystemExit: 0 ({__file__}:"),
 ]
 
 
-@pytest.fixture(params=RAISED, ids=lambda raised: raised[1])
+@pytest.fixture(params=RAISED, ids=lambda raised: type(raised[0]).__name__)
 def raised(request, monkeypatch):
     """Status and message of what every fit of one method raises."""
     error, status, message = request.param
@@ -49,7 +50,9 @@ def test_what_a_fit_raises_is_a_result_in_a_grid(raised, tmp_path):
     path.write_text(GRID)
     cells = run_studies(str(path), tmp_path)["mine"].squeeze()
     broken, full = cells.sel({"method": "fixed_basis"}), cells.sel({"method": "full_order"})
-    assert (broken["status"].item(), broken["message"].item()) == raised
+    status, message = raised
+    assert broken["status"].item() == status
+    assert message in broken["message"].item()
     assert full["status"].item() == "ok"
 
 
@@ -60,7 +63,7 @@ def test_what_a_fit_raises_is_a_result_in_a_protocol(raised, tmp_path, protocol_
     rows = run_studies(str(path), tmp_path)["predictive-small"]
     broken = rows.sel(row="fixed basis")
     assert set(broken["status"].values) == {raised[0]}
-    assert set(broken["message"].values) == {raised[1]}
+    assert all(raised[1] in message for message in broken["message"].values)
     assert set(rows["status"].sel(row="newton 1e-12").values) == {"ok"}
 
 

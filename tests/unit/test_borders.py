@@ -14,6 +14,7 @@ from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.toml_files import read_toml
 
 SUSPENSION, CAR = "double_wishbone", "independent_suspension_vehicle"
+TRAVEL = component("maneuver", "sine_travel")
 MASKED = np.ma.array([1.0, 2.0], mask=[True, False])
 
 
@@ -162,13 +163,13 @@ GOOD = {
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"name": 3}, ["name and summary of a maneuver must be text"]),
+        ({"name": 3}, ["name of a maneuver is 3, not a line of text"]),
         ({"duration": -1.0}, ["duration is -1 s, not positive"]),
         ({"duration": "5"}, ["duration: '5' is not a number"]),
         ({"duration": 1e300}, ["duration: 1e+300 s is above 100000 s"]),
         ({"samples": 0}, ["samples is 0; it must be a whole number, at least 1"]),
         ({"samples": 2.5}, ["samples is 2.5; it must be a whole number"]),
-        ({"samples": 10**12}, ["samples: 1e+12 is above 1e+07"]),
+        ({"samples": 10**12}, ["samples is 1000000000000; it must", "at most 10000000"]),
         ({"signal": None}, ["signal is not a function"]),
         ({"corners": (1.0,)}, ["corners is not a function"]),
         ({"inputs": "delta"}, ["inputs is 'delta', not a tuple of names"]),
@@ -247,6 +248,50 @@ def test_a_start_may_be_a_state(car):
         own = vm.simulate(car, start=state)
         np.testing.assert_array_equal(own["outputs"], dropped["outputs"])
     assert not np.array_equal(vm.simulate(car)["outputs"], dropped["outputs"])
+
+
+WRONG = ([1], {"a": 1}, [[1.0]], np.ones(3), np.zeros(0), np.ones((3, 3)), 10**400)
+STEER = vm.Signal.from_samples([0.0, 0.1, 0.2], [0.0, 0.01, 0.0], inputs=["delta"])
+NONE = (None, set(), range(0))
+
+
+@pytest.mark.parametrize(
+    ("call", "values", "words"),
+    [
+        (lambda _, v: vm.rom(v), [[], {}, *WRONG], "unknown model with a reduced one"),
+        (lambda _, v: vm.Signal.from_samples([0, 1], [0, 1], hold=v), WRONG, "unknown hold"),
+        (lambda _, v: vm.Signal.from_samples([0, 1], [0, 1], output_step=v), [1e308], "above"),
+        (lambda _, v: STEER.perturbed(amplitude=v), WRONG, "amplitude factor"),
+        (lambda _, v: STEER.perturbed(frequency=v), WRONG, "frequency factor"),
+        (lambda car, v: car.simulate(STEER, solver=v), [{}, "", 0, *WRONG], "unknown solver"),
+        (lambda car, v: car.simulate(STEER, tolerance=v), WRONG, "tolerance is"),
+        (lambda car, v: car.simulate(STEER, begin=v), [*NONE, *WRONG], "begin: "),
+        (lambda _, v: vm.model(SUSPENSION).simulate(solver=v, maneuver=TRAVEL), WRONG, "solver"),
+        (lambda _, v: vm.model(CAR, v), [{1: 2}, *WRONG], "parameter"),
+        (vm.export, WRONG, "unknown target"),
+        (
+            lambda car, v: vm.export(car, "c", "none/c", step=v),
+            [1e300, 1e5, 10.0, 1e-300, *WRONG],
+            "step",
+        ),
+        (lambda car, v: vm.simulate_many(car, [STEER], outputs=v), [{}, *WRONG], "output"),
+        (lambda car, v: vm.simulate_many(car, [STEER], v), [np.array(1.0), 10**400], "start"),
+        (lambda car, v: vm.simulate_many(car, [STEER], jobs=v), [10**39, *WRONG], "jobs is"),
+        (lambda car, v: vm.simulate(car, errors=v), [b"x", *NONE, *WRONG], "errors is"),
+        (lambda car, v: vm.simulate(car, "pod", control_period=v), WRONG[:-1], "control_period"),
+        (lambda _, v: vm.describe(CAR, None, v), WRONG, "parameter_file"),
+        (lambda _, v: vm.run_study("paper", v), WRONG, "jobs is"),
+        (lambda _, v: vm.model(CAR, None, v), ["a\nb", *WRONG], "is not a path"),
+    ],
+)
+def test_values_of_any_kind_are_refused_in_one_line(car, call, values, words):
+    for value in values:
+        refused(lambda value=value: call(car, value), words)
+
+
+def test_what_overflows_in_a_reduced_model_is_refused():
+    rom = vm.rom(CAR)
+    refused(lambda: rom.rhs(rom.state(), 1e308), "derivative of", "is not finite")
 
 
 STUDY = """

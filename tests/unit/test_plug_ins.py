@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.plugin.installation import installed
 from vehiclemor import registry
-from vehiclemor.errors import InputError
+from vehiclemor.cli import main
+from vehiclemor.errors import InputError, VehiclemorError
 from vehiclemor.registry import component
 
 
@@ -34,7 +36,10 @@ def plug_in(tmp_path, monkeypatch):
         ("raise RuntimeError('at import')", "RuntimeError: at import"),
         ("import no_such_package", "no_such_package"),
         ("summary = 'half'", "is of type module: it must be a Method"),
-        ("raise SystemExit(3)", "can't be imported: SystemExit: 3"),
+        ("raise SystemExit(3)", "can't be imported: SystemExit: 3 ("),
+        ("raise KeyboardInterrupt", "can't be imported: KeyboardInterrupt ("),
+        ("raise BaseException('mine')", "can't be imported: BaseException: mine ("),
+        ("raise OSError(5, 'x')", "can't be imported: x ("),
         ("raise ValueError('one\\ntwo')", "can't be imported: ValueError: one two"),
     ],
 )
@@ -43,7 +48,7 @@ def test_a_broken_plug_in_is_named_and_harmless(plug_in, text, words):
     listed = vm.methods()
     assert words in listed["faulty"]
     assert listed["pod"].startswith("POD")
-    with pytest.raises(InputError, match="faulty"):
+    with pytest.raises(VehiclemorError, match="faulty"):
         registry.component("method", "faulty")
 
 
@@ -57,6 +62,7 @@ def test_no_plug_in_takes_a_built_in_name(monkeypatch):
 
 REPLAY = """
 from dataclasses import replace
+import signal, time
 import numpy as np
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.methods import replay
@@ -72,6 +78,15 @@ def altered(**values):
         return replace(run, **{name: change(getattr(run, name)) for name, change in values.items()})
     Reduced.simulate = simulate
 METHOD = replace(replay.METHOD, name="faulty", fit=fit)
+def ends(error):
+    def ended(*_):
+        raise error
+    return ended
+def zeroed(model, *_):
+    model.constants[:] = 0
+def interrupted(*_):
+    signal.raise_signal(signal.SIGINT)
+    time.sleep(1)
 """
 STUDY = """
 title = "mine"
@@ -93,7 +108,7 @@ def faulty(plug_in):
     ("change", "words"),
     [
         ("METHOD = replace(METHOD, fit=lambda *_: 1 / 0)", "ZeroDivisionError"),
-        ("METHOD = replace(METHOD, fit=lambda *_: None)", "method 'faulty': fit gives None"),
+        ("METHOD = replace(METHOD, fit=lambda *_: None)", "'faulty': fit: None has no simulate"),
         ("METHOD = replace(METHOD, fit=lambda model: model)", "TypeError"),
         ("METHOD = replace(METHOD, check=lambda *_: 1 / 0)", "ZeroDivisionError"),
         ("Reduced.simulate = lambda *_: 1 / 0", "ZeroDivisionError"),
@@ -102,7 +117,7 @@ def faulty(plug_in):
         ("altered(outputs=lambda o: o + 0j)", "outputs (1001, 6) of complex128"),
         ("altered(outputs=lambda o: 'x')", "outputs ()"),
         ("altered(coordinates=lambda q: np.hstack([q, q]))", "(1001, 16)"),
-        ("altered(time=lambda t: t[:5])", "5 times, not the 1001"),
+        ("altered(time=lambda t: t[:5])", "time (5,) of float64, not (1001,) floats"),
         ("altered(status=lambda s: 'fine')", "status 'fine'"),
         ("altered(seconds=lambda s: 'x')", "seconds 'x'"),
         ("altered(counts=lambda c: None)", "counts None"),
@@ -110,6 +125,15 @@ def faulty(plug_in):
         ("Reduced.effective_rank = 'x'", "effective_rank is 'x', no whole number"),
         ("del Reduced.offline", "has no offline"),
         ("Reduced.offline = None", "offline is None, no Offline"),
+        ("METHOD = replace(METHOD, fit=ends(SystemExit(0)))", "fit: SystemExit: 0 (/"),
+        ("METHOD = replace(METHOD, fit=ends(KeyboardInterrupt()))", "fit: KeyboardInterrupt (/"),
+        ("METHOD = replace(METHOD, fit=ends(BaseException('mine')))", "BaseException: mine (/"),
+        ("METHOD = replace(METHOD, fit=ends(OSError(2, 'x')))", "fit: FileNotFoundError: [Errno 2"),
+        ("METHOD = replace(METHOD, check=ends(SystemExit(0)))", "check: SystemExit: 0 (/"),
+        ("METHOD = replace(METHOD, fit=ends(ValueError('\\x1b[31m')))", r"ValueError: \x1b[31m (/"),
+        ("METHOD = replace(METHOD, fit=zeroed)", "fit: ValueError: assignment destination is read"),
+        ("Reduced.simulate = ends(SystemExit(0))", "Reduced: simulate: SystemExit: 0 (/"),
+        ("Reduced.best_approximation = ends(SystemExit(0))", "approximation: SystemExit: 0 (/"),
     ],
 )
 def test_a_method_that_breaks_is_an_error_of_its_own_cells(faulty, tmp_path, change, words):
@@ -118,7 +142,7 @@ def test_a_method_that_breaks_is_an_error_of_its_own_cells(faulty, tmp_path, cha
     message = data["message"].item()
     assert data["status"].item() == "error"
     assert words in message
-    assert "\n" not in message
+    assert message.isprintable()
     assert np.isnan(data["rms_error"]).all()
 
 
@@ -128,6 +152,60 @@ def test_a_study_with_a_broken_method_is_finished(faulty, tmp_path):
     path.write_text(STUDY)
     data = vm.run_study(path, out=tmp_path / "results").squeeze()
     assert data["status"].values.tolist() == ["error", "ok"]
+
+
+def test_what_the_machine_does_to_a_method_is_named(faulty, capsys):
+    faulty("METHOD = replace(METHOD, fit=ends(OSError(28, 'no space')))")
+    assert main(["simulate", "double_wishbone", "--method", "faulty"]) == 1
+    assert "method 'faulty': fit: no space (/" in capsys.readouterr().err
+
+
+def test_the_user_stops_a_method(faulty, capsys):
+    faulty("METHOD = replace(METHOD, fit=interrupted)")
+    assert main(["simulate", "double_wishbone", "--method", "faulty"]) == 130
+    assert "stopped" in capsys.readouterr().err
+    with pytest.raises(KeyboardInterrupt):
+        vm.simulate("double_wishbone", "faulty")
+
+
+TRAVEL = """
+from dataclasses import replace
+from vehiclemor.maneuver import sine_travel
+MANEUVER = replace(sine_travel, name="faulty", %s)
+"""
+
+
+@pytest.mark.parametrize("text", ["raise SystemExit(0)", "raise KeyboardInterrupt", "1 / 0"])
+@pytest.mark.parametrize("function", ["signal", "corners"])
+def test_a_maneuver_that_breaks_is_named_with_its_line(plug_in, capsys, function, text):
+    travel = f"def broken(*_):\n    {text}\n{TRAVEL % f'{function}=broken'}"
+    plug_in("faulty", travel, ":MANEUVER", "maneuver")
+    assert main(["simulate", "double_wishbone", "--maneuver", "faulty"]) == 1
+    message = capsys.readouterr().err
+    assert f"vehiclemor: maneuver 'faulty': {function}: " in message
+    assert ".py:2)" in message
+
+
+def test_a_billion_corners_are_not_counted(plug_in):
+    plug_in("faulty", TRAVEL % "corners=lambda _: range(10**9)", ":MANEUVER", "maneuver")
+    with pytest.raises(InputError, match="maneuver 'faulty': there are more than 10000 corners"):
+        vm.simulate("double_wishbone", maneuver="faulty")
+
+
+def test_processes_go_on_after_a_method_that_ends_its_own(tmp_path, capsys):
+    (tmp_path / "ending.py").write_text(
+        f"{REPLAY}METHOD = replace(METHOD, name='ending', fit=ends(SystemExit(0)))\n"
+    )
+    (tmp_path / "pyproject.toml").write_text(
+        '[project]\nname = "ending"\nversion = "1"\n'
+        '[project.entry-points."vehiclemor.methods"]\nending = "ending:METHOD"\n'
+    )
+    grid = "[grid]\nfrequency_factor = [0.9, 1.0]\n"
+    study = tmp_path / "mine.toml"
+    study.write_text(STUDY.replace("faulty", "ending") + grid)
+    with installed(tmp_path):
+        assert main(["run", str(study), "--jobs", "2", "--out", str(tmp_path / "results")]) == 1
+    assert "2 error, 2 ok" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -156,8 +234,9 @@ def test_a_broken_refusal_refuses(faulty, tmp_path, change, words):
         ("settings=['ae']", "method 'faulty': settings: AttributeError"),
         ("settings={'ae': dict}", "method 'faulty': settings of ae are no class of Settings"),
         ("presets=None", "method 'faulty': presets: AttributeError"),
-        ("presets={'ae': {'mine': {'rnk': 3}}}", "preset 'mine' sets 'rnk', which is no setting"),
-        ("summary=None", "method 'faulty': summary is not text"),
+        ("presets={'ae': {'mine': {'rnk': 3}}}", "unknown setting in preset 'mine' of ae 'rnk'"),
+        ("summary=None", "method 'faulty': summary is None, not a line"),
+        ("summary='\\x1b[2Jgone'", r"summary is '\x1b[2Jgone', not a line of text"),
         ("fit=3", "method 'faulty': fit is not a function"),
     ],
 )
@@ -220,7 +299,7 @@ def car(plug_in, plug_in_package, tmp_path):
         ("faulty(starts=lambda p: {'a': [0.0]})", r"start 'a' has shape \(1,\), faulty needs"),
         ("faulty(starts=lambda p: {'a': [np.nan] * 4})", r"start 'a'\[0\] is not finite"),
         ("faulty(solved=('a',))", "model 'faulty': solve_equilibrium: KeyError: 'a'"),
-        ("faulty(summary=None)", "name and summary of a model must be text"),
+        ("faulty(summary=None)", "summary of a model is None, not a line of text"),
         ("faulty(coordinates=('a', 'b'))", "coordinates must be quantities with units"),
         ("faulty(outputs=())", "outputs are missing or named twice"),
         ("faulty(parameters={'a': 3})", "parameter 'a' is not declared by a unit"),

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from cyclopts import CycloptsError
 
 from vehiclemor.cli.exit_status import FAILED, STOPPED, WRONG_INPUT
-from vehiclemor.errors import MachineError, VehiclemorError, machine_reason
+from vehiclemor.errors import MachineError, PlugInError, VehiclemorError, machine_reason
 
 # Seconds until a signal that has been heard by nobody is raised again.
 AGAIN = 2.0
@@ -27,7 +27,7 @@ def ended(run: Callable[[], int | None]) -> int:
     except BrokenPipeError:
         sys.stderr.close()
         return 0
-    except MachineError as error:
+    except (MachineError, PlugInError) as error:
         return _said(str(error), FAILED)
     except (CycloptsError, VehiclemorError) as error:
         return _said(str(error), WRONG_INPUT)

@@ -1,8 +1,8 @@
 """Exit statuses of the command line."""
 
-# A published bound is missed; a simulation, cells of a study or the machine have failed; wrong
-# input; and what the number of a signal is added to.
+# A published bound is missed; a simulation, cells of a study, a plug-in or the machine have
+# failed; wrong input; and what the number of a signal is added to.
 MISSED, FAILED, WRONG_INPUT, STOPPED = 1, 1, 2, 128
 MEANING = """Exit status: 0 done; 1 a published bound is missed, a simulation has diverged, cells
-of a study have the status error, or the machine has failed (no space, no memory, a killed worker);
-2 wrong input; 130 and 143 stopped by Ctrl-C and by SIGTERM."""
+of a study have the status error, a plug-in breaks, or the machine has failed (no space, no memory,
+a killed worker); 2 wrong input; 130 and 143 stopped by Ctrl-C and by SIGTERM."""

@@ -45,11 +45,14 @@ def result_file(option: str, path: Path) -> Path:
     Raises
     ------
     InputError, FileError
-        If it can't be written, or what stands there is something else.
+        If it has another ending, can't be written, or what stands there is something else.
     """
     from vehiclemor.study.netcdf_file import read_dataset
 
-    if _exists(option, path):
+    there = _exists(option, path)
+    if path.suffix.lower() != ".nc":
+        raise InputError(f"{option} {path}: the file ends with .nc")
+    if there:
         read_dataset(path, "source", "vehiclemor")
     return path
 

@@ -1,12 +1,13 @@
 """`vehiclemor run`: a study, resumed where an earlier run stopped."""
 
-import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 from vehiclemor import api
 from vehiclemor.cli.exit_status import FAILED
 from vehiclemor.cli.progress import shown_progress
+from vehiclemor.cli.status import print_reasons
 from vehiclemor.report.printing import wrapped
 
 
@@ -44,10 +45,10 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
     errors = 0
     for name, dataset in results.items():
         places = f"{dataset['status'].size} grid points, {cells[name]} cells"
-        ends = counted_ends(dataset)
-        print(wrapped(f"{name}: {places}: {ends}; {dataset.encoding['source']}", 0, 2))
+        counts = counted_ends(dataset)
+        print(wrapped(f"{name}: {places}: {counts}; {dataset.encoding['source']}", 0, 2))
+        ends = zip(dataset["status"].values.flat, dataset["message"].values.flat, strict=True)
+        print_reasons(Counter(end for end in ends if end[0] in ("rejected", "error")))
         errors += int((dataset["status"] == "error").sum())
     print(f"{time.perf_counter() - began:.1f} s")
-    if errors:
-        print("cells with the status error are tried again by the next run", file=sys.stderr)
     return FAILED if errors else 0

@@ -1,5 +1,6 @@
 """`vehiclemor status`: how far a study is."""
 
+from collections import Counter
 from pathlib import Path
 
 from vehiclemor import api
@@ -31,10 +32,15 @@ def status(study: str, *, out: Path = api.RESULTS) -> None:
         combined = found.result or "not combined yet"
         older = " is older" if found.result and found.to_do else ""
         print(wrapped(f"{text}; {combined}{older}", 0, 2))
-        failed = found.failed.most_common()
-        for (kind, message), runs in failed[:REASONS]:
-            again = ", tried again by the next run" if kind == "error" else ""
-            print(wrapped(f"{runs} {kind}{again}: {message}", 2, 4))
-        if len(failed) > REASONS:
-            rest = sum(runs for _, runs in failed[REASONS:])
-            print(f"  {rest} for {len(failed) - REASONS} other reasons")
+        print_reasons(found.failed)
+
+
+def print_reasons(failed: Counter[tuple[str, str]]) -> None:
+    """Print why runs have failed, the most frequent reasons first."""
+    found = failed.most_common()
+    for (kind, message), runs in found[:REASONS]:
+        again = ", tried again by the next run" if kind == "error" else ""
+        print(wrapped(f"{runs} {kind}{again}: {message}", 2, 4))
+    if len(found) > REASONS:
+        rest = sum(runs for _, runs in found[REASONS:])
+        print(f"  {rest} for {len(found) - REASONS} other reasons")

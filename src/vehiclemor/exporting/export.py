@@ -9,9 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from vehiclemor.arguments import file_path, number, quoted
-from vehiclemor.errors import InputError, did_you_mean
+from vehiclemor.arguments import file_path, number, quoted, within
+from vehiclemor.errors import InputError
 from vehiclemor.files import make_folder, not_written, temporary_path, write_whole
+from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
     from vehiclemor.exporting.system import ExportedSystem
@@ -25,6 +26,8 @@ ENDINGS = {"c": "", "fmu": ".fmu", "fmu2": ".fmu", "casadi": ".casadi", "jax": "
 ENDINGS["sympy"] = "_sympy.py"
 # Step in s of the integrator in C: stable for modes of up to 2780 1/s; see the handbook.
 STEP = 1e-3
+# Shortest and longest: below, rounding is all; above, no model of a vehicle is stable.
+STEPS = 1e-7, 1.0
 # What is always written.
 FILES = ("c", "fmu", "fmu2")
 # A folder with this file is one of ours.
@@ -71,11 +74,8 @@ def export(
         If an argument is wrong, the method can't be exported, something is there already, a package
         is missing, or the C compiler fails.  Then nothing is written.
     """
-    if to not in TARGETS:
-        hint = did_you_mean(to, TARGETS) or f"known: {', '.join(TARGETS)}"
-        raise InputError(f"to: {quoted(to)} is no target; {hint}")
-    if not number("step", step) > 0.0:
-        raise InputError(f"step: {step:g} s is not above 0")
+    choice("target", to, TARGETS)
+    step = within("step", number("step", step), STEPS, " s")
     if isinstance(model, str):
         from vehiclemor.simulation.build import build
 

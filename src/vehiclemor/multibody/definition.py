@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.arguments import line_of_text
 from vehiclemor.errors import InputError, did_you_mean
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.multibody.report import ModelReport, completed
@@ -166,8 +167,8 @@ class ModelDefinition(ShortRepr):
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself, so that a plug-in's author reads one clear line."""
-        if not isinstance(self.name, str) or not isinstance(self.summary, str):
-            raise InputError("name and summary of a model must be text")
+        for text in ("name", "summary"):
+            line_of_text(f"{text} of a model", getattr(self, text))
         if self.kind not in KINDS:
             raise InputError(
                 f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"

@@ -78,6 +78,7 @@ def starts_of(starts: Any, runs: int, model: Model) -> Sequence[Start]:
     if starts is None or isinstance(starts, str):
         model.start(starts)
         return [starts or model.starts[0]] * runs
+    starts = np.atleast_1d(starts) if isinstance(starts, np.ndarray) else starts
     if not isinstance(starts, Sequence | np.ndarray):
         raise InputError(f"starts is {quoted(starts)}, neither names nor states")
     if not len(starts) or (np.ndim(starts[0]) == 0 and not isinstance(starts[0], str)):

@@ -10,7 +10,7 @@ import numpy as np
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
@@ -57,20 +57,12 @@ class Selection(NamedTuple):
 
 def selected(model: Model, outputs: Any, times: Any) -> Selection:
     """What a user has chosen, checked; all outputs at the signals' output times by default."""
-    known = dict.fromkeys((*model.outputs, *model.coordinates, *model.speeds))
+    known = {name: k for k, name in enumerate((*model.definition.states, *model.outputs))}
     chosen = model.outputs if outputs is None else outputs
     chosen = (chosen,) if isinstance(chosen, str) else chosen
     if not isinstance(chosen, Sequence) or not len(chosen):
         raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
-    columns = []
-    for name in chosen:
-        if name not in known:
-            raise unknown("output", name, known)
-        states = len(model.definition.states)
-        if name in model.outputs:
-            columns.append(states + model.outputs.index(name))
-        else:
-            columns.append((*model.coordinates, *model.speeds).index(name))
+    columns = [known[choice("output", name, known)] for name in chosen]
     if times is not None:
         try:
             times = np.atleast_1d(real_array(times))

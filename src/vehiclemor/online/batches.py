@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import count, file_path
+from vehiclemor.arguments import MOST_JOBS, count, file_path
 from vehiclemor.errors import InputError, VehiclemorError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.online.batch_arguments import (
@@ -106,7 +106,7 @@ def simulate_many(
     kept = kept_times(chosen, signals)
     begins = starts_of(starts, runs, reduced.model)
     sets = parameter_sets(parameters, runs, reduced)
-    threads = _cores() if jobs is None else count("jobs", jobs)
+    threads = _cores() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
     about = _attributes(reduced, runs)
     work = _Work(reduced, chosen, signals, begins, sets)
 

@@ -20,7 +20,7 @@ from vehiclemor.arguments import file_path, quoted
 from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.validation import checked_fit
+from vehiclemor.reduction.validation import checked_fit, checked_settings
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr, shortened
 from vehiclemor.simulation.build import build
@@ -132,7 +132,7 @@ def read(path: Any) -> Saved:
         parts, settings, training, parameters = (json.loads(stored.pop(key)) for key in TEXTS)
         model = _model(name, parameters)
         reduces: Method = component("method", method)
-        reduces.check(model, for_method(model, method, settings))
+        checked_settings(reduces, model, for_method(model, method, settings))
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
             raise FileError(f"the equations of {name} have changed since")
         reader = Reader(model, stored)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import number
-from vehiclemor.errors import InputError
+from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
@@ -111,7 +111,8 @@ class ReducedOrderModel(ShortRepr):
         if isinstance(chosen, str):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
-        run = self.reduced.simulate(chosen, begun)
+        with blamed(f"method {self.method!r}: simulate", self.reduced):
+            run = self.reduced.simulate(chosen, begun)
         if self.outside and (run.status == "untrusted" or not (run.trust and run.trust.reason)):
             return run.judged(self.outside)
         if run.trust or self._range is None:
@@ -215,8 +216,11 @@ class ReducedOrderModel(ShortRepr):
         return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
-        """Time derivative (dim,) of a state."""
-        return self.state_space.rates(self._state(state), self._inputs(inputs), time)
+        """Time derivative (dim,) of a state; `InputError` if it isn't finite."""
+        rates = self.state_space.rates(self._state(state), self._inputs(inputs), time)
+        if not np.isfinite(rates).all():
+            raise InputError(f"the derivative of {self._name} is not finite at this state")
+        return rates
 
     def jacobian(
         self,
@@ -379,7 +383,7 @@ def reduce(
         If a name or value is wrong, or the method can't reduce the model.
     """
     from vehiclemor.progress import first_use
-    from vehiclemor.reduction.validation import fitted, validated
+    from vehiclemor.reduction.validation import checked_settings, fitted, validated
     from vehiclemor.simulation.build import build
     from vehiclemor.study.linear_algebra import one_thread
     from vehiclemor.study.scenario import training_run
@@ -390,7 +394,7 @@ def reduce(
     if not accepted:
         raise InputError(reason)
     complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
-    definition.check(ready, complete)
+    checked_settings(definition, ready, complete)
     if isinstance(cars, Mapping) and not cars:
         raise InputError("cars: a box without parameters")
     scenarios = of_cars(ready, training_set(ready, method, training), cars)

@@ -10,10 +10,11 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -138,25 +139,20 @@ class Method(ShortRepr):
     def __post_init__(self) -> None:
         """Refuse what is no method, so that its author reads one clear line."""
         for name in ("name", "summary", "reference"):
-            if not isinstance(getattr(self, name), str):
-                raise InputError(f"method {quoted(self.name)}: {name} is not text")
+            line_of_text(f"method {quoted(self.name)}: {name}", getattr(self, name))
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")
-        with blamed(f"method {self.name!r}: settings"):
+        with blamed(f"method {self.name!r}: settings", self.fit):
             wrong = [kind for kind, s in self.settings.items() if not issubclass(s, Settings)]
         if wrong:
             raise InputError(
                 f"method {self.name!r}: settings of {wrong[0]} are no class of Settings"
             )
-        with blamed(f"method {self.name!r}: presets"):
+        with blamed(f"method {self.name!r}: presets", self.fit):
             for kind, presets in self.presets.items():
                 for preset, name in ((p, n) for p, values in presets.items() for n in values):
-                    if name not in self.names_of(kind):
-                        raise InputError(
-                            f"method {self.name!r}: preset {preset!r} sets {name!r}, "
-                            f"which is no setting of kind {kind}"
-                        )
+                    choice(f"setting in preset {preset!r} of {kind}", name, self.names_of(kind))
 
     def accepts(self, model: Model) -> tuple[bool, str]:
         """Whether the method can reduce a model, and why not; a broken refusal refuses."""
@@ -164,7 +160,7 @@ class Method(ShortRepr):
             kinds = " or ".join(self.settings)
             return False, f"{self.name} reduces kind {kinds}; {model.name} is of kind {model.kind}"
         try:
-            with blamed(f"method {self.name!r}: refusal"):
+            with blamed(f"method {self.name!r}: refusal", self.refusal):
                 reason = self.refusal(model)
         except InputError as error:
             reason = str(error)

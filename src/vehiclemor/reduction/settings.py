@@ -11,6 +11,8 @@ from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
 
 Value = int | float | str
 LARGEST_NUMBER = 1e300
+# Marks a setting that is at most the number of the model's coordinates where it is not given.
+AT_MOST_COORDINATES = "at most the number of coordinates"
 # Beyond a tenth nothing is solved any more.
 LARGEST_TOLERANCE = 0.1
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -10,14 +12,28 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
+HISTORIES = ("time", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
+
 
 @dataclass(frozen=True)
 class TrainingRun(ShortRepr):
-    """One maneuver of the full-order model, solved wherever a method asks."""
+    """One maneuver of the full-order model, solved wherever a method asks.
+
+    It has the `HISTORIES` of a trajectory at the maneuver's output times.
+    """
 
     model: Model
     maneuver: Maneuver
     start: Start
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in HISTORIES:
+            raise AttributeError(f"a training run has no {name}")
+        return getattr(self._recorded, name)
+
+    @cached_property
+    def _recorded(self) -> Trajectory:
+        return self.recorded()
 
     def at(self, times: np.ndarray) -> Trajectory:
         """Full-order trajectory, solved exactly at the given increasing times (samples,) in s."""

@@ -1,21 +1,24 @@
 """The border of methods: settings that come in, and what a fit and its runs give back."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError
+from vehiclemor.errors import InputError, PlugInError, blamed, printable
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
-from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.training import Training
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import STATUSES, Trajectory
+from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
+
+# Pydantic's word for a bound -> ours.
+BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
 
 
 def validated(
@@ -30,7 +33,7 @@ def validated(
     Parameters
     ----------
     coordinates
-        Number of the model's coordinates: a rank that is not given is at most that.
+        Number of the model's coordinates, see `AT_MOST_COORDINATES`.
 
     Returns
     -------
@@ -43,22 +46,27 @@ def validated(
         If a name is not declared, or a value has the wrong kind or is out of bounds.
     """
     presets = method.presets_of(kind)
-    if not isinstance(preset, str) or preset not in presets:
-        raise unknown(f"preset of {method.name}", preset, presets)
+    choice(f"preset of {method.name}", preset, presets)
     declared = method.settings.get(kind, Settings)
     for name in given:
-        if name not in declared.model_fields:
-            raise unknown(f"setting of {method.name}", name, declared.model_fields)
-    chosen = dict(presets[preset])
-    if coordinates is not None and "rank" in declared.model_fields:
-        rank = chosen.get("rank", declared.model_fields["rank"].default)
-        if isinstance(rank, int) and rank > coordinates:
-            chosen["rank"] = coordinates
-    try:
-        return declared.model_validate(chosen | dict(given))
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError(f"{method.name}: {first['loc'][0]} {_wrong(first)}") from None
+        choice(f"setting of {method.name}", name, declared.model_fields)
+    chosen: dict[str, Any] = dict(presets[preset])
+    with blamed(f"method {method.name!r}: settings", declared):
+        for name, field in declared.model_fields.items():
+            if coordinates is not None and AT_MOST_COORDINATES in field.metadata:
+                chosen[name] = min(chosen.get(name, field.default), coordinates)
+        try:
+            return declared.model_validate(chosen | dict(given))
+        except ValidationError as error:
+            first = error.errors()[0]
+            name = first["loc"][0] if first["loc"] else "settings"
+            raise InputError(printable(f"{method.name}: {name} {_wrong(first)}")) from None
+
+
+def checked_settings(method: Method, model: Model, settings: Any) -> None:
+    """Raise `InputError` if validated settings don't fit a model."""
+    with blamed(f"method {method.name!r}: check", method.check):
+        method.check(model, settings)
 
 
 def fitted(
@@ -78,7 +86,8 @@ def fitted(
                 f"training run is another"
             )
     more = (others,) if others and method.fits_others else ()
-    return checked_fit(method.name, method.fit(model, training, settings, *more))
+    with blamed(f"method {method.name!r}: fit", method.fit):
+        return checked_fit(method.name, method.fit(model, training, settings, *more))
 
 
 def of_car(method: Method, reduced: ReducedModel, model: Model, settings: Any) -> ReducedModel:
@@ -90,7 +99,8 @@ def of_car(method: Method, reduced: ReducedModel, model: Model, settings: Any) -
         If the method does not know how.
     """
     if (remade := getattr(reduced, "for_car", None)) is not None:
-        return checked_fit(method.name, remade(model))
+        with blamed(f"method {method.name!r}: for_car", remade):
+            return checked_fit(method.name, remade(model))
     if method.learns_from == "inputs":
         return fitted(method, model, (), settings)
     raise InputError(
@@ -99,54 +109,48 @@ def of_car(method: Method, reduced: ReducedModel, model: Model, settings: Any) -
 
 
 def checked_fit(method: str, reduced: Any) -> Any:
-    """A reduced model; `TypeError` if what `fit` gave is none."""
+    """A reduced model; `PlugInError` if what `fit` gave is none."""
     for name in ("simulate", "best_approximation", "offline", "effective_rank"):
         if not hasattr(reduced, name):
-            raise TypeError(f"method {method!r}: fit gives {quoted(reduced)}, which has no {name}")
+            raise PlugInError(f"method {method!r}: fit: {quoted(reduced)} has no {name}")
     if not isinstance(reduced.offline, Offline):
-        raise TypeError(f"method {method!r}: offline is {quoted(reduced.offline)}, no Offline")
+        raise PlugInError(f"method {method!r}: offline is {quoted(reduced.offline)}, no Offline")
     if not isinstance(reduced.effective_rank, int | np.integer):
         rank = quoted(reduced.effective_rank)
-        raise TypeError(f"method {method!r}: effective_rank is {rank}, no whole number")
+        raise PlugInError(f"method {method!r}: effective_rank is {rank}, no whole number")
     return reduced
 
 
-def checked_run(model: Model, maneuver: Maneuver, reduced: Any, run: Any) -> Trajectory:
-    """A trajectory at the output times; `TypeError` if what `simulate` gave is none."""
-    whose = f"{type(reduced).__module__}.{type(reduced).__name__}: simulate gives"
+def checked_run(model: Model, maneuver: Maneuver, start: Start, reduced: Any) -> Trajectory:
+    """A run of a reduced model at the output times; `PlugInError` if it gives none."""
+    whose = f"{type(reduced).__module__}.{type(reduced).__name__}: simulate"
+    with blamed(whose, reduced):
+        run = reduced.simulate(maneuver, start)
+    whose += " gives"
     if not isinstance(run, Trajectory):
-        raise TypeError(f"{whose} {quoted(run)}, no Trajectory")
-    samples = maneuver.samples
-    for name in ("coordinates", "speeds", "outputs"):
-        shape = (samples, len(getattr(model, name)))
+        raise PlugInError(f"{whose} {quoted(run)}, no Trajectory")
+    columns = {name: (len(getattr(model, name)),) for name in ("coordinates", "speeds", "outputs")}
+    for name, size in {"time": (), **columns}.items():
+        shape = (maneuver.samples, *size)
         found = np.asarray(getattr(run, name))
         if found.shape != shape or found.dtype != float:
-            raise TypeError(f"{whose} {name} {found.shape} of {found.dtype}, not {shape} of floats")
-    if np.shape(run.time) != (samples,):
-        raise TypeError(f"{whose} {np.size(run.time)} times, not the {samples} of the maneuver")
+            raise PlugInError(f"{whose} {name} {found.shape} of {found.dtype}, not {shape} floats")
     if run.status not in STATUSES or not isinstance(run.seconds, float | int):
-        raise TypeError(f"{whose} status {run.status!r} and seconds {quoted(run.seconds)}")
+        raise PlugInError(f"{whose} status {run.status!r} and seconds {quoted(run.seconds)}")
     if not isinstance(run.counts, Mapping):
-        raise TypeError(f"{whose} counts {quoted(run.counts)}, not numbers by name")
+        raise PlugInError(f"{whose} counts {quoted(run.counts)}, not numbers by name")
     return run
 
 
 def _wrong(error: Any) -> str:
     """What is wrong with a value, in the words of this package."""
     value, limits = error["input"], error.get("ctx", {})
-    words: dict[str, Callable[[], str]] = {
-        "greater_than_equal": lambda: f"is {value:g}; it must be at least {limits['ge']:g}",
-        "greater_than": lambda: f"is {value:g}; it must be above {limits['gt']:g}",
-        "less_than_equal": lambda: f"is {value:g}; it must be at most {limits['le']:g}",
-        "less_than": lambda: f"is {value:g}; it must be below {limits['lt']:g}",
-        "int_type": lambda: f"is {value!r}, not an integer",
-        "float_type": lambda: f"is {value!r}, not a number",
-        "string_type": lambda: f"is {value!r}; allowed: text",
-        "literal_error": lambda: f"is {value!r}; allowed: {_listed(limits['expected'])}",
-    }
-    return words.get(error["type"], lambda: error["msg"].removeprefix("Value error, "))()
-
-
-def _listed(expected: str) -> str:
-    """Pydantic's "'a', 'b' or 'c'" as "a, b, c"."""
-    return expected.replace(" or ", ", ").replace("'", "")
+    for limit, words in BOUNDS.items():
+        if limit in limits:
+            return f"is {value:g}; it must be {words} {limits[limit]:g}"
+    allowed = limits.get("expected", "text").replace(" or ", ", ").replace("'", "")
+    kinds = {"int_type": ", not an integer", "float_type": ", not a number"}
+    kinds |= dict.fromkeys(("string_type", "literal_error"), f"; allowed: {allowed}")
+    if error["type"] in kinds:
+        return f"is {quoted(value)}{kinds[error['type']]}"
+    return error["msg"].removeprefix("Value error, ")

@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_folder, write_text, write_whole
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.report.result_selection import stored_result
 from vehiclemor.study.netcdf_file import PART, regions
 
@@ -54,8 +54,7 @@ def convert(
     VehiclemorError
         If there is no such result, a package is missing, or something is there already.
     """
-    if to not in FORMATS:
-        raise unknown("format", to, FORMATS)
+    choice("format", to, FORMATS)
     engine = ENGINES.get(to)
     if engine and not find_spec(engine):
         raise InputError(f"{to} needs the package {engine}: pip install 'vehiclemor[convert]'")

@@ -14,7 +14,7 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import DESIGN_START
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.signals import Signal
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
@@ -253,6 +253,7 @@ class AlgebraicModel(Model):
 
     def _solved(self, sampled: Sampled, solver: str, tolerance: float) -> Trajectory:
         check_positive("tolerance", tolerance)
+        choice("solver", solver, SOLVERS)
         times, inputs, given = sampled
         if solver == "newton_lanes":
             found, solver = self._side_by_side(sampled, tolerance), "newton"
@@ -299,12 +300,10 @@ class AlgebraicModel(Model):
                 modules = "chord_path", "simulation.chord_loops"
                 jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
                 how = np.linalg.inv(jacobian).T.copy()
-            elif solver == "newton_lanes":
+            else:
                 modules, names = ("lane_path", "simulation.lane_loops"), ("newton_step", "outputs")
                 addresses = [address_of(self.kernels, name, LANES) for name in names]
                 how = ready(LaneKernels(np.array(addresses, dtype=np.int64)))
-            else:
-                raise unknown("solver", solver, SOLVERS)
             self._kept[solver] = self.loop(*modules), how
         return self._kept[solver]
 

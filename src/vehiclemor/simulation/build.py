@@ -110,7 +110,7 @@ def _algebraic(
     # Imported here: a model of one kind needs nothing of the other.
     from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
 
-    with blamed(f"model {definition.name!r}: design_coordinates"):
+    with blamed(f"model {definition.name!r}: design_coordinates", definition.design_coordinates):
         design = real_array(definition.design_coordinates(parameters.values()))
     equations, digest = derived or compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
     check_equations(definition, equations)
@@ -139,15 +139,15 @@ def _dynamic(
     from vehiclemor.simulation.dynamic import DynamicModel
 
     values = values_of(definition, parameters.flat())
-    with blamed(f"model {definition.name!r}: check"):
+    with blamed(f"model {definition.name!r}: check", definition.check):
         definition.check(values)
     equations, digest = derived or compiled(definition.name, definition.derive)
     check_equations(definition, equations)
-    with blamed(f"model {definition.name!r}: solve_equilibrium"):
+    with blamed(f"model {definition.name!r}: solve_equilibrium", definition.solve_equilibrium):
         values |= solved_parameters(definition, parameters.flat(), equations)
         solved = [float(values[key]) for key in definition.solved]
     constants = hoisted_constants(equations, parameters.flat(), solved)
-    with blamed(f"model {definition.name!r}: starts"):
+    with blamed(f"model {definition.name!r}: starts", definition.starts):
         initial = {name: real_array(x) for name, x in definition.starts(values).items()}
     _check_states(definition, initial)
     return DynamicModel(definition, equations, parameters, digest, constants, initial)
@@ -193,6 +193,6 @@ def compiled(
     loops
         Modules of the loops that run it.
     """
-    with blamed(f"model {name!r}: its equations can't be derived"):
+    with blamed(f"model {name!r}: its equations can't be derived", derive):
         made = derivation(name, derive)
     return made, kernel_hash(f"{made.source}\n{loops_digest(loops)}")

@@ -1,5 +1,6 @@
 """Checks at the border of a model that is ready to run, and of what its runs give."""
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,8 @@ from vehiclemor.arguments import number, quoted, real_array, within
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
+
+LARGEST = sys.float_info.max
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -76,7 +79,8 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
         value, bool
     )
-    if not (number and 0.0 < float(value) < np.inf and float(value) >= smallest):  # type: ignore[arg-type]
+    # An integer may be too large for a float.
+    if not (number and 0.0 < value <= LARGEST and value >= smallest):  # type: ignore[operator]
         bound = f"at least {smallest:g}" if smallest else "positive"
         raise InputError(f"{name} is {quoted(value)}; it must be a finite number, {bound}")
 

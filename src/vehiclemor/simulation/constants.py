@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.codegen.tangent import tangent
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
     from vehiclemor.codegen.derivation import Derivation
@@ -61,14 +61,10 @@ def components(definition: ModelDefinition, name: str) -> range:
     InputError
         If it is no parameter of the model.
     """
-    if name not in definition.parameters:
-        raise unknown("parameter", name, definition.parameters)
-    place = 0
-    for known, declared in definition.parameters.items():
-        if known == name:
-            break
-        place += declared.size
-    return range(place, place + definition.parameters[name].size)
+    declared = definition.parameters
+    place = [*declared].index(choice("parameter", name, declared))
+    first = sum(before.size for before in [*declared.values()][:place])
+    return range(first, first + declared[name].size)
 
 
 def constants_along(

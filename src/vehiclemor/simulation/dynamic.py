@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vehiclemor.arguments import number
 from vehiclemor.codegen.loops import Prepared, Ready, cache_lines, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
@@ -20,6 +21,7 @@ from vehiclemor.simulation.checks import (
     loop_array,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.integrators.catalogue import integrator
 from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.kernel_derivatives import By, chosen
 from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
@@ -207,6 +209,8 @@ class DynamicModel(Model):
         ConvergenceError
             If the integration fails or leaves the model's range of validity.
         """
+        if solver is not None:
+            integrator(solver)
         trajectory = self.integrate(
             maneuver,
             self.start(start),
@@ -215,7 +219,7 @@ class DynamicModel(Model):
             REFERENCE_TOLERANCE if tolerance is None else tolerance,
             times,
             longest_step,
-            begin,
+            begin if type(begin) is float else number("begin", begin),
         )
         if trajectory.status != "ok":
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)

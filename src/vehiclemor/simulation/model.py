@@ -71,6 +71,11 @@ class Model(ShortRepr):
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
 
+    def __post_init__(self) -> None:
+        """Methods share it: what a plug-in writes into it is refused."""
+        for array in (self.constants, *self.initial.values()):
+            array.flags.writeable = False
+
     @property
     def name(self) -> str:
         """Registered name."""

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.errors import ConvergenceError, InputError, PlugInError, blamed
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import checked_run, fitted, of_car
+from vehiclemor.reduction.validation import checked_run, checked_settings, fitted, of_car
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
@@ -188,7 +188,8 @@ def refusal(model: Model, experiment: Experiment) -> Failure | None:
         accepted, reason = method.accepts(model)
         if not accepted:
             raise InputError(reason)
-        method.check(model, for_method(model, experiment.method, experiment.settings))
+        settings = for_method(model, experiment.method, experiment.settings)
+        checked_settings(method, model, settings)
 
     return attempt(check)
 
@@ -333,17 +334,18 @@ def _tested(
             return Outcome(trajectory, reference, estimate=_estimate(car, trajectory))
         # The first run loads machine code and warms caches, another is timed where it is compared.
         if not fitted.warm and reference is not None:
-            reduced.simulate(scenario.maneuver, start)
+            checked_run(car, scenario.maneuver, start, reduced)
             fitted.warm = True
         trajectory = _sound(car, reduced, scenario, start)
         trajectory = _remarked(model, experiment, scenario, trajectory, reduced)
         if reference is None:
             return Outcome(trajectory, None)
-        nearest = reduced.best_approximation(reference.states)
+        with blamed(f"method {experiment.method!r}: best_approximation", reduced):
+            nearest = reduced.best_approximation(reference.states)
         if nearest is None:
             return Outcome(trajectory, reference)
         if np.shape(nearest) != reference.states.shape:
-            raise TypeError(
+            raise PlugInError(
                 f"best_approximation gives shape {np.shape(nearest)}, not its argument's"
             )
         floor = rms(car.outputs_at(nearest, reference.inputs) - reference.outputs)
@@ -389,8 +391,7 @@ def _estimate(model: Model, run: Trajectory) -> ErrorEstimate | None:
 
 def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:
     """A run; what ends without complaint, but in values that are no numbers, diverged."""
-    run = reduced.simulate(scenario.maneuver, start)
-    trajectory = checked_run(model, scenario.maneuver, reduced, run)
+    trajectory = checked_run(model, scenario.maneuver, start, reduced)
     if not trajectory.finished or np.isfinite(trajectory.outputs).all():
         return trajectory
     return replace(trajectory, status="diverged", message="an output is not finite")

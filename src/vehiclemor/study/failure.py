@@ -12,8 +12,10 @@ from vehiclemor.errors import (
     ConvergenceError,
     InputError,
     MachineError,
+    PlugInError,
     UnreachableError,
     VehiclemorError,
+    interrupted,
     machine_reason,
     one_line,
 )
@@ -50,11 +52,15 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
         return Failure("unreachable", _line(error))
     except ConvergenceError as error:
         return Failure("diverged", whose + _line(error))
+    except PlugInError as error:
+        return Failure("error", whose + _line(error))
     except InputError as error:
         return Failure("rejected", _line(error))
     except VehiclemorError:
         raise
-    except Exception as error:
+    except BaseException as error:
+        if interrupted(error):
+            raise
         if reason := machine_reason(error):
             raise MachineError(reason) from error
         return Failure("error", whose + one_line(error))

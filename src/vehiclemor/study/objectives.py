@@ -10,7 +10,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.study.between_samples import crossing, highest
 
@@ -272,6 +272,4 @@ def objective(name: str) -> Objective:
     InputError
         If there is none of that name.
     """
-    if not isinstance(name, str) or name not in OBJECTIVES:
-        raise unknown("objective", name, OBJECTIVES)
-    return OBJECTIVES[name]
+    return OBJECTIVES[choice("objective", name, OBJECTIVES)]

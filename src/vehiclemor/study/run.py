@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.arguments import count, within
+from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.errors import InputError
 from vehiclemor.progress import telling
 from vehiclemor.study.cluster import LOCAL, reached
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _LOG = logging.getLogger("vehiclemor")
-MOST_JOBS = 1024
 # A grid of so many points is told of before it is expanded; and so many experiments are made and
 # given to workers at a time.
 LARGE, AT_ONCE = 10_000, 5_000
@@ -56,7 +55,7 @@ def run_studies(
         Study name -> combined dataset, stored too, see `combined_path`; of a protocol the name is
         `predictive-<protocol>`.
     """
-    within("jobs", count("jobs", jobs), (1, MOST_JOBS))
+    count("jobs", jobs, most=MOST_JOBS)
     if jobs > 1 and scheduler not in ("", LOCAL):
         raise InputError("jobs: a scheduler at an address has its own workers")
     files = studies_and_files(study)

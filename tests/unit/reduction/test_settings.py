@@ -1,5 +1,6 @@
 """Settings of methods are checked at the border: kind, bounds, choices, names."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import OneOf, Settings
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES, OneOf, Settings
 from vehiclemor.reduction.validation import validated
 
 
@@ -34,6 +35,18 @@ def test_defaults_then_preset_then_given() -> None:
     method = declared(mine={"rank": 4, "mode": "slow"})
     settings = validated(method, "ode", {"rank": 5}, "mine").model_dump()
     assert settings == {"rank": 5, "period": 5.0, "mode": "slow", **others}
+
+
+class Bounded(Declared):
+    modes: Annotated[int, AT_MOST_COORDINATES] = Field(3, ge=1, description="how many at most")
+
+
+def test_a_default_is_at_most_the_number_of_coordinates_where_it_says_so() -> None:
+    method = replace(declared(), presets={"ode": {"mine": {"modes": 4}}}, settings={"ode": Bounded})
+    for preset in ("recommended", "mine"):
+        settings = validated(method, "ode", {}, preset, coordinates=2)
+        assert (settings.rank, settings.modes) == (3, 2)
+    assert validated(method, "ode", {"modes": 3}, coordinates=2).modes == 3
 
 
 @pytest.mark.parametrize(

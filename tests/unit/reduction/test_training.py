@@ -34,6 +34,18 @@ def test_run_is_exact_at_any_times(
     np.testing.assert_allclose(history.coordinates, full.coordinates[some], rtol=0, atol=1e-13)
 
 
+def test_a_run_has_the_histories_of_its_trajectory(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    [run] = training_runs(model, nominal)
+    recorded = run.recorded()
+    for name in ("time", "inputs", "states", "outputs"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
+    assert run.outputs is run.outputs
+    with pytest.raises(AttributeError, match="a training run has no rank"):
+        _ = run.rank
+
+
 @pytest.mark.parametrize(
     ("policy", "message"),
     [("set", "needs training_set"), ("nomnal", "unknown training .* did you mean nominal")],

@@ -19,7 +19,7 @@ from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedMod
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.validation import fitted, of_car, validated
+from vehiclemor.reduction.validation import checked_settings, fitted, of_car, validated
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
@@ -209,7 +209,7 @@ def check(model: DynamicModel, settings: GuardedSettings) -> None:
         if not accepted or name == NAME:
             told = reason or "it would guard itself"
             raise InputError(f"{NAME}: {setting} can't be {name!r}: {told}")
-        method.check(model, of(model, settings))
+        checked_settings(method, model, of(model, settings))
 
 
 def _of_fast(model: DynamicModel, settings: GuardedSettings) -> Any:

@@ -10,7 +10,7 @@ import math
 import time
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -26,7 +26,7 @@ from vehiclemor.reduction.polynomials.kernels import (
 from vehiclemor.reduction.polynomials.residual_loops import Polynomials
 from vehiclemor.reduction.projection.algebraic import ITERATION_LIMIT
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
-from vehiclemor.reduction.settings import Settings, StepTolerance
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings, StepTolerance
 from vehiclemor.reduction.solved_path import solved_path
 from vehiclemor.reduction.state_space import SolvedAnywhere
 from vehiclemor.reduction.training import Training
@@ -50,7 +50,7 @@ LINEARITY_TOLERANCE = 1e-12
 class PolynomialResidualSettings(Settings):
     """Settings for a kinematic model."""
 
-    rank: int = Field(3, ge=1, description="number of reduced coordinates")
+    rank: Annotated[int, AT_MOST_COORDINATES] = Field(3, ge=1, description="reduced coordinates")
     degree: int = Field(3, ge=1, description="total degree of the polynomials")
     snapshots: int = Field(101, ge=2, description="snapshots in each training run")
     solver: Literal["chord", "newton"] = Field(

@@ -4,9 +4,22 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vehiclemor.reduction.settings import ProjectedSettings, Settings, StepTolerance, Tolerance
+from vehiclemor.reduction.settings import (
+    AT_MOST_COORDINATES,
+    ProjectedSettings,
+    Settings,
+    StepTolerance,
+    Tolerance,
+)
 
-Rank = Annotated[int, Field(ge=1, description="number of basis vectors in each window")]
+Rank = Annotated[
+    int,
+    Field(
+        ge=1,
+        description="number of basis vectors in each window; by default no more than coordinates",
+    ),
+    AT_MOST_COORDINATES,
+]
 Snapshots = Annotated[int, Field(ge=2, description="snapshots in each window and training run")]
 RankTolerance = Annotated[
     float,

@@ -119,7 +119,10 @@ def own_and_others(model: DynamicModel, training: Training) -> tuple[Training, l
     """
     own = [run for run in training if not difference(model, run.model)]
     if not own:
-        raise InputError("a box of cars is learnt around one of them: no training run is of it")
+        raise InputError(
+            "slow_manifold must be trained on the car it is tested on; no training run is of it "
+            '(cars = "nominal" trains on the model\'s own car alone)'
+        )
     if len(own) == len(training):
         return own, []
     cars = cars_of(run.model for run in training)

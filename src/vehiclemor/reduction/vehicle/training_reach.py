@@ -7,7 +7,7 @@ slow motion, is known for the starts of the training alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -96,12 +96,6 @@ class TrainingReach:
         # Slower motion of the start is in the reduced states; it is as large as that of the modes.
         larger = max(float((sizes / self.steered).max()) / FADED, 1.0)
         return max(settled, self.faded * np.log(larger) / -np.log(FADED))
-
-    def with_starts(self, remainders: np.ndarray) -> TrainingReach:
-        """The same with other known starts, by what lifting leaves of them (starts, n)."""
-        if not len(self.left):
-            return self
-        return replace(self, **known_starts(remainders, self.left))
 
     def unlike(self, remainder: np.ndarray) -> float:
         """How much a start leaves (n,), beside what known starts do; 1 is the edge."""

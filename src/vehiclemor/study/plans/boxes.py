@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import component, unknown
+from vehiclemor.registry import choice, component
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol_file import Box, Draw, ProtocolFile
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
@@ -92,14 +92,13 @@ def check_boxes(model: Model, definition: ProtocolFile) -> None:
             try:
                 _check_corners(model, box)
             except InputError as error:
-                raise InputError(f"{purpose}, box {number}: {error}") from None
+                raise type(error)(f"{purpose}, box {number}: {error}") from None
 
 
 def _check_corners(model: Model, box: Box) -> None:
     maneuver: Maneuver = component("maneuver", box.maneuver)
     for start in box.start:
-        if start not in model.starts:
-            raise unknown(f"start of {model.name}", start, model.starts)
+        choice(f"start of {model.name}", start, model.starts)
     for frequency in box.frequency:
         for speed in box.speed or [None]:
             for amplitude in box.amplitude:

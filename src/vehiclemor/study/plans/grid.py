@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import FileError, GeometryError, InputError
+from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -214,6 +214,8 @@ def expand(name: str, study: StudyFile) -> Grid:
         grid.check()
         assert grid.keys.size
         return grid
+    except PlugInError:
+        raise
     except (InputError, GeometryError) as error:
         raise FileError(f"study {name}: {error}") from None
 

@@ -4,10 +4,10 @@ import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vehiclemor.errors import FileError, GeometryError, InputError
+from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
-from vehiclemor.registry import component, unknown
+from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -103,6 +103,8 @@ def load_protocol(protocol: str) -> Protocol:
     definition = read_toml(path, ProtocolFile)
     try:
         return _resolved(path, definition)
+    except PlugInError:
+        raise
     except (GeometryError, InputError) as error:
         raise FileError(f"{path}: {error}") from None
 
@@ -113,8 +115,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     if definition.straight:
         outputs.append(definition.straight.output)
     for output in outputs:
-        if output not in model.outputs:
-            raise unknown(f"output of {model.name}", output, model.outputs)
+        choice(f"output of {model.name}", output, model.outputs)
     sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
     check_boxes(model, definition)
@@ -125,8 +126,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
             raise InputError(f"label {label!r} is used twice")
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
-        if target.against not in known:
-            raise unknown("row that a target is against", target.against, known)
+        choice("row that a target is against", target.against, known)
     return Protocol(path, definition, model, sets, contestants)
 
 
@@ -135,10 +135,13 @@ def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenar
     found: list[Scenario] = []
     for number, group in enumerate(getattr(definition, key), start=1):
         try:
+            # What is stored lists them where there are none.
+            if "points" in group.model_fields_set and not group.points:
+                raise InputError("points is empty")
             runs = _of_group(model, group)
             found += by_cars(model, runs, definition.cars) if group.cars else runs
         except InputError as error:
-            raise InputError(f"{key}, group {number}: {error}") from None
+            raise type(error)(f"{key}, group {number}: {error}") from None
     return tuple(found)
 
 
@@ -189,8 +192,7 @@ def _contestant(
         candidates.append(complete)
     known = {scenario.maneuver.name for scenario in sets["training"]}
     for name in entry.train_on:
-        if name not in known:
-            raise unknown(f"maneuver in the training of {where}", name, known)
+        choice(f"maneuver in the training of {where}", name, known)
     training = tuple(
         s for s in sets["training"] if not entry.train_on or s.maneuver.name in entry.train_on
     )

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from vehiclemor.toml_files import FileSchema
+from vehiclemor.toml_files import FileSchema, Line
 
 
 class Bound(FileSchema):
@@ -97,7 +97,7 @@ class Draw(FileSchema):
 class ContestantEntry(FileSchema):
     """One method with candidates for its settings."""
 
-    label: str = Field(min_length=1, description="name of its row")
+    label: Line = Field(description="name of its row")
     method: str = Field(description="registered name")
     role: Literal["full order", "baseline", "contender"] = Field(
         "contender", description="of full order every candidate has a row; a contender chooses one"
@@ -138,7 +138,7 @@ class Straight(FileSchema):
 class ProtocolFile(FileSchema):
     """Schema of `data/protocols/*.toml`."""
 
-    title: str = Field(description="one line")
+    title: Line = Field(description="one line")
     model: str = Field(description="registered name")
     bounds: dict[str, Bound] = Field(min_length=1, description="output -> largest allowed error")
     reported: list[str] = Field(

@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.errors import FileError
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.toml_files import FileSchema, has_table, read_toml
+from vehiclemor.toml_files import FileSchema, Line, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
@@ -72,7 +72,7 @@ class MethodEntry(FileSchema):
     """One method of a study: settings that differ from a preset, under a label of its own."""
 
     method: str = Field(description="registered name")
-    label: str = Field("", description="name of its results; the method's by default")
+    label: Line = Field("", description="name of its results; the method's by default")
     preset: str = Field("recommended", description="preset that its settings differ from")
     settings: dict[str, int | float | str] = Field(
         default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
@@ -88,7 +88,7 @@ class StudyFile(FileSchema):
     `study/plans/protocol.py`).
     """
 
-    title: str = Field(description="one line")
+    title: Line = Field(description="one line")
     studies: list[str] = Field(
         default_factory=list, description="of a collection: names of studies, or TOML files"
     )
@@ -228,9 +228,7 @@ def named_file(kind: str, folder: str, name: str) -> Path:
     """
     if name.endswith(".toml"):
         return Path(name)
-    if name not in data_names(folder):
-        raise unknown(kind, name, data_names(folder))
-    return data_folder() / folder / f"{name}.toml"
+    return data_folder() / folder / f"{choice(kind, name, data_names(folder))}.toml"
 
 
 def study_path(study: str) -> Path:
