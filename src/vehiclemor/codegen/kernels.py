@@ -42,6 +42,18 @@ class KernelSource:
     sizes: tuple[int, ...]
     dimensions: int
 
+    def check(self, *lengths: int) -> None:
+        """Raise `ValueError` if the kernel reads or writes more floats than its arguments have.
+
+        Parameters
+        ----------
+        lengths
+            Of the arguments in order, as far as they are known.
+        """
+        for argument, size, length in zip(self.arguments, self.sizes, lengths, strict=False):
+            if size > length:
+                raise ValueError(f"kernel {self.name}: {argument} has {length} floats, not {size}")
+
 
 class Kernels:
     """Kernels by name, each compiled when it is first used.
@@ -124,10 +136,14 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
     return address, ctypes.CFUNCTYPE(None, *pointers)(address), code
 
 
+def kernel_texts(text: str) -> list[str]:
+    """Texts of the kernels in a text."""
+    return [f"{part}\n" for part in re.split(r"\n+(?=def )", text.strip())]
+
+
 def kernel_sources(text: str) -> dict[str, KernelSource]:
     """Sources of the kernels in a text, by name."""
-    found = [_source(f"{part}\n") for part in re.split(r"\n+(?=def )", text.strip())]
-    return {source.name: source for source in found}
+    return {source.name: source for source in map(_source, kernel_texts(text))}
 
 
 # Models with other parameters ask for the same again.

@@ -4,109 +4,153 @@ A kernel reads and writes at the places that its text names, a loop as far as an
 that a file that lies about sizes would reach into other memory.  Whatever fails is a `ValueError`.
 """
 
-import ast
+import dataclasses
 import math
-import re
-import sys
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, lru_cache
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from vehiclemor.codegen.kernel_statements import KernelText
-from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.llvm_kernels import kernel_module
+from vehiclemor.codegen.foreign_texts import MOST_CHARACTERS, MOST_SIZE, check_line
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.codegen.vector_statements import NAMES
+from vehiclemor.reduction.cars import Cars
+from vehiclemor.reduction.methods import path_map, polynomial_residual
+from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.projection.car_subspaces import Subspaces
 from vehiclemor.reduction.projection.dynamic import DynamicProjection
+from vehiclemor.reduction.projection.pod_settings import Formulation
 from vehiclemor.reduction.reduced_system import FullStates, ReducedSystem
+from vehiclemor.reduction.validation import checked_fit
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.slow_cars import SlowVehicle
 from vehiclemor.reduction.vehicle.two_track_cars import TwoTrackVehicle
 from vehiclemor.reduction.vehicle.two_track_fit import FEATURES
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
 
-ARGUMENTS = ("_x", "_u", "_constants", "_result")
-# Statements that read and write more than their text names.
-WHOLE_VECTORS = re.compile(rf"\b({'|'.join(NAMES)})\s*\(")
+# Reduced coordinates; the models of this package have at most 9.
+MOST_STATES = 100
+# A kernel of whole steps has all features so many times.
+STEPS = 6
 
 
-def check(part: Any) -> None:
-    """Raise `ValueError` if a part is not of the sizes that others will take it for."""
+def check(part: Any, model: Model) -> None:
+    """Raise `ValueError` if a part of a reduced model is not what others will take it for."""
+    if type(part).__module__.startswith("vehiclemor."):
+        for name, kind in _declared(type(part)).items():
+            _require(_is(getattr(part, name), kind), name)
     match part:
-        case Kernels():
-            for source in part.sources.values():
-                _require(not WHOLE_VECTORS.search(source.text), f"kernel {source.name}")
-                # Whatever is no straight-line arithmetic is found now, not at the first run.
-                kernel_module([KernelText(source.text)])
+        case Cars():
+            components = len(model.parameters.flat())
+            _shaped("cars", (part.values, max(len(part.values), 1), components))
         case Features():
-            _check_features(part)
+            _parameters(part)
         case ReducedVehicle():
             _check_vehicle(part)
         case System():
             _check_system(part)
         case ReducedSystem():
             _check_reduced_system(part)
+        case GuardedModel():
+            for each in (part.fast, part.safe):
+                checked_fit(part.fast_name, each)
         case AlgebraicProjection():
             n = len(part.model.coordinates)
             _require(len(part.edges) == len(part.bases) + 1, "edges")
             for basis in part.bases:
                 _shaped("bases", (basis.mean, n), (basis.vectors, n, basis.rank))
+                _require(basis.rank <= n, "bases")
         case PathMapModel():
             _check_map(part)
         case PolynomialResidualModel():
             n, inputs, r = len(part.model.coordinates), len(part.model.inputs), part.basis.rank
-            terms = math.comb(r + part.degree, r)
+            known = 0 < part.degree <= polynomial_residual.HIGHEST_DEGREE and 0 < r <= n
+            terms = math.comb(r + part.degree, r) if known else 0
+            _require(0 < terms <= polynomial_residual.MOST_MONOMIALS, "degree")
             _shaped("basis", (part.basis.mean, n), (part.basis.vectors, n, r), (part.scales, r))
             _shaped("response", (part.mean_inputs, inputs), (part.response, inputs, r))
             _shaped("coefficients", (part.coefficients, terms, r))
 
 
-def _check_features(part: Features) -> None:
-    for name, _ in part.lines:
-        _require(name.isidentifier() and not name.startswith("_"), f"line {name!r}")
-    _places(part)
+@cache
+def _declared(kind: type) -> Mapping[str, Any]:
+    """Fields of a dataclass or a named tuple, with their types."""
+    if not dataclasses.is_dataclass(kind) and not hasattr(kind, "_fields"):
+        return {}
+    return get_type_hints(kind)
+
+
+def _is(value: Any, kind: Any) -> bool:
+    """Whether a value is of a declared type; what is made of others is of it in all its parts."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return any(_is(value, one) for one in inner)
+    if origin is tuple and inner[-1:] != (...,):
+        fits = isinstance(value, tuple) and len(value) == len(inner)
+        return fits and all(map(_is, value, inner))
+    if origin in (tuple, list):
+        return isinstance(value, origin) and all(_is(part, inner[0]) for part in value)
+    if origin in (dict, Mapping):
+        return isinstance(value, Mapping) and all(_is(v, inner[1]) for v in value.values())
+    if origin is Callable:
+        return callable(value)
+    if kind is Any or getattr(kind, "_is_protocol", False):
+        return True
+    # A truth value is a whole number to Python, and that is a float to the type's author.
+    wider = (float, int) if kind is float else kind
+    return isinstance(value, wider) and (kind is bool or not isinstance(value, bool))
+
+
+@lru_cache(maxsize=64)
+def _parameters(part: Features) -> int:
+    """Number of parameters that features need; their texts reach into nothing else."""
+    _require(0 < part.states <= MOST_STATES and 0 <= part.inputs <= MOST_STATES, "states")
+    lines = [*part.lines, *(("term", text) for text in part.terms)]
+    lines += [("watched", text) for text, _ in part.watched]
+    _require(sum(len(text) for _, text in lines) <= MOST_CHARACTERS // STEPS, "features")
+    known = {f"z{i}" for i in range(part.states)} | {f"u{i}" for i in range(part.inputs)}
+    sizes, most = [], 0
+    for number, (name, text) in enumerate(lines):
+        size, needed = check_line(name, text, known)
+        sizes.append(size)
+        most = max(most, needed)
+        if number < len(part.lines):
+            known.add(name)
+    own, total = sizes[len(part.lines) :], sum(sizes)
+    _require(len(part.groups) <= part.states + PLANAR, "groups")
     for terms, columns in part.blocks:
-        _within("groups", terms, len(part.terms))
-        _within("groups", columns, part.states + PLANAR)
+        _apart("groups", terms, len(part.terms))
+        _apart("groups", columns, part.states + PLANAR)
+        _require(bool(terms and columns), "groups")
+        total += sum(own[j] for j in terms) + len(terms) * padded(len(columns))
+    _require(total <= MOST_SIZE // STEPS, "features")
     fits = all(size > 0 for size in part.diagonal) and sum(part.diagonal) <= part.states
     _require(fits, "diagonal")
-
-
-def _places(part: Features) -> int:
-    """Number of parameters that features need; their texts reach into nothing else."""
-    most = 0
-    texts = (*part.terms, *(text for _, text in part.lines), *(text for text, _ in part.watched))
-    for text in texts:
-        for node in ast.walk(ast.parse(text, mode="eval")):
-            if isinstance(node, ast.Name):
-                _require(not node.id.startswith("_"), f"feature {text[:40]!r}")
-            if isinstance(node, ast.Subscript):
-                place = getattr(node.slice, "value", -1)
-                _require(ast.unparse(node.value) == "p", f"feature {text[:40]!r}")
-                _within(f"feature {text[:40]!r}", [place], sys.maxsize)
-                most = max(most, place + 1)
     return most
 
 
 def _check_vehicle(part: ReducedVehicle) -> None:
     own, lifted = part.features, part.lifted_features or part.features
     k, n, inputs = own.states, len(part.shape.kept), len(part.model.inputs)
-    same = (own.inputs, lifted.inputs, lifted.states) == (inputs, inputs, k)
-    _require(same and part.shape.model is part.model, "features")
-    _require(part.parameters.ndim == 1, "parameters")
-    _require(len(part.parameters) >= max(_places(own), _places(lifted)), "parameters")
+    _require((own.inputs, lifted.inputs, lifted.states) == (inputs, inputs, k), "features")
+    _require(part.parameters.ndim == 1 and part.parameters.dtype == float, "parameters")
+    _require(len(part.parameters) >= max(_parameters(own), _parameters(lifted)), "parameters")
     _shaped("coefficients", (part.coefficients, len(own.terms), k + PLANAR))
     _shaped("lifting", (part.lifting, len(lifted.terms), n))
     _shaped("encoding", (part.encoding, k, n), (part.feedthrough, k, inputs))
     _shaped("error_scale", (part.error_scale, k + PLANAR))
+    modes = len(part.transient.rates)
+    for vectors in (part.transient.left, part.transient.right):
+        _require(not modes or vectors.shape == (modes, n), "transient")
+    _require(modes <= n, "transient")
     if isinstance(part, SlowVehicle) and part.box is not None:
         box, free = part.box, sum(len(terms) for terms, _ in part.box.table.free)
         _shaped("box", (box.coefficients, *part.coefficients.shape))
@@ -117,9 +161,9 @@ def _check_vehicle(part: ReducedVehicle) -> None:
         texts = {*own.terms, *lifted.terms}
         _require(all(set(part.box.chosen[kind]) <= texts for kind in FEATURES), "box")
     reach = part.reach
-    _require(own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
+    _require(0 <= own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
     if len(reach.lasted):
-        modes, starts = len(part.transient.rates), len(reach.begun)
+        starts = len(reach.begun)
         _shaped("lasted", (reach.lasted, 2 * lifted.lateral, LEVELS), (reach.decaying, modes))
         _shaped("steered", (reach.steered, modes))
         _shaped("starts", (reach.left, n), (reach.starts, starts, n), (reach.begun, starts))
@@ -127,17 +171,13 @@ def _check_vehicle(part: ReducedVehicle) -> None:
 
 def _check_system(part: System) -> None:
     dim, n = len(part.reference), len(part.constants)
-    results = {"derivative": dim, "speeds": dim // 2, "second_order": dim // 2 * (dim // 2 + 1)}
-    for name, source in part.kernels.sources.items():
-        if name in (*results, "full_state"):
-            most = (dim, part.inputs, n, results.get(name, source.sizes[-1]))
-            fits = all(size <= limit for size, limit in zip(source.sizes, most, strict=False))
-            _require(source.arguments == ARGUMENTS and fits, f"kernel {name}")
     _shaped("system", (part.reference, dim), (part.error_scale, dim), (part.constants, n))
-    _require(not part.fused and not part.diagonal, "fused")
-    _require(len(part.partners) in (0, dim), "partners")
+    _require(not part.fused and not part.diagonal and not part.directions.size, "fused")
     for name in ("active", "rotating", "partners"):
-        _within(name, getattr(part, name).tolist(), dim)
+        _apart(name, getattr(part, name).tolist(), dim)
+    _require(len(part.rotating) % 2 == 1 or not part.rotating.size, "rotating")
+    mirrored = part.partners[part.partners].tolist()
+    _require(mirrored in ([], list(range(dim))), "partners")
 
 
 def _check_reduced_system(part: ReducedSystem) -> None:
@@ -147,7 +187,7 @@ def _check_reduced_system(part: ReducedSystem) -> None:
     lifting = getattr(part.lift, "__self__", None)
     if isinstance(lifting, FullStates):
         written = lifting.system.kernels.sources["full_state"].sizes[-1]
-        _require(written <= lifting.size == states, "full_state")
+        _require(written <= lifting.size == states >= dim, "full_state")
         _require(lifting.system is system, "full_state")
     else:
         _require(dim == states, "system")
@@ -158,42 +198,49 @@ def _check_reduced_system(part: ReducedSystem) -> None:
 
 def _check_subspaces(part: Subspaces, dim: int) -> None:
     width, windows = len(part.weight), len(part.local)
-    _require(width in (dim, dim // 2) and len(part.edges) == windows + 1, "subspaces")
+    _require(width in (dim, dim // 2) and len(part.edges) == windows + 1 > 1, "subspaces")
+    _require(part.formulation in get_args(Formulation), "formulation")
     _shaped("weight", (part.weight, width, width))
-    cars = len(part.local[0].means) if windows else 0
+    cars = len(part.local[0].means)
     _require(cars in (1, len(part.cars.values)), "cars")
     for local in part.local:
         rank = local.origin.shape[-1]
+        _require(rank <= width, "origin")
         _shaped("means", (local.means, cars, dim), (local.origin, width, rank))
         _shaped("tangents", (local.tangents, cars, width, rank))
 
 
 def _check_windows(part: ProjectionWindows, dim: int) -> None:
     windows = len(part.ranks)
-    _require(part.formulation in FORMULATIONS and len(part.edges) == windows + 1, "edges")
-    if part.formulation == "full":
-        _require(part.ranks.tolist() == [dim], "ranks")
-        return
-    rows = part.trial_basis.shape[1]
-    bases = (part.trial_basis, windows, rows, dim), (part.test_basis, windows, rows, dim)
-    _shaped("spaces", (part.means, windows, dim), *bases)
+    _require(part.formulation in FORMULATIONS and len(part.edges) == windows + 1 > 1, "edges")
+    full = part.formulation == "full"
+    rows, columns = (1, 1) if full else (part.trial_basis.shape[1], dim)
+    bases = (part.trial_basis, windows, rows, columns), (part.test_basis, windows, rows, columns)
+    _shaped("spaces", (part.edges, windows + 1), (part.means, windows, columns), *bases)
     # A coordinate and its rate share a row where coordinates are projected.
-    most = rows * (2 if part.formulation == "coordinates" else 1)
-    _within("ranks", part.ranks.tolist(), most + 1)
+    most = dim if full else rows * (2 if part.formulation == "coordinates" else 1)
+    _within("ranks", part.ranks.tolist(), min(most, dim) + 1)
+    _require(not full or part.ranks.tolist() == [dim], "ranks")
 
 
 def _check_map(part: PathMapModel) -> None:
     inputs, cells = len(part.model.inputs), part.cells
     _shaped("ranges", (part.ranges, inputs, 2), (cells.centres, inputs), (cells.scales, inputs))
     _shaped("cells", (cells.halves, inputs), (cells.tops, inputs))
-    _within("moving", part.moving, inputs)
+    # What is no number would be a place anywhere.
+    _require(np.isfinite([*cells.centres, *cells.scales, *part.ranges.ravel()]).all(), "cells")
+    _apart("moving", part.moving, inputs)
+    _require(0 <= part.degree <= path_map.HIGHEST_DEGREE, "degree")
     _require(len(part.columns) == len(part.model.coordinates) + len(part.model.outputs), "columns")
+    _within("columns", part.columns, len(part.columns))
     numbers = cells.numbers.tolist()
     _require(len(numbers) == inputs and min(numbers) > 0, "numbers")
     _require(np.array_equal(cells.tops, cells.numbers - 1.0), "tops")
+    _require(np.array_equal(cells.halves, 0.5 * cells.numbers), "halves")
     terms = math.comb(len(part.moving) + part.degree, part.degree)
     width = padded(max(part.columns) + 1)
     _shaped("coefficients", (cells.coefficients, math.prod(numbers), terms, width))
+    _require(bool(part.moving) and terms * width <= MOST_SIZE, "degree")
 
 
 def _shaped(what: str, *arrays: Sequence[Any]) -> None:
@@ -202,8 +249,16 @@ def _shaped(what: str, *arrays: Sequence[Any]) -> None:
         _require(array.dtype == float and array.shape == tuple(shape), what)
 
 
-def _within(what: str, places: Iterable[int], size: int) -> None:
-    _require(all(isinstance(place, int) and 0 <= place < size for place in places), what)
+def _within(what: str, places: Sequence[Any], size: int) -> None:
+    """Require whole numbers of at least zero and below a size."""
+    _require(all(type(place) is int and 0 <= place < size for place in places), what)
+
+
+def _apart(what: str, places: Sequence[Any], size: int) -> None:
+    """Require the same, each once."""
+    _require(len(places) <= size, what)
+    _within(what, places, size)
+    _require(len({*places}) == len(places), what)
 
 
 def _require(fits: bool, what: str) -> None:

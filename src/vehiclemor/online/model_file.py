@@ -37,6 +37,9 @@ SCHEMA = 3
 TEXTS = ("parts", "settings", "training", "parameters")
 # What is taken apart.
 PARTS = ("reduced", "known")
+# Bytes of all variables of a file, and characters of a text: the largest of this package's methods
+# have 3 MB and 0.3 million.
+MOST_BYTES, MOST_CHARACTERS = 1 << 28, 4_000_000
 # Differences of what a model's equations give that rounding explains: relative, and as part of the
 # largest number.
 SAME, ROUNDING = 1e-8, 1e-12
@@ -129,7 +132,7 @@ def read(path: Any) -> Saved:
     stored, attrs = content(path)
     try:
         method, name = str(attrs["method"]), str(attrs["model"])
-        parts, settings, training, parameters = (json.loads(stored.pop(key)) for key in TEXTS)
+        parts, settings, training, parameters = (_parsed(stored.pop(key)) for key in TEXTS)
         model = _model(name, parameters)
         reduces: Method = component("method", method)
         checked_settings(reduces, model, for_method(model, method, settings))
@@ -147,6 +150,12 @@ def read(path: Any) -> Saved:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
         raise _unfit(path, " ".join(str(error).split())) from None
+
+
+def _parsed(text: str) -> Any:
+    if len(text) > MOST_CHARACTERS:
+        raise ValueError(f"a text has {len(text)} characters, more than {MOST_CHARACTERS}")
+    return json.loads(text)
 
 
 def fingerprint(model: Model) -> np.ndarray:
@@ -194,7 +203,7 @@ def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     FileError
         If there is none.
     """
-    with opened(path, "saved model") as file:
+    with opened(path, "saved model", most=MOST_BYTES) as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:
             raise FileError(f"{path}: not a saved model")

@@ -2,7 +2,7 @@
 
 What a method's `fit` gives is a tree of dataclasses and named tuples.  It is written field by
 field; the full-order model, and what is the model's own, is only referred to.  What is read can
-name classes and functions of this package's rooms of models, or of a plug-in that is in use, and
+name the classes and functions that are listed here, or those of a plug-in that is in use, and
 nothing else: no text becomes Python.
 """
 
@@ -21,14 +21,55 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.foreign_texts import check_kernel
+from vehiclemor.codegen.kernels import Kernels, kernel_sources, kernel_texts
 from vehiclemor.errors import InputError
 from vehiclemor.online.bounds import check
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
 
-# Rooms whose classes are parts of reduced models.
-ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
+# Module -> its classes and functions that are parts of reduced models; `bounds` checks their sizes.
+PARTS = {
+    f"vehiclemor.{module}": names.split()
+    for module, names in {
+        "reduction.car_checks": "CarChecks Input Sampled",
+        "reduction.cars": "Cars",
+        "reduction.high_fidelity.frozen_constants": "ExactVehicle judge",
+        "reduction.interface": "Offline",
+        "reduction.methods.full_order": "FullOrderModel",
+        "reduction.methods.guarded": "GuardedModel",
+        "reduction.methods.independent_coordinates": "Chosen",
+        "reduction.methods.path_map": "PathMapModel",
+        "reduction.methods.polynomial_residual": "PolynomialResidualModel",
+        "reduction.methods.replay": "ReplayModel",
+        "reduction.methods.softened_slip": "every_state",
+        "reduction.polynomials.map_loops": "Cells",
+        "reduction.projection.algebraic": "AlgebraicProjection",
+        "reduction.projection.bases": "Basis",
+        "reduction.projection.car_subspaces": "LocalBases Subspaces",
+        "reduction.projection.dynamic": "DynamicProjection",
+        "reduction.reduced_system": "FullStates ReducedSystem _nothing_told _own_path _same_state",
+        "reduction.vehicle.features": "Features",
+        "reduction.vehicle.lifting": "Transient",
+        "reduction.vehicle.projected_vehicle": "HeadingFrame",
+        "reduction.vehicle.reduced_vehicle": "ReducedVehicle",
+        "reduction.vehicle.shape": "VehicleShape",
+        "reduction.vehicle.slow_cars": "Box SlowVehicle",
+        "reduction.vehicle.slow_features": "FeatureTable Ranges",
+        "reduction.vehicle.slow_modes": "SlowModes",
+        "reduction.vehicle.training_reach": "TrainingReach",
+        "reduction.vehicle.two_track_cars": "Box Drive TwoTrackVehicle",
+        "reduction.vehicle.two_track_fit": "Sizes",
+        "simulation.projection_windows": "ProjectionWindows",
+        "simulation.system": "System",
+        "simulation.trajectory": "Trajectory Trust",
+        "study.input_range": "InputRange",
+    }.items()
+}
+# Methods that are.
+METHODS = ("encode", "lift", "project", "judge", "slopes")
+# Parts that a model may have, each counted wherever it is meant: those of this package have 20,000.
+MOST_PARTS = 500_000
 # What of a model may be a part of a reduced one.
 OWN = ("system", "kernels")
 # Types of arrays, and as what they are stored.
@@ -78,7 +119,11 @@ class Writer:
         if isinstance(value, Kernels):
             if value.sources == self._own_sources:
                 return {"model": "kernels"}
-            return {"kernels": "\n".join(s.text for s in value.sources.values())}
+            text = "\n".join(s.text for s in value.sources.values())
+            with suppress(ValueError):
+                kernels_of(text)
+                return {"kernels": text}
+            raise _unwritable(place, value)
         if names := _fields(kind):
             fields = {name: self.part(getattr(value, name), f"{place}.{name}") for name in names}
             return {"class": _name(value, kind, place), "fields": fields}
@@ -87,7 +132,7 @@ class Writer:
             return {kind.__name__: items}
         if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
             return {"mapping": {key: self.part(v, f"{place}.{key}") for key, v in value.items()}}
-        if inspect.ismethod(value) and _fields(type(value.__self__)):
+        if inspect.ismethod(value) and value.__name__ in METHODS and _fields(type(value.__self__)):
             return {"method": value.__name__, "of": self.part(value.__self__, f"{place}.of")}
         if inspect.isfunction(value):
             return {"function": _name(value, value, place)}
@@ -116,7 +161,9 @@ class Reader:
 
     def __init__(self, model: Model, arrays: Mapping[str, np.ndarray]) -> None:
         self._model, self._arrays = model, arrays
-        self._made: dict[str, Any] = {}
+        # Place -> what is made there, and of how many parts it is.
+        self._made: dict[str, tuple[Any, int]] = {}
+        self._count = 0
 
     def value(self, part: Any, place: str) -> Any:
         """What a part stands for.
@@ -126,12 +173,20 @@ class Reader:
         KeyError, TypeError, ValueError, AttributeError
             If it stands for nothing, or does not fit the rest.
         """
+        before = self._count
+        self._count += 1
         if not isinstance(part, dict):
             return part
         if "same" in part:
-            return self._made[part["same"]]
-        made = self._made[place] = self._of_kind(part, place)
-        check(made)
+            made, count = self._made[part["same"]]
+            self._count += count
+            if self._count > MOST_PARTS:
+                raise ValueError(f"{place} has too many parts")
+            return made
+        made = self._of_kind(part, place)
+        if "model" not in part:
+            check(made, self._model)
+        self._made[place] = made, self._count - before
         return made
 
     def _of_kind(self, part: dict[str, Any], place: str) -> Any:
@@ -143,7 +198,7 @@ class Reader:
             case {"model": name} if name in OWN:
                 return getattr(self._model, name)
             case {"kernels": text}:
-                return Kernels(kernel_sources(text))
+                return kernels_of(text)
             case {"class": name, "fields": fields}:
                 made = named(name)
                 # What has a default may have come since.
@@ -158,23 +213,38 @@ class Reader:
                 return {key: self.value(item, f"{place}.{key}") for key, item in items.items()}
             case {"method": name, "of": of}:
                 owner = self.value(of, f"{place}.of")
-                if name.startswith("_") or not inspect.isfunction(getattr(type(owner), name)):
+                if name not in METHODS or not inspect.isfunction(getattr(type(owner), name)):
                     raise ValueError(f"{name} is no method")
                 return getattr(owner, name)
-            case {"function": name}:
-                return named(name)
+            case {"function": name} if inspect.isfunction(found := named(name)):
+                return found
         raise ValueError(f"{quoted(part)} is no part of a model")
 
     def _array(self, stored: np.ndarray, part: dict[str, Any]) -> np.ndarray:
         stored = np.ascontiguousarray(stored, dtype=STORED[part["type"]]).ravel()
         complex_pairs = part["type"] == "complex128"
         found = stored.view(complex) if complex_pairs else stored.astype(part["type"])
+        if not all(type(size) is int and size >= 0 for size in part["shape"]):
+            raise ValueError(f"{quoted(part['shape'])} is no shape")
         found = found.reshape(part["shape"])
         return found.T if part["turned"] else found
 
 
+def kernels_of(text: str) -> Kernels:
+    """Kernels of a text, which is decided on before anything of it is compiled.
+
+    Raises
+    ------
+    ValueError
+        If one of them is not allowed.
+    """
+    for part in kernel_texts(text):
+        check_kernel(part)
+    return Kernels(kernel_sources(text))
+
+
 def named(name: str) -> Any:
-    """The dataclass, named tuple or function `module:name` of a room of models or of a plug-in.
+    """The dataclass, named tuple or function `module:name` of `PARTS` or of a plug-in.
 
     Raises
     ------
@@ -182,9 +252,8 @@ def named(name: str) -> Any:
         If it is anything else.
     """
     module, _, own = name.partition(":")
-    if module.startswith(ROOMS):
-        with suppress(ImportError):
-            import_module(module)
+    if own in PARTS.get(module, ()):
+        import_module(module)
     # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
     elif module.partition(".")[0] not in _plug_ins():
         module = ""

@@ -54,6 +54,8 @@ def results(
     """The same of paths that are known to be what the kernel reads."""
     states, inputs = paths
     result = np.empty((len(states), size))
+    if name in kernels:
+        kernels.sources[name].check(states.shape[1], inputs.shape[1], len(constants), size)
     if len(states) < LANES:
         address = np.array([address_of(kernels, name)], dtype=np.int64)
         path_loops()["kernel_path"](states, inputs, address, constants, result)

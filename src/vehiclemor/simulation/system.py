@@ -107,6 +107,15 @@ class System(ShortRepr):
     partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
+    def __post_init__(self) -> None:
+        """Refuse kernels that reach beyond what loops give them: they don't look."""
+        dim, n, half = len(self.reference), len(self.constants), len(self.reference) // 2
+        results = {"derivative": dim, "speeds": half, "second_order": half * (half + 1)}
+        for name, source in self.kernels.sources.items():
+            if source.arguments[0] == "_x" and name not in self.fused.values():
+                given = (dim, self.inputs, n)
+                source.check(*given, *([results[name]] if name in results else ()))
+
     def equations(self, *names: str, step: int = 0) -> Equations:
         """Kernels of these names, at their places, as compiled loops take them.
 

@@ -15,7 +15,7 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.reduction.reduced_system import full_state_slopes
 from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
-from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
@@ -125,7 +125,10 @@ class Lifting(ShortRepr):
         """The kernel and its constants."""
         if modes not in self._made:
             text, constants = self.text(modes)
-            self._made[modes] = Kernels(kernel_sources(text)), constants
+            sources, features = kernel_sources(text), self.features
+            given = features.states + PLANAR, features.inputs + 2 * modes, len(constants)
+            sources["full_state"].check(*given)
+            self._made[modes] = Kernels(sources), constants
         return self._made[modes]
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
