@@ -7,7 +7,7 @@ they read is defined before, or an entry of an argument.
 import ast
 from collections.abc import Collection, Sequence
 
-from vehiclemor.codegen.kernel_statements import SEED, places
+from vehiclemor.codegen.kernel_statements import SEED
 from vehiclemor.codegen.llvm_expressions import COMPARISONS, LIBRARY, LLVM_FUNCTIONS
 from vehiclemor.codegen.vector_lanes import LANES, RESULTS, padded
 
@@ -104,7 +104,7 @@ class _Checked:
 
     def __init__(self, arrays: Sequence[str], names: Collection[str] = ()) -> None:
         self._arrays, self._known = arrays, set[str | int](names)
-        self.size = self.entries = 0
+        self.size = self.entries = self._dimensions = 0
 
     def statement(self, node: ast.stmt) -> None:
         """Check a statement; what it defines is known from then on."""
@@ -116,7 +116,7 @@ class _Checked:
                 self.define(target)
             case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
                 self.value(expression)
-                _places(target)
+                self._write(target)
             case ast.Assign([ast.Subscript(ast.Name("_work"), place)], expression):
                 self.value(expression)
                 self._known.add(_whole(place))
@@ -190,16 +190,17 @@ class _Checked:
                 raise _refused(name)
             self._known.add(name)
 
+    def _write(self, target: ast.Subscript) -> None:
+        inner = target.slice.elts if isinstance(target.slice, ast.Tuple) else [target.slice]
+        places = [_whole(place) for place in inner]
+        if len(places) not in ([self._dimensions] if self._dimensions else (1, 2)):
+            raise _refused(target)
+        self._dimensions = len(places)
+
     def _grow(self, size: int) -> None:
         self.size += size
         if self.size > MOST_SIZE:
             raise ValueError("a kernel is larger than any of this package could be")
-
-
-def _places(node: ast.Subscript) -> None:
-    for place in node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]:
-        _whole(place)
-    places(node)
 
 
 def _whole(node: ast.expr) -> int:

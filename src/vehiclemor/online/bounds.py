@@ -4,12 +4,11 @@ A kernel reads and writes at the places that its text names, a loop as far as an
 that a file that lies about sizes would reach into other memory.  Whatever fails is a `ValueError`.
 """
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, lru_cache
 from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -35,6 +34,7 @@ from vehiclemor.reduction.vehicle.two_track_fit import FEATURES
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
+from vehiclemor.study.input_range import InputRange
 
 # Reduced coordinates; the models of this package have at most 9.
 MOST_STATES = 100
@@ -51,6 +51,9 @@ def check(part: Any, model: Model) -> None:
         case Cars():
             components = len(model.parameters.flat())
             _shaped("cars", (part.values, max(len(part.values), 1), components))
+        case InputRange():
+            kinds = 1 if model.kind == "ae" else 3
+            _shaped("largest", (part.largest, kinds, len(model.inputs)))
         case Features():
             _parameters(part)
         case ReducedVehicle():
@@ -83,9 +86,9 @@ def check(part: Any, model: Model) -> None:
 @cache
 def _declared(kind: type) -> Mapping[str, Any]:
     """Fields of a dataclass or a named tuple, with their types."""
-    if not dataclasses.is_dataclass(kind) and not hasattr(kind, "_fields"):
-        return {}
-    return get_type_hints(kind)
+    names = getattr(kind, "__dataclass_fields__", getattr(kind, "_fields", ()))
+    hints = get_type_hints(kind) if names else {}
+    return {name: of for name, of in hints.items() if get_origin(of) is not ClassVar}
 
 
 def _is(value: Any, kind: Any) -> bool:
@@ -186,11 +189,12 @@ def _check_reduced_system(part: ReducedSystem) -> None:
     _require(system.inputs == len(part.model.inputs), "inputs")
     lifting = getattr(part.lift, "__self__", None)
     if isinstance(lifting, FullStates):
-        written = lifting.system.kernels.sources["full_state"].sizes[-1]
-        _require(written <= lifting.size == states >= dim, "full_state")
-        _require(lifting.system is system, "full_state")
+        _require(lifting.system is system and lifting.size == states >= dim, "full_state")
     else:
         _require(dim == states, "system")
+    results = {"full_state": states, "outputs": len(part.model.outputs)}
+    for name in results.keys() & system.kernels.sources.keys():
+        system.kernels.sources[name].check(dim, system.inputs, len(system.constants), results[name])
     _check_windows(spaces, dim)
     if isinstance(part, DynamicProjection) and part.subspaces is not None:
         _check_subspaces(part.subspaces, dim)

@@ -17,7 +17,6 @@ import reduced_models
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.codegen.kernels import Kernels, KernelSource
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.online import model_file, parts
 from vehiclemor.online.parts import Reader, Writer
@@ -60,6 +59,16 @@ def refusal(path: Path) -> str:
     line = str(caught.value)
     assert line.startswith(f"{path}: ")
     assert "\n" not in line
+    return line
+
+
+def refused_untouched(path: Path) -> str:
+    """Why a file is refused of which nothing has been compiled or run."""
+    compiled = mock.patch("vehiclemor.codegen.kernels.fetched")
+    loops = mock.patch("vehiclemor.codegen.loops.fetched")
+    with compiled as one, loops as other, mock.patch.object(model_file, "response") as ran:
+        line = refusal(path)
+    assert not any(seen.called for seen in (one, other, ran))
     return line
 
 
@@ -249,6 +258,20 @@ def replaced(places: str, value: Any) -> Callable[[xr.Dataset, dict[str, Any]], 
 
 HARM = "__import__('pathlib').Path('harm').touch()"
 FEATURES = "reduced.fields.features.fields"
+# What no array of a file is.
+ARRAYS = [
+    {"array": "reduced.error_scale", "type": "float64", "shape": shape, "turned": False}
+    for shape in ([-1], [5, -1], [True, 6], [2, 3], [1, 6], [10**9], [6.0], 6, None, "6")
+] + [
+    {"array": name, "type": kind, "shape": [6], "turned": False}
+    for name, kind in (
+        ("reduced.parameters", "float64"),
+        ("reduced.error_scale", "int64"),
+        ("reduced.error_scale", "object"),
+        ("parts", "float64"),
+        (["reduced.error_scale"], "float64"),
+    )
+]
 
 
 @pytest.mark.parametrize(
@@ -267,24 +290,30 @@ FEATURES = "reduced.fields.features.fields"
         ("reduced", {"tuple": [1.0]}),
         ("known", {"function": "vehiclemor.reduction.trust:trust_of"}),
         ("reduced.fields.coefficients", {"array": "reduced.nothing"}),
-        # Texts that would become machine code: nothing but arithmetic, of their own numbers.
-        (f"{FEATURES}.terms.tuple", [HARM] * 8),
-        (f"{FEATURES}.terms.tuple", ["_x[99999]"] * 8),
-        (f"{FEATURES}.terms.tuple", ["p[99999]"] * 8),
-        (f"{FEATURES}.terms.tuple", ["z0\n    _result[99999] = z0"] * 8),
         (f"{FEATURES}.terms.tuple", ["z0", "z1"]),
-        (f"{FEATURES}.lines.tuple", [{"tuple": ["_result[99999]", "z0"]}]),
-        (f"{FEATURES}.lines.tuple", [{"tuple": ["a = 1.0\n    _x", "z0"]}]),
         (f"{FEATURES}.diagonal.tuple", [9, 9]),
-        (
-            "reduced.fields.error_scale",
-            {"array": "reduced.parameters", "type": "float64", "shape": [1], "turned": False},
-        ),
+        (f"{FEATURES}.states", 10**9),
+        (f"{FEATURES}.states", True),
+        (f"{FEATURES}.lateral", -1),
+        (f"{FEATURES}.groups", {"tuple": [{"tuple": [{"tuple": [0, 0]}, {"tuple": [1]}]}]}),
+        (f"{FEATURES}.groups", {"tuple": [{"tuple": [{"tuple": [-1]}, {"tuple": [1]}]}]}),
+        (f"{FEATURES}.groups", {"tuple": [{"tuple": [{"tuple": [math.nan]}, {"tuple": [1]}]}]}),
+        ("reduced.fields.offline", {"same": "reduced.shape"}),
+        ("reduced.fields.offline", {"same": []}),
+        ("reduced.fields.offline", {"model": "parameters"}),
+        ("reduced.fields.features", {"same": "reduced.shape"}),
+        ("reduced.fields.coefficients", 3.0),
+        ("reduced.fields.solver", {"array": "reduced.parameters"}),
+        ("reduced.fields.tolerance", "1e-3"),
+        ("reduced.fields.tolerance", True),
+        ("reduced.fields.model", {"class": "vehiclemor.simulation.dynamic:DynamicModel"}),
+        ("known.fields.longest", None),
+        *(("reduced.fields.error_scale", array) for array in ARRAYS),
     ],
 )
 def test_parts_that_would_do_harm_are_refused(saved, place, value, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    refusal(rewritten(saved, replaced(place, value)))
+    refused_untouched(rewritten(saved, replaced(place, value)))
     assert not Path("harm").exists()
 
 
@@ -297,6 +326,10 @@ def test_parts_that_would_do_harm_are_refused(saved, place, value, monkeypatch, 
         "vehiclemor.files:write_text",
         "vehiclemor.cli.app:main",
         "vehiclemor.reduction.no_such_room:thing",
+        "vehiclemor.simulation.dynamic:DynamicModel",
+        "vehiclemor.simulation.integrators.structures:Equations",
+        "vehiclemor.simulation.build:build",
+        "vehiclemor.reduction.vehicle.features:monomials",
         "vehiclemor.reduction.vehicle.features:Features.blocks",
         "vehiclemor.reduction.vehicle.features:PLANAR",
         # Defined elsewhere.
@@ -308,38 +341,279 @@ def test_names_of_other_things_are_refused(name):
         parts.named(name)
 
 
+# Bodies of a kernel `derivative` with 28 states, 1 input and 102 constants that no kernel has.
+BODIES = {
+    "write beyond": "_result[99999] = _x[0]",
+    "write one beyond": "_result[28] = _x[0]",
+    "read beyond": "_result[0] = _x[99999]",
+    "read an input beyond": "_result[0] = _u[1]",
+    "read a constant beyond": "_result[0] = _constants[99999]",
+    "sums beyond": "a, b = weighted_sums(_constants, 0, ("
+    + "_x[0], " * 9999
+    + "))\n_result[0] = a",
+    "sums from beyond": "a, b = weighted_sums(_constants, 10**9, (_x[0], ))",
+    "sums from afar": f"a, b = weighted_sums(_constants, {10**30}, (_x[0],))",
+    "sums from before": "a, b = weighted_sums(_constants, -8, (_x[0],))",
+    "sums of the result": "a, b = weighted_sums(_result, 0, (_x[0],))",
+    "sums of scratch": "a, b = weighted_sums(_work, 0, (_x[0],))",
+    "sums of nothing": "a, b = weighted_sums(_constants, 0, ())",
+    "sums into results": "(_result[0], b) = weighted_sums(_constants, 0, (_x[0],))",
+    "sums into a star": "(*a, b) = weighted_sums(_constants, 0, (_x[0],))",
+    "sums with a keyword": "a, b = weighted_sums(_constants, 0, terms=(_x[0],))",
+    "sums of a star": "a, b = weighted_sums(_constants, 0, (*_x,))",
+    "combine": "combine(_result[0], 99999, 1.0, _x[0])",
+    "magnitudes": "magnitudes(_result[0], 99999, _x[0], _x[0])",
+    "product": "product(_result[0], 8, _constants[0], _x[0], (99999,), (), 1.0)",
+    "execute": "execute(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "execute in parentheses": "(execute)(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "execute in more": "((execute))(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "full-width execute": "\uff45xecute(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "mathematical execute": "\U0001d41execute(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "execute on two lines": "execute\\\n(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "execute behind a comment": "(execute # (\n)(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "full-width array": "_result[0] = _\uff58[99999]",
+    "assigned execute": "a = execute(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "index that is none": "_result[_x[0]] = 1.0",
+    "index that is a name": "i = 1.0\n_result[i] = 1.0",
+    "negative index": "_result[0] = _x[-1]",
+    "negative place": "_result[-1] = _x[0]",
+    "truth value": "_result[True] = _x[0]",
+    "truth value read": "_result[0] = _x[True]",
+    "huge index": f"_result[0] = _x[{2**64}]",
+    "index of three": "_result[0, 0, 0] = _x[0]",
+    "slice": "_result[0:9] = _x[0]",
+    "two shapes": "_result[0] = _x[0]\n_result[0, 1] = _x[0]",
+    "read results": "_result[0] = _result[1]",
+    "unknown name": "_result[0] = a",
+    "name before it is known": "_result[0] = a\na = _x[0]",
+    "unknown scratch": "_result[0] = _work[0]",
+    "batch of unknown scratch": "_work[0] = _x[0]\nsincos_batch(_work, 0)",
+    "batch of an array": "sincos_batch(_x, 0)",
+    "batch from before": "sincos_batch(_work, -8)",
+    "unknown batch": "system_batch(_work, 0)",
+    "name of an array": "_constants = _x[0]",
+    "attribute": "_result[0] = _x[0].real",
+    "import": "import os",
+    "import in a line": f"_result[0] = {HARM}",
+    "unknown function": "_result[0] = math.system(_x[0])",
+    "too many arguments": "_result[0] = math.sin(_x[0], _x[0])",
+    "keyword": "_result[0] = math.sin(x=_x[0])",
+    "lambda": "_result[0] = (lambda: 1.0)()",
+    "f-string": "_result[0] = f'{_x[0]}'",
+    "text": "_result[0] = 'a'",
+    "walrus": "_result[0] = (a := _x[0])",
+    "star": "_result[0] = (*_x,)",
+    "comprehension": "_result[0] = sum(x for x in _x)",
+    "comparison": "_result[0] = _x[0] < _x[1]",
+    "chained comparison": "_result[0] = 1.0 if 0.0 < _x[0] < 1.0 else 0.0",
+    "whole number": "_result[0] = 1",
+    "complex number": "_result[0] = 1j",
+    "remainder": "_result[0] = _x[0] % 2.0",
+    "two targets": "_result[0] = _result[1] = _x[0]",
+    "augmented": "_result[0] += _x[0]",
+    "annotated": "a: float = _x[0]",
+    "nested function": "def inner():\n    return 1.0",
+    "loop": "for a in _x: pass",
+    "delete": "del _x",
+    "return": "return 1.0",
+    "semicolon": "a = _x[0]; execute(_x[0], _x[0], _u[0], _constants[0], _result[0])",
+    "signs": f"_result[0] = {'-' * 60_000}_x[0]",
+    "parentheses": f"_result[0] = {'(' * 150}_x[0]{')' * 151}",
+    "deep sum": f"_result[0] = {'1.0 + ' * 30_000}_x[0]",
+    "deep": f"_result[0] = {'(1.0 + ' * 190}_x[0]{')' * 190}",
+    "long": "a = _x[0]\n" + "a = a + 1.0\n" * 40_000,
+    "many functions": "a = _x[0]\n" + "a = math.sin(a)\n" * 5_000,
+    "wide sums": f"{'a, ' * 999}= weighted_sums(_constants, 0, ({'_x[0], ' * 999}))",
+    "null": "a = _x[0]\0",
+}
+HEADS = (
+    "def derivative(_x, _u, _constants, _result, _more):",
+    "def derivative(_x, _constants, _u, _result):",
+    "def derivative(_x, _u, _result):",
+    "def derivative(_x, _u, _constants, *_result):",
+    "def derivative(_x, _u, _constants, *, _result):",
+    "def derivative(_x, _u, _constants, _result, /):",
+    "def derivative(_x, _u, _constants, _result=print('harm')):",
+    "def derivative(_x, _u, _constants, _result: print('harm')):",
+    "def derivative(_x, _u, _constants, _result) -> print('harm'):",
+    "@print\ndef derivative(_x, _u, _constants, _result):",
+    "async def derivative(_x, _u, _constants, _result):",
+    "class derivative:",
+    "def tan(_x, _u, _constants, _result):",
+    "def etdrk4_step(_x, _u, _constants, _work, _result):",
+    "import os\ndef derivative(_x, _u, _constants, _result):",
+)
+# Kernel -> what is one too many of its results.
+OTHERS = {"speeds": 14, "second_order": 14 * 15, "outputs": 33}
+
+
+def with_body(body: str, head: str = "def derivative(_x, _u, _constants, _work, _result):") -> str:
+    return "\n    ".join([head, *body.splitlines()]) + "\n"
+
+
+@pytest.fixture(scope="module")
+def softened(tmp_path_factory) -> bytes:
+    """A file whose kernels are a text."""
+    made = vm.reduce(CAR, "softened_slip", training="nominal")
+    path = made.save(tmp_path_factory.mktemp("softened") / "model.nc")
+    text = "\n".join(source.text for source in made.reduced.system.kernels.sources.values())
+    return with_kernels(path, text).read_bytes()
+
+
+def with_kernels(path: Path, text: str) -> Path:
+    return rewritten(path, replaced("reduced.fields.system.fields.kernels", {"kernels": text}))
+
+
+def test_kernels_that_are_a_text_are_loaded(softened, tmp_path):
+    (path := tmp_path / "model.nc").write_bytes(softened)
+    assert vm.load(path).simulate().status == "ok"
+
+
 @pytest.mark.parametrize(
     "text",
     [
-        "_result[99999] = _x[0]",
-        "_result[0] = _x[99999]",
-        "_result[0] = _constants[99999]",
-        "a, b = weighted_sums(_constants, 0, (" + "_x[0], " * 9999 + "))\n    _result[0] = a",
-        "combine(_result[0], 99999, 1.0, _x[0])",
-        "_result[_x[0]] = 1.0",
+        *(pytest.param(with_body(body), id=name) for name, body in BODIES.items()),
+        *(pytest.param(with_body("pass", head), id=head) for head in HEADS),
+        *(
+            with_body(f"_result[{place}] = _x[0]").replace("derivative", name)
+            for name, place in {**OTHERS, "unheard_of": 0}.items()
+        ),
+        pytest.param(with_body("pass") + with_body("_u[9] = 1.0"), id="the second of two"),
+        pytest.param("", id="nothing"),
+        pytest.param(3, id="a number"),
     ],
 )
-def test_kernels_that_reach_beyond_their_arrays_are_refused(text, tmp_path):
-    refusal(with_kernel(text, tmp_path))
-
-
-def test_a_kernel_is_arithmetic_or_nothing(tmp_path, monkeypatch):
+def test_kernels_that_are_more_than_arithmetic_of_their_arrays_are_refused(
+    text, softened, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    assert "import" in refusal(with_kernel(f"_result[0] = {HARM}", tmp_path))
+    (path := tmp_path / "model.nc").write_bytes(softened)
+    refused_untouched(with_kernels(path, text))
     assert not Path("harm").exists()
 
 
-def with_kernel(text: str, folder: Path) -> Path:
-    """File of a car whose equations are another text."""
-    arguments = ("_x", "_u", "_constants", "_result")
-    kernel = f"def derivative({', '.join(arguments)}):\n    {text}\n"
-    kernels = Kernels({"derivative": KernelSource("derivative", kernel, arguments, (0,) * 4, 1)})
-    made = vm.reduce(CAR, "softened_slip")
-    system = dataclasses.replace(made.reduced.system, kernels=kernels)
-    reduced = dataclasses.replace(made.reduced, system=system)
-    # Nothing here runs it.
-    with mock.patch.object(model_file, "response", return_value=np.empty(0)):
-        return dataclasses.replace(made, reduced=reduced).save(folder / "model.nc")
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("reference", np.zeros(27)),
+        ("reference", np.zeros((28, 1))),
+        ("constants", np.zeros(101)),
+        ("error_scale", np.ones(1)),
+        ("active", np.array([28])),
+        ("active", np.array([-1])),
+        ("active", np.zeros(28, dtype=int)),
+        ("active", np.zeros(1)),
+        ("rotating", np.array([5, 0])),
+        ("partners", np.zeros(28, dtype=int)),
+        ("directions", np.zeros((1, 102))),
+    ],
+)
+def test_arrays_of_a_system_that_dont_fit_it_are_refused(field, value, softened, tmp_path):
+    (path := tmp_path / "model.nc").write_bytes(softened)
+    place = f"reduced.system.{field}"
+
+    def change(dataset: xr.Dataset, found: dict[str, Any]) -> None:
+        dataset[place] = [f"{place}_{axis}_" for axis in range(value.ndim)], value
+        written = {"array": place, "type": value.dtype.name, "shape": list(value.shape)}
+        replaced(f"reduced.fields.system.fields.{field}", written | {"turned": False})(None, found)
+
+    refused_untouched(rewritten(path, change))
+
+
+def test_what_is_huge_where_it_is_written_small_is_refused_soon(saved):
+    # Never written: it takes no space in the file.
+    with netCDF4.Dataset(saved, "r+") as file:
+        for axis in "ab":
+            file.createDimension(axis, 10**9)
+        file.createVariable("huge", "f8", ("a", "b"), chunksizes=(1000, 1000))
+    assert "its variables have more than" in refused_untouched(saved)
+
+
+def test_parts_that_stand_for_ever_more_are_refused_soon(saved):
+    def change(_: object, found: dict[str, Any]) -> None:
+        twice = ({"tuple": [{"same": f"reduced.offline.{number}"}] * 2} for number in range(60))
+        found["reduced"]["fields"]["offline"] = {"tuple": [{"tuple": [1.0, 2.0]}, *twice]}
+
+    assert "too many parts" in refused_untouched(rewritten(saved, change))
+    deep = replaced("reduced.fields.offline", json.loads("[" * 900 + "]" * 900))
+    refused_untouched(rewritten(saved, deep))
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "1" * 5_000, "[" + "0," * 2_000_001 + "0]"])
+def test_texts_that_are_deep_or_long_are_refused_soon(text, saved):
+    with xr.open_dataset(saved, decode_cf=False) as file:
+        dataset = file.load()
+    dataset["parts"] = ((), text)
+    saved.unlink()
+    write_dataset(dataset, saved)
+    refused_untouched(saved)
+
+
+# Texts of one feature.
+TEXTS = {
+    "call": HARM,
+    "array": "_x[99999]",
+    "parameter beyond": "p[99999]",
+    "negative parameter": "p[-1]",
+    "truth value": "p[True]",
+    "parameter of parameters": "p[p[0]]",
+    "slice": "p[0:1]",
+    "unknown": "z9",
+    "unknown input": "u9",
+    "kernel's own name": "y0",
+    "own name": "term",
+    "line behind": "z0\n    _result[99999] = z0",
+    "line behind a semicolon": "z0; _result[0] = z0",
+    "comment": "z0 # )",
+    "continued": "z0 \\\n + z0",
+    "two": "z0, z1",
+    "end of the sum": "z0,)) or ((z0",
+    "walrus": "(z0 := 1.0)",
+    "star": "*z0",
+    "lambda": "lambda: z0",
+    "f-string": "f'{z0}'",
+    "attribute": "z0.real",
+    "comparison": "z0 < z1",
+    "full-width": "\uff5a0",
+    "execute": "execute(p[0], p[0], p[0], p[0])",
+    "signs": "-" * 60_000 + "u0",
+    "long": "z0 + " * 20_000 + "z0",
+    "nothing": "",
+    "number": 3,
+}
+
+
+FEATURES = "reduced.fields.features.fields"
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_features_that_are_more_than_arithmetic_of_their_numbers_are_refused(text, saved):
+    where = replaced(f"{FEATURES}.terms", {"tuple": [text, *["z0"] * 7]})
+    refused_untouched(rewritten(saved, where))
+
+
+@pytest.mark.parametrize(
+    ("place", "entry"),
+    [
+        ("lines", ["a", "z9"]),
+        ("lines", ["a", "execute(p[0], p[0], p[0], p[0])"]),
+        ("lines", ["_result[9]", "z0"]),
+        ("lines", ["a = 1.0\n    _x", "z0"]),
+        ("lines", ["_x", "z0"]),
+        ("lines", ["p", "z0"]),
+        ("lines", ["if", "z0"]),
+        ("lines", ["\uff41", "z0"]),
+        ("lines", ["a.b", "z0"]),
+        ("lines", ["", "z0"]),
+        ("lines", ["a", "a"]),
+        ("lines", ["a", "z0", "z0"]),
+        ("watched", ["p[99999]", "speed"]),
+        ("watched", ["y0", "speed"]),
+    ],
+)
+def test_lines_of_features_are_as_terms_are(place, entry, saved):
+    where = replaced(f"{FEATURES}.{place}", {"tuple": [{"tuple": entry}]})
+    refused_untouched(rewritten(saved, where))
 
 
 SHIPPED = data_names("protocols")
