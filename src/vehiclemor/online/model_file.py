@@ -7,6 +7,7 @@ and of kernels are JSON.  Machine code is made of these texts, or comes from the
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -203,13 +204,16 @@ def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     FileError
         If there is none.
     """
-    with opened(path, "saved model", most=MOST_BYTES) as file:
+    with opened(path, "saved model") as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:
             raise FileError(f"{path}: not a saved model")
         if attrs["saved_model"] != SCHEMA:
             was = f"format {shortened(str(attrs['saved_model']))} where this is {SCHEMA}"
             raise FileError(f"{path}: saved by another version, {was}; reduce the model again")
+        # What is compressed or was never written takes no space in a file.
+        if sum(8 * math.prod(variable.shape) for variable in file.variables.values()) > MOST_BYTES:
+            raise FileError(f"{path}: its variables have more than {MOST_BYTES} bytes")
         return {name: variable[...] for name, variable in file.variables.items()}, attrs
 
 

@@ -24,6 +24,7 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
+from vehiclemor.study import netcdf_file
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.scenario import start_of
 
@@ -526,6 +527,7 @@ def test_what_is_huge_where_it_is_written_small_is_refused_soon(saved):
         for axis in "ab":
             file.createDimension(axis, 10**9)
         file.createVariable("huge", "f8", ("a", "b"), chunksizes=(1000, 1000))
+    netcdf_file._seal(saved)
     assert "its variables have more than" in refused_untouched(saved)
 
 
