@@ -232,7 +232,9 @@ def _check_map(part: PathMapModel) -> None:
     _shaped("ranges", (part.ranges, inputs, 2), (cells.centres, inputs), (cells.scales, inputs))
     _shaped("cells", (cells.halves, inputs), (cells.tops, inputs))
     # What is no number would be a place anywhere.
-    _require(np.isfinite([*cells.centres, *cells.scales, *part.ranges.ravel()]).all(), "cells")
+    _require(
+        bool(np.isfinite([*cells.centres, *cells.scales, *part.ranges.ravel()]).all()), "cells"
+    )
     _apart("moving", part.moving, inputs)
     _require(0 <= part.degree <= path_map.HIGHEST_DEGREE, "degree")
     _require(len(part.columns) == len(part.model.coordinates) + len(part.model.outputs), "columns")

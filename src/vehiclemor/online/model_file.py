@@ -40,7 +40,7 @@ TEXTS = ("parts", "settings", "training", "parameters")
 PARTS = ("reduced", "known")
 # Bytes of all variables of a file, and characters of a text: the largest of this package's methods
 # have 3 MB and 0.3 million.
-MOST_BYTES, MOST_CHARACTERS = 1 << 28, 4_000_000
+MOST_BYTES, MOST_CHARACTERS = 1 << 28, 2_000_000
 # Differences of what a model's equations give that rounding explains: relative, and as part of the
 # largest number.
 SAME, ROUNDING = 1e-8, 1e-12
@@ -99,6 +99,8 @@ def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
         parts = {name: writer.part(getattr(saved, name), name) for name in PARTS}
     except InputError as error:
         raise InputError(f"{saved.method} of {model.name}: {error}") from None
+    if sum(array.nbytes for array in writer.arrays.values()) > MOST_BYTES:
+        raise InputError(f"{saved.method} of {model.name}: more than {MOST_BYTES} bytes to save")
     texts = parts, dict(saved.settings), list(saved.training), parameters_of(model)
     variables: dict[str, Any] = {
         name: ((), json.dumps(text)) for name, text in zip(TEXTS, texts, strict=True)

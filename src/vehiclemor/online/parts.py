@@ -28,44 +28,18 @@ from vehiclemor.online.bounds import check
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
 
-# Module -> its classes and functions that are parts of reduced models; `bounds` checks their sizes.
-PARTS = {
-    f"vehiclemor.{module}": names.split()
-    for module, names in {
-        "reduction.car_checks": "CarChecks Input Sampled",
-        "reduction.cars": "Cars",
-        "reduction.high_fidelity.frozen_constants": "ExactVehicle judge",
-        "reduction.interface": "Offline",
-        "reduction.methods.full_order": "FullOrderModel",
-        "reduction.methods.guarded": "GuardedModel",
-        "reduction.methods.independent_coordinates": "Chosen",
-        "reduction.methods.path_map": "PathMapModel",
-        "reduction.methods.polynomial_residual": "PolynomialResidualModel",
-        "reduction.methods.replay": "ReplayModel",
-        "reduction.methods.softened_slip": "every_state",
-        "reduction.polynomials.map_loops": "Cells",
-        "reduction.projection.algebraic": "AlgebraicProjection",
-        "reduction.projection.bases": "Basis",
-        "reduction.projection.car_subspaces": "LocalBases Subspaces",
-        "reduction.projection.dynamic": "DynamicProjection",
-        "reduction.reduced_system": "FullStates ReducedSystem _nothing_told _own_path _same_state",
-        "reduction.vehicle.features": "Features",
-        "reduction.vehicle.lifting": "Transient",
-        "reduction.vehicle.projected_vehicle": "HeadingFrame",
-        "reduction.vehicle.reduced_vehicle": "ReducedVehicle",
-        "reduction.vehicle.shape": "VehicleShape",
-        "reduction.vehicle.slow_cars": "Box SlowVehicle",
-        "reduction.vehicle.slow_features": "FeatureTable Ranges",
-        "reduction.vehicle.slow_modes": "SlowModes",
-        "reduction.vehicle.training_reach": "TrainingReach",
-        "reduction.vehicle.two_track_cars": "Box Drive TwoTrackVehicle",
-        "reduction.vehicle.two_track_fit": "Sizes",
-        "simulation.projection_windows": "ProjectionWindows",
-        "simulation.system": "System",
-        "simulation.trajectory": "Trajectory Trust",
-        "study.input_range": "InputRange",
-    }.items()
-}
+# Where the classes and functions are that are parts of reduced models; `bounds` checks their sizes.
+ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
+PARTS = (
+    *("AlgebraicProjection", "Basis", "Box", "CarChecks", "Cars", "Cells", "Chosen", "Drive"),
+    *("DynamicProjection", "ExactVehicle", "FeatureTable", "Features", "FullOrderModel"),
+    *("FullStates", "GuardedModel", "HeadingFrame", "Input", "InputRange", "LocalBases"),
+    *("Offline", "PathMapModel", "PolynomialResidualModel", "ProjectionWindows", "Ranges"),
+    *("ReducedSystem", "ReducedVehicle", "ReplayModel", "Sampled", "Sizes", "SlowModes"),
+    *("SlowVehicle", "Subspaces", "System", "TrainingReach", "Trajectory", "Transient"),
+    *("Trust", "TwoTrackVehicle", "VehicleShape", "_nothing_told", "_own_path", "_same_state"),
+    *("every_state", "judge"),
+)
 # Methods that are.
 METHODS = ("encode", "lift", "project", "judge", "slopes")
 # Parts that a model may have, each counted wherever it is meant: those of this package have 20,000.
@@ -252,8 +226,10 @@ def named(name: str) -> Any:
         If it is anything else.
     """
     module, _, own = name.partition(":")
-    if own in PARTS.get(module, ()):
-        import_module(module)
+    if module.startswith(ROOMS):
+        with suppress(ImportError):
+            import_module(module)
+        own = own if own in PARTS else ""
     # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
     elif module.partition(".")[0] not in _plug_ins():
         module = ""

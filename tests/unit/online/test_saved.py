@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -65,12 +66,13 @@ def refusal(path: Path) -> str:
 
 def refused_untouched(path: Path) -> str:
     """Why a file is refused of which nothing has been compiled or run."""
-    compiled = mock.patch("vehiclemor.codegen.kernels.fetched")
-    loops = mock.patch("vehiclemor.codegen.loops.fetched")
-    with compiled as one, loops as other, mock.patch.object(model_file, "response") as ran:
-        line = refusal(path)
-    assert not any(seen.called for seen in (one, other, ran))
-    return line
+    with ExitStack() as stack:
+        for compiled in ("kernels", "loops"):
+            place = f"vehiclemor.codegen.{compiled}.fetched"
+            stack.enter_context(mock.patch(place, side_effect=AssertionError("compiled")))
+        ran = AssertionError("ran")
+        stack.enter_context(mock.patch.object(model_file, "response", side_effect=ran))
+        return refusal(path)
 
 
 LOADED = """
