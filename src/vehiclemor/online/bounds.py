@@ -34,6 +34,7 @@ from vehiclemor.reduction.vehicle.two_track_fit import FEATURES
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
+from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.input_range import InputRange
 
 # Reduced coordinates; the models of this package have at most 9.
@@ -62,6 +63,11 @@ def check(part: Any, model: Model) -> None:
             _check_system(part)
         case ReducedSystem():
             _check_reduced_system(part)
+        case Trajectory():
+            samples = max(len(part.time), 1)
+            _shaped("time", (part.time, samples))
+            for name in ("inputs", "coordinates", "speeds", "outputs"):
+                _shaped(name, (getattr(part, name), samples, len(getattr(model, name))))
         case GuardedModel():
             for each in (part.fast, part.safe):
                 checked_fit(part.fast_name, each)
