@@ -170,6 +170,8 @@ def _check_vehicle(part: ReducedVehicle) -> None:
         texts = {*own.terms, *lifted.terms}
         _require(all(set(part.box.chosen[kind]) <= texts for kind in FEATURES), "box")
     reach = part.reach
+    if reach.inputs.size:
+        _shaped("reach", (reach.inputs, 3, inputs))
     _require(0 <= own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
     if len(reach.lasted):
         starts = len(reach.begun)
