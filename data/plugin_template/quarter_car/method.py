@@ -72,5 +72,4 @@ METHOD = Method(
     settings={"ode": ModalSettings},
     fit=fit,
     # Only what ReducedSystem integrates can be.
-    exported=False,
 )

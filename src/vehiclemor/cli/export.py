@@ -8,8 +8,7 @@ from cyclopts import Parameter
 import vehiclemor as vm
 from vehiclemor.cli.key_values import key_values
 from vehiclemor.errors import InputError
-from vehiclemor.exporting.export import STEP, Target, destination, name_of
-from vehiclemor.registry import component
+from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
 
 # Method that stands for the model that ships.
 SHIPPED = "shipped"
@@ -18,7 +17,7 @@ SHIPPED = "shipped"
 def export(
     model: str,
     *,
-    to: Target,
+    to: FileTarget,
     method: str | None = None,
     settings: Annotated[
         tuple[str, ...], Parameter(name="--set", negative="", show_default=False)
@@ -35,8 +34,8 @@ def export(
     model
         Registered name, or file of a reduced model.
     to
-        c: a folder with C99 sources; fmu, fmu2: a functional mock-up unit by FMI 3.0 or 2.0;
-        casadi: a function that CasADi loads; jax, sympy: a Python module.
+        c: a folder with C99 sources; fmu: a functional mock-up unit by FMI 2.0; casadi: a function
+        that CasADi loads.
     method
         Reduce the model by this method first; shipped: the reduced model that ships with the
         package.  The full model by default.
@@ -66,13 +65,8 @@ def export(
     else:
         chosen = vm.model(model, values)
         # Before anything is fitted.
-        name = name_of(model, method)
-        out = destination(name, to, out, overwrite)
+        out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
-            if not component("method", method).exported:
-                from vehiclemor.exporting.exported import WHY
-
-                raise InputError(f"{name} can't be exported: {WHY}")
             chosen = vm.reduce(chosen, method, **given)
     print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")
     return 0

@@ -19,17 +19,18 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
-Target = Literal["c", "fmu", "fmu2", "casadi", "jax", "sympy"]
+# What a file, or a folder, is written for; the others are objects alone.
+FileTarget = Literal["c", "fmu", "casadi"]
+Target = Literal[FileTarget, "jax", "sympy"]
 TARGETS: tuple[str, ...] = Target.__args__
 # How the name of what is written ends; C is a folder.
-ENDINGS = {"c": "", "fmu": ".fmu", "fmu2": ".fmu", "casadi": ".casadi", "jax": "_jax.py"}
-ENDINGS["sympy"] = "_sympy.py"
+ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi"}
 # Step in s of the integrator in C: stable for modes of up to 2780 1/s; see the handbook.
 STEP = 1e-3
 # Shortest and longest: below, rounding is all; above, no model of a vehicle is stable.
 STEPS = 1e-7, 1.0
 # What is always written.
-FILES = ("c", "fmu", "fmu2")
+FILES = ("c", "fmu")
 # A folder with this file is one of ours.
 OURS = "vehiclemor_model.h"
 
@@ -50,14 +51,14 @@ def export(
         Registered name, a model made by `model()`, or a reduced one: of `reduce()`, `load()` or
         `rom()`.
     to
-        `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit by FMI 3.0 for model
+        `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit by FMI 2.0 for model
         exchange and co-simulation, with sources, and a binary for this platform where there is a C
-        compiler; `fmu2`: by FMI 2.0.  `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a
-        function (x, u, p) -> (dx, y).  `sympy`: expressions.
+        compiler.  `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a function (x, u, p) ->
+        (dx, y).  `sympy`: expressions.
     path
         File or folder to write.  Without it C and FMU go under the model's name into the working
-        folder; of the others the object is returned, and with it a file is written: CasADi's own
-        for `Function.load`, or a Python module.
+        folder; of the others the object is returned.  With it CasADi's own file for `Function.load`
+        is written; what is made for JAX and SymPy is an object alone.
     overwrite
         Whether an export that is there is replaced.
     step
@@ -76,6 +77,8 @@ def export(
     """
     choice("target", to, TARGETS)
     step = within("step", number("step", step), STEPS, " s")
+    if path is not None and to not in ENDINGS:
+        raise InputError(f"path: what is made for {to} is an object, no file")
     if isinstance(model, str):
         from vehiclemor.simulation.build import build
 
@@ -153,18 +156,13 @@ def _object(system: ExportedSystem, to: str) -> Any:
 
 def _writer(system: ExportedSystem, to: str, step: float) -> Callable[[Path], object]:
     """What writes a file; all of its content is made before."""
-    if to in FILES:
-        from vehiclemor.exporting.fmu import fmu_files, write_archive
-
-        files = fmu_files(system, step, 2 if to == "fmu2" else 3)
-        return lambda path: write_archive(files, path)
     if to == "casadi":
         function = _object(system, to)
         return lambda path: function.save(str(path))
-    from vehiclemor.exporting import to_jax, to_sympy
+    from vehiclemor.exporting.fmu import fmu_files, write_archive
 
-    text = (to_jax if to == "jax" else to_sympy).module_text(system)
-    return lambda path: path.write_text(text, encoding="utf-8")
+    files = fmu_files(system, step)
+    return lambda path: write_archive(files, path)
 
 
 def _write_folder(path: Path, files: dict[str, str]) -> Path:

@@ -16,9 +16,6 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import DynamicModel
 
-# Of what no printer knows.
-WHY = "its equations are no straight-line program"
-
 
 def exported_system(what: Any, name: str) -> ExportedSystem:
     """The system of a model, or of what the fit of a method has given.
@@ -54,4 +51,4 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
                 return reduced_system(what, name, (kernels.sources["full_state"], constants))
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)
-    raise InputError(f"{name} can't be exported: {WHY}")
+    raise InputError(f"{name} can't be exported: its equations are no straight-line program")

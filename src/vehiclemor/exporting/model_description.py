@@ -1,7 +1,7 @@
-"""`modelDescription.xml` of an FMU, by the schemas of FMI 2.0 and 3.0.
+"""`modelDescription.xml` of an FMU, by the schema of FMI 2.0.
 
 Value references count time, states, their derivatives, inputs, outputs and parameters, as
-`vehiclemor_fmu.h` does.
+`vehiclemor_fmi2.c` does.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from vehiclemor.exporting.system import TOOL, ExportedSystem
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.units import base_units
 
-CAPABILITIES = {
-    2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"),
-    3: ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"),
-}
+CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
+# Files that a binary is compiled of, the interface first.
+UNIT = "vehiclemor_fmi2.c"
+COMPILED = UNIT, MODEL, TANGENT, STEPPER
 # What an importer proposes, in s.
 STOP, COMMUNICATION = 10.0, 0.01
 
@@ -68,42 +68,34 @@ def _local(name: str, quantity: Quantity, initial: str, start: float | None = No
     return Variable(name, quantity.unit, quantity.long_name, "local", "continuous", initial, start)
 
 
-def model_description(system: ExportedSystem, token: str, step: float, fmi: int) -> bytes:
+def model_description(system: ExportedSystem, token: str) -> bytes:
     """The file.
 
     Parameters
     ----------
     token
         By which an importer's file and binary know one another.
-    step
-        Of the integrator inside, in s.
-    fmi
-        2 or 3.
     """
     every = variables(system)
     root = ElementTree.Element(
         "fmiModelDescription",
-        fmiVersion=f"{fmi}.0",
+        fmiVersion="2.0",
         modelName=system.name,
+        guid=token,
         description=system.summary,
         generationTool=TOOL,
         variableNamingConvention="structured",
+        numberOfEventIndicators="0",
     )
-    root.set("guid" if fmi == 2 else "instantiationToken", token)
-    if fmi == 2:
-        root.set("numberOfEventIndicators", "0")
-    common = {"modelIdentifier": identifier(system), **dict.fromkeys(CAPABILITIES[fmi], "true")}
+    common = {"modelIdentifier": system.name, **dict.fromkeys(CAPABILITIES, "true")}
     exchange = ElementTree.SubElement(root, "ModelExchange", common)
     simulation = ElementTree.SubElement(
         root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"}
     )
-    if fmi == 3:
-        simulation.set("fixedInternalStepSize", repr(step))
-    else:
-        for kind in (exchange, simulation):
-            files = ElementTree.SubElement(kind, "SourceFiles")
-            for name in sources(fmi):
-                ElementTree.SubElement(files, "File", name=name)
+    for kind in (exchange, simulation):
+        files = ElementTree.SubElement(kind, "SourceFiles")
+        for name in COMPILED:
+            ElementTree.SubElement(files, "File", name=name)
     _units(root, (v.unit for v in every.values()))
     ElementTree.SubElement(
         root,
@@ -114,20 +106,10 @@ def model_description(system: ExportedSystem, token: str, step: float, fmi: int)
     )
     listed = ElementTree.SubElement(root, "ModelVariables")
     for reference, variable in every.items():
-        _variable(listed, variable, reference, fmi)
-    _structure(ElementTree.SubElement(root, "ModelStructure"), every, fmi)
+        _variable(listed, variable, reference)
+    _structure(ElementTree.SubElement(root, "ModelStructure"), every)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
-
-
-def identifier(system: ExportedSystem) -> str:
-    """Name of the binary."""
-    return system.name
-
-
-def sources(fmi: int) -> tuple[str, ...]:
-    """Files that a binary is compiled of."""
-    return f"vehiclemor_fmi{fmi}.c", MODEL, TANGENT, STEPPER
 
 
 def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
@@ -142,7 +124,7 @@ def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
             ElementTree.SubElement(unit, "BaseUnit", given)
 
 
-def _variable(listed: ElementTree.Element, variable: Variable, reference: int, fmi: int) -> None:
+def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -> None:
     own = {
         "name": variable.name,
         "valueReference": str(reference),
@@ -156,28 +138,22 @@ def _variable(listed: ElementTree.Element, variable: Variable, reference: int, f
     if variable.start is not None:
         typed["start"] = repr(variable.start)
     if variable.derivative_of is not None:
-        # Version 2 counts variables from one, and time is the first.
-        typed["derivative"] = str(variable.derivative_of + (fmi == 2))
-    if fmi == 3:
-        ElementTree.SubElement(listed, "Float64", own | typed)
-    else:
-        scalar = ElementTree.SubElement(listed, "ScalarVariable", own)
-        ElementTree.SubElement(scalar, "Real", typed)
+        # Variables are counted from one, and time is the first.
+        typed["derivative"] = str(variable.derivative_of + 1)
+    scalar = ElementTree.SubElement(listed, "ScalarVariable", own)
+    ElementTree.SubElement(scalar, "Real", typed)
 
 
-def _structure(structure: ElementTree.Element, every: Mapping[int, Variable], fmi: int) -> None:
+def _structure(structure: ElementTree.Element, every: Mapping[int, Variable]) -> None:
     outputs = [i for i, v in every.items() if v.causality == "output"]
     rates = [i for i, v in every.items() if v.derivative_of is not None]
     kinds = (
-        ("Outputs", "Output", outputs),
-        ("Derivatives", "ContinuousStateDerivative", rates),
-        ("InitialUnknowns", "InitialUnknown", sorted(outputs + rates)),
+        ("Outputs", outputs),
+        ("Derivatives", rates),
+        ("InitialUnknowns", sorted(outputs + rates)),
     )
-    for plural, single, places in kinds:
-        if fmi == 3:
-            for place in places:
-                ElementTree.SubElement(structure, single, valueReference=str(place))
-        elif places:
-            listed = ElementTree.SubElement(structure, plural)
+    for name, places in kinds:
+        if places:
+            listed = ElementTree.SubElement(structure, name)
             for place in places:
                 ElementTree.SubElement(listed, "Unknown", index=str(place + 1))

@@ -9,32 +9,12 @@ import numpy as np
 
 from vehiclemor.exporting.interpreter import evaluated
 from vehiclemor.exporting.packages import needed
-from vehiclemor.exporting.python_module import python_module
 from vehiclemor.exporting.straight_line import FUNCTIONS
 from vehiclemor.exporting.system import ExportedSystem
 
 # Where JAX has another name.
 RENAMED = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
 RENAMED |= {"fabs": "abs"}
-ENTRY = """
-
-TABLE = jnp.array({table!r})
-
-
-def entry(row, place):
-    return TABLE[row.astype(int) + place]
-
-"""
-
-
-def module_text(system: ExportedSystem) -> str:
-    """A Python module of its functions; it needs JAX when it is used, not now."""
-    words = {name: f"jnp.{RENAMED.get(name, name)}" for name in FUNCTIONS}
-    words |= {"select": "jnp.where", "pow": "pow", "entry": "entry"}
-    imported = "import jax.numpy as jnp"
-    if len(system.table):
-        imported += ENTRY.format(table=system.table.tolist())
-    return python_module(system, imported, words, "jnp.array")
 
 
 def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from vehiclemor.exporting.interpreter import evaluated
-from vehiclemor.exporting.python_module import python_module
 from vehiclemor.exporting.straight_line import FUNCTIONS
 from vehiclemor.exporting.system import ExportedSystem
 from vehiclemor.short_repr import ShortRepr
@@ -16,18 +15,6 @@ if TYPE_CHECKING:
 
 # Where SymPy has another name.
 RENAMED = {"fabs": "Abs", "fmax": "Max", "fmin": "Min"}
-SELECT = """\
-def select(test, then, otherwise):
-    return sp.Piecewise((then, test), (otherwise, True))
-"""
-
-
-def module_text(system: ExportedSystem) -> str:
-    """A Python module of its functions, for columns of symbols or numbers."""
-    words = {name: f"sp.{RENAMED.get(name, name)}" for name in FUNCTIONS} | {"pow": "pow"}
-    words["select"] = "select"
-    imported = f"import sympy as sp\n\n\n{SELECT}"
-    return python_module(system, imported, words, "sp.Matrix")
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,8 +109,6 @@ class Method(ShortRepr):
     follows_time
         Whether what it fits belongs to the times of the training runs, as a basis for each control
         period does: then a run is known where its inputs are those of a training run.
-    exported
-        Whether what it fits can be exported; it can't if it is no straight-line program.
     fits_others
         Whether `fit` takes a `FitOther` too, by which it fits what it is made of.
     check
@@ -132,7 +130,6 @@ class Method(ShortRepr):
     learns_from: Literal["own", "any", "inputs"] = "own"
     own_limits: bool = False
     follows_time: bool = False
-    exported: bool = True
     fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
 

@@ -22,27 +22,26 @@ validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 # Step of the integrator inside, and steps between exchanges with the outside.
 STEP, HELD = 1e-3, 10
-TARGETS = {2: "fmu2", 3: "fmu"}
 CASES = [
-    ("independent_suspension_vehicle", "full", 3),
-    ("independent_suspension_vehicle", "reduced", 2),
-    ("high_fidelity_vehicle", "full", 3),
+    ("independent_suspension_vehicle", "full"),
+    ("independent_suspension_vehicle", "reduced"),
+    ("high_fidelity_vehicle", "full"),
 ]
 
 
 @pytest.fixture(scope="module")
 def units(tmp_path_factory):
-    """(model, kind, version) -> model in use and path of its unit, quickly compiled."""
+    """(model, kind) -> model in use and path of its unit, quickly compiled."""
     made = {}
 
-    def unit(name, kind, version):
-        if (name, kind, version) not in made:
+    def unit(name, kind):
+        if (name, kind) not in made:
             path = tmp_path_factory.mktemp("unit") / "car.fmu"
             model = in_use(name, kind)
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0", "-Wall", "-Werror"))
-                made[name, kind, version] = model, vm.export(model, TARGETS[version], path)
-        return made[name, kind, version]
+                made[name, kind] = model, vm.export(model, "fmu", path)
+        return made[name, kind]
 
     return unit
 
@@ -52,34 +51,29 @@ class Instance:
 
     def __init__(self, path: Path, folder: Path) -> None:
         from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
 
         described = fmpy.read_model_description(str(path))
         self.number = {v.name: v.valueReference for v in described.modelVariables}
         self.outputs = [v.name for v in described.modelVariables if v.causality == "output"]
-        third = described.fmiVersion == "3.0"
-        self.slave = (FMU3Slave if third else FMU2Slave)(
+        self.slave = FMU2Slave(
             guid=described.guid,
             unzipDirectory=fmpy.extract(str(path), str(folder)),
             modelIdentifier=described.coSimulation.modelIdentifier,
             instanceName="car",
         )
         self.slave.instantiate()
-        if not third:
-            self.slave.setupExperiment()
+        self.slave.setupExperiment()
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
-        self._get = self.slave.getFloat64 if third else self.slave.getReal
-        self._set = self.slave.setFloat64 if third else self.slave.setReal
 
     def of(self, names):
         return [self.number[name] for name in names]
 
     def get(self, names):
-        return np.array(self._get(self.of(names)))
+        return np.array(self.slave.getReal(self.of(names)))
 
     def set(self, names, values):
-        self._set(self.of(names), np.asarray(values, float).tolist())
+        self.slave.setReal(self.of(names), np.asarray(values, float).tolist())
 
     def along(self, unknown, known):
         rows = [
@@ -252,24 +246,23 @@ def test_a_step_that_no_run_has_is_refused(started, case, length):
 def test_a_state_that_was_kept_is_gone_back_to(started, case):
     _, unit = started(*case)
     unit.set(["delta"], [0.02])
-    state = unit.slave.getFMUState() if case[2] == 3 else unit.slave.getFMUstate()
+    state = unit.slave.getFMUstate()
     ends = []
     for _ in range(2):
         unit.slave.doStep(0.0, 0.05)
         ends.append(unit.get(unit.outputs))
-        (unit.slave.setFMUState if case[2] == 3 else unit.slave.setFMUstate)(state)
+        unit.slave.setFMUstate(state)
     assert np.array_equal(*ends)
-    (unit.slave.freeFMUState if case[2] == 3 else unit.slave.freeFMUstate)(state)
+    unit.slave.freeFMUstate(state)
 
 
-@pytest.mark.parametrize("version", [2, 3])
-def test_declarations_are_those_of_the_standards_headers(units, tmp_path, version):
-    _, path = units(*CASES[3 - version])
+def test_declarations_are_those_of_the_standards_header(units, tmp_path):
+    _, path = units(*CASES[1])
     with ZipFile(path) as archive:
         archive.extractall(tmp_path)
     headers = Path(fmpy.__file__).parent / "c-code"
-    options = ["-std=c11", "-Wall", "-Werror", "-fsyntax-only", f"-DFMI{version}_HEADER"]
-    source = tmp_path / "sources" / f"vehiclemor_fmi{version}.c"
+    options = ["-std=c11", "-Wall", "-Werror", "-fsyntax-only", "-DFMI2_HEADER"]
+    source = tmp_path / "sources" / "vehiclemor_fmi2.c"
     command = ["cc", *options, f"-I{headers}", source]
     subprocess.run(command, check=True)
 

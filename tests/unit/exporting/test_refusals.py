@@ -19,6 +19,7 @@ CAR = "independent_suspension_vehicle"
         ({"to": "c", "step": float("nan")}, "nan is not finite"),
         ({"to": "c", "path": "no-such-folder/car"}, "does not exist"),
         ({"to": "c", "path": ""}, "is not a path"),
+        ({"to": "jax", "path": "car.py"}, "what is made for jax is an object, no file"),
     ],
 )
 def test_wrong_arguments(tmp_path, monkeypatch, arguments, words):
@@ -39,12 +40,6 @@ def test_a_method_without_equations_of_its_own(model, nominal):
     reduced = fitted(model, nominal, "pod", rank=2)
     with pytest.raises(vm.VehiclemorError, match="double_wishbone_pod can't be exported"):
         vm.export(ReducedOrderModel(model, "pod", {}, (), reduced), "casadi")
-
-
-def test_a_method_is_refused_before_it_is_fitted(monkeypatch, capsys):
-    monkeypatch.setattr(vm, "reduce", None)
-    assert main(["export", CAR, "--to", "c", "--method", "pod"]) == 2
-    assert f"{CAR}_pod can't be exported" in capsys.readouterr().err
 
 
 def test_a_table_is_no_expression():

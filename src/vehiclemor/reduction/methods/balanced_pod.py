@@ -160,5 +160,4 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="any",
-    exported=False,
 )

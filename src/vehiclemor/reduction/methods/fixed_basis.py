@@ -59,5 +59,4 @@ METHOD = Method(
     check=check_subspaces,
     fit=fit,
     learns_from="any",
-    exported=False,
 )

@@ -110,5 +110,4 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="any",
-    exported=False,
 )

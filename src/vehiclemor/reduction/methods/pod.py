@@ -94,5 +94,4 @@ METHOD = Method(
     fit=fit,
     learns_from="any",
     follows_time=True,
-    exported=False,
 )

@@ -246,5 +246,4 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="any",
-    exported=False,
 )

@@ -65,5 +65,4 @@ METHOD = Method(
     refusal=refusal,
     fit=fit,
     learns_from="inputs",
-    exported=False,
 )

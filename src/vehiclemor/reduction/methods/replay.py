@@ -115,6 +115,5 @@ METHOD = Method(
     settings=dict.fromkeys(KINDS, Settings),
     fit=fit,
     learns_from="any",
-    exported=False,
     own_limits=True,
 )
