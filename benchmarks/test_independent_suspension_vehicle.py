@@ -120,7 +120,7 @@ def test_batch(benchmark, model, which, jobs):
         car = vm.reduce(model, "full_order", solver="ros34pw2", tolerance=2e-3)
     times, rng = np.linspace(0.0, 10.0, 501), np.random.default_rng(1)
     rate = rng.uniform(0.5, 4.0, (BATCH, 1))
-    signals = vm.Signals(times, 0.01 * np.tanh(times) * np.sin(rate * times), "cubic")
+    signals = vm.many_signals(times, 0.01 * np.tanh(times) * np.sin(rate * times), "cubic")
     kept = {"outputs": ["lateral_position", "yaw", "Fz_FL"], "times": times[::5]}
     found = benchmark(vm.simulate_many, car, signals, jobs=jobs, **kept)
     benchmark.extra_info["seconds in compiled loops"] = found.seconds.sum().item()

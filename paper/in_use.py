@@ -137,9 +137,9 @@ def batches() -> Values:
     t = np.linspace(0.0, 10.0, 201)
     rate, phase = rng.uniform(0.5, 4.0, (count, 3, 1)), rng.uniform(0.0, 6.28, (count, 3, 1))
     onset = np.tanh(np.maximum(t - 1.0, 0.0)) ** 2
-    signals = vm.Signals(t, 0.01 * onset * np.sin(rate * t + phase).sum(axis=1), hold="cubic")
+    signals = vm.many_signals(t, 0.01 * onset * np.sin(rate * t + phase).sum(axis=1), hold="cubic")
     how: dict[str, Any] = {"outputs": ["lateral_position", "yaw", "Fz_FL"], "times": t[::2]}
-    some = partial(vm.simulate_many, signals=signals[:100], outputs=ASIDE, times=t)
+    some = partial(vm.simulate_many, signals=signals[:100], outputs=ASIDE, times=t[::2])
     exact = some(vm.reduce(VEHICLES["gv"][0], "full_order", tolerance=1e-8))["values"]
     values: Values = {}
     for kind, car in cars("gv").items():

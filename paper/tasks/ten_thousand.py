@@ -5,6 +5,6 @@ from maneuvers import steering, t
 import vehiclemor as vm
 
 car = vm.rom("independent_suspension_vehicle")
-signals = vm.Signals(t, steering, hold="cubic")
+signals = vm.many_signals(t, steering, hold="cubic")
 names = ["lateral_position", "yaw", "Fz_FL"]
 found = vm.simulate_many(car, signals, outputs=names, times=t[::2])

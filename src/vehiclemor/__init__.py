@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.maneuver import maneuver as maneuver
-    from vehiclemor.online.batch_signals import Signals as Signals
     from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
+    from vehiclemor.signal_arrays import many_signals as many_signals
     from vehiclemor.signals import Signal as Signal
     from vehiclemor.study.objectives import objective as objective
     from vehiclemor.study.objectives import objectives as objectives
@@ -46,7 +46,6 @@ _DEFINED_IN = {
     ),
     **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.signals",
-    "Signals": "vehiclemor.online.batch_signals",
     "VehiclemorError": "vehiclemor.errors",
     "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
@@ -54,6 +53,7 @@ _DEFINED_IN = {
     "figures": "vehiclemor.report.regenerate",
     "leaderboard": "vehiclemor.report.leaderboard",
     "maneuver": "vehiclemor.maneuver",
+    "many_signals": "vehiclemor.signal_arrays",
     "write_report": "vehiclemor.report.html.document",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
@@ -64,7 +64,6 @@ _DEFINED_IN = {
 }
 __all__ = [
     "Signal",
-    "Signals",
     "VehiclemorError",
     "compare",
     "convert",
@@ -75,6 +74,7 @@ __all__ = [
     "load",
     "maneuver",
     "maneuvers",
+    "many_signals",
     "methods",
     "model",
     "models",

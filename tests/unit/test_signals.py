@@ -364,3 +364,23 @@ def test_nothing_of_a_signal_is_left_for_the_next(car, solver):
         assert shared.counts == alone.counts
         for name in ("inputs", "states", "outputs"):
             np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
+def test_many_are_as_one_by_one(hold):
+    times, values = samples([0.1, 0.2, 0.3], 8)
+    every = vm.many_signals(times, values.reshape(4, 4, 2).swapaxes(0, 1), hold)
+    assert len(every) == 4
+    for run, signal in enumerate(every):
+        alone = vm.Signal.from_samples(times, values.reshape(4, 4, 2)[:, run], hold)
+        for found, wanted in zip(signal.pieces, alone.pieces, strict=True):
+            np.testing.assert_array_equal(found, wanted)
+        assert (signal.samples, signal.summary) == (alone.samples, alone.summary)
+
+
+def test_bad_samples_of_many_are_refused():
+    times = np.linspace(0.0, 4.0, 41)
+    with pytest.raises(InputError, match=r"u \(3,\)"):
+        vm.many_signals(times, [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="run 1 holds what is not finite"):
+        vm.many_signals(times, [0.0 * times, np.inf * np.ones(41)])

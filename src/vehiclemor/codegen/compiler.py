@@ -41,7 +41,7 @@ INTRINSICS = {
     name: getattr(loop_intrinsics, name)
     for name in (
         *("vector", "matrix", "call_kernel", "call_lanes", "call_tangent"),
-        *("call_loop", "mixed_rows"),
+        "mixed_rows",
     )
 }
 

@@ -166,20 +166,6 @@ def mixed_rows(typing_context: Any, rows: Any, weights: Any, result: Any) -> Any
     return types.void(rows, weights, result), generate
 
 
-@intrinsic
-def call_loop(typing_context: Any, entry: Any, words: Any) -> Any:
-    """See `loop_types.call_loop`."""
-    del typing_context
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        entry = context.cast(builder, args[0], sig.args[0], types.int64)
-        kind = ir.FunctionType(WORD, [WORD.as_pointer()])
-        function = builder.inttoptr(entry, kind.as_pointer())
-        return builder.call(function, [_data(context, builder, sig, args, 1)], attrs=("nounwind",))
-
-    return types.int64(entry, words), generate
-
-
 def inlined_kernel(text: str) -> Any:
     """A kernel whose instructions are written where a loop calls it, given its arrays."""
     kernel = KernelText(text)

@@ -73,11 +73,6 @@ def mixed_rows(rows: Matrix, weights: tuple[float, ...], result: Vector) -> None
     raise NotImplementedError(COMPILED_ONLY)
 
 
-def call_loop(entry: int, words: IntVector) -> int:
-    """Call the loop at an address with its arguments in words, see `loops.Prepared`."""
-    raise NotImplementedError(COMPILED_ONLY)
-
-
 def declared_arguments(entry: Any) -> dict[str, Any]:
     """Declared types of the arguments of a loop's entry by name."""
     return {name: kind for name, kind in entry.__annotations__.items() if name != "return"}

@@ -86,11 +86,6 @@ class Prepared:
         ctypes.memmove(place, bundle.words, len(bundle.words))
         self._given[name] = bundle
 
-    @property
-    def entry(self) -> int:
-        """Address of the loop, for loops that call it."""
-        return ctypes.cast(self._entry, ctypes.c_void_p).value or 0  # type: ignore[arg-type]
-
     def address(self, name: str) -> int:
         """Number of the word that is the address of an array; its shape follows."""
         return self._places[name]

@@ -11,8 +11,7 @@ from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.online.batch_result import Selection
-from vehiclemor.online.batch_signals import Signals
+from vehiclemor.online.batch_result import SAME_TIME, Selection
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.reduction.methods.full_order import FullOrderModel
@@ -45,7 +44,7 @@ def count_of(signals: Any, model: Model) -> int:
     """Number of runs; `InputError` if something else than inputs of the model is given."""
     if isinstance(signals, Maneuver) or not isinstance(signals, Sequence) or not len(signals):
         raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
-    for run, signal in enumerate([signals.first] if isinstance(signals, Signals) else signals):
+    for run, signal in enumerate(signals):
         if not isinstance(signal, Maneuver):
             raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
         if signal.for_inputs(model.inputs).inputs != model.inputs:
@@ -56,21 +55,38 @@ def count_of(signals: Any, model: Model) -> int:
     return len(signals)
 
 
-def kept_times(chosen: Selection, signals: Any) -> np.ndarray:
-    """Times in s of the result; `InputError` if runs don't share or don't reach them."""
-    first = signals.first if isinstance(signals, Signals) else signals[0]
-    others = () if isinstance(signals, Signals) else signals
-    if chosen.times is None:
-        for run, signal in enumerate(others):
+def kept_times(
+    chosen: Selection, signals: Sequence[Maneuver]
+) -> tuple[np.ndarray, list[slice | np.ndarray]]:
+    """Times in s of the result, and which samples of each run these are.
+
+    Raises
+    ------
+    InputError
+        If runs have other output times.
+    """
+    first, times = signals[0], chosen.times
+    if times is None:
+        for run, signal in enumerate(signals):
             if (signal.duration, signal.samples) != (first.duration, first.samples):
                 raise InputError(
                     f"signals[{run}] has other output times than the first: choose times="
                 )
-        return first.times
-    shortest = min(signal.duration for signal in (first, *others))
-    if chosen.times[0] < 0.0 or chosen.times[-1] > shortest * (1.0 + 1e-9):
-        raise InputError(f"times must lie within all runs, 0 to {shortest:g} s")
-    return chosen.times
+        return first.times, [slice(None)] * len(signals)
+    known: dict[tuple[float, int], np.ndarray] = {}
+    for run, signal in enumerate(signals):
+        alike = signal.duration, signal.samples
+        if alike not in known:
+            own = signal.times
+            rows = np.minimum(np.searchsorted(own, times - SAME_TIME), len(own) - 1)
+            missed = abs(own[rows] - times) > SAME_TIME
+            if missed.any():
+                raise InputError(
+                    f"times: {times[missed.argmax()]:g} s is no output time of signals[{run}]: "
+                    f"they go from 0 to {signal.duration:g} s by {own[1]:g} s"
+                )
+            known[alike] = rows
+    return times, [known[signal.duration, signal.samples] for signal in signals]
 
 
 def starts_of(starts: Any, runs: int, model: Model) -> Sequence[Start]:

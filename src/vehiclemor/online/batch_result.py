@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
+from vehiclemor.study.failure import Failure
 
 # Times (s) that differ by less are one.
 SAME_TIME = 1e-9
@@ -26,43 +26,29 @@ class Selection(NamedTuple):
     ----------
     names
         Names of outputs, coordinates or speeds.
-    columns
-        Their numbers among the states and, behind these, the outputs.
+    places
+        Where a trajectory has them: its attribute, and their number there.
     times
         In s; the signals' own output times if none.
     """
 
     names: tuple[str, ...]
-    columns: np.ndarray
+    places: list[tuple[str, int]]
     times: np.ndarray | None
-
-    def part(self, times: np.ndarray, names: np.ndarray) -> Selection:
-        """Some of the names, by their numbers, at some of the times."""
-        return Selection(tuple(self.names[k] for k in names), self.columns[names], times)
-
-    def samples(self, maneuver: Maneuver) -> tuple[np.ndarray | None, np.ndarray]:
-        """Times at which a run is recorded, if not at its own output times, and the rows kept.
-
-        Recorded are all of its own output times too: there a run is watched.
-        """
-        times = maneuver.times
-        if self.times is None:
-            return None, np.arange(len(times))
-        rows = np.minimum(np.searchsorted(times, self.times - SAME_TIME), len(times) - 1)
-        if (abs(times[rows] - self.times) <= SAME_TIME).all():
-            return None, rows
-        times = np.unique(np.concatenate([times, self.times]))
-        return times, np.searchsorted(times, self.times)
 
 
 def selected(model: Model, outputs: Any, times: Any) -> Selection:
     """What a user has chosen, checked; all outputs at the signals' output times by default."""
-    known = {name: k for k, name in enumerate((*model.definition.states, *model.outputs))}
+    known = {
+        name: (group, number)
+        for group in ("speeds", "coordinates", "outputs")
+        for number, name in enumerate(getattr(model, group))
+    }
     chosen = model.outputs if outputs is None else outputs
     chosen = (chosen,) if isinstance(chosen, str) else chosen
     if not isinstance(chosen, Sequence) or not len(chosen):
         raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
-    columns = [known[choice("output", name, known)] for name in chosen]
+    places = [known[choice("output", name, known)] for name in chosen]
     if times is not None:
         try:
             times = np.atleast_1d(real_array(times))
@@ -72,11 +58,11 @@ def selected(model: Model, outputs: Any, times: Any) -> Selection:
             raise InputError("times must be a list of finite times in s")
         if (np.diff(times) <= SAME_TIME).any():
             raise InputError("times must increase")
-    return Selection(tuple(chosen), np.array(columns, dtype=np.int64), times)
+    return Selection(tuple(chosen), places, times)
 
 
 class Found(NamedTuple):
-    """Results of some runs.
+    """Results of runs, into which each is written.
 
     Attributes
     ----------
@@ -84,7 +70,7 @@ class Found(NamedTuple):
         Quantities (runs, times, names).
     status, message, remark
         Of each run, see `Trajectory`.
-    indicator, until, reason
+    indicator, until
         What each run tells of itself, see `Trust`; the first is not a number where it is nothing.
     counts
         Solver counts (runs, counts).
@@ -98,54 +84,38 @@ class Found(NamedTuple):
     remark: np.ndarray
     indicator: np.ndarray
     until: np.ndarray
-    reason: np.ndarray
     counts: np.ndarray
     seconds: np.ndarray
 
     @classmethod
-    def empty(cls, runs: int, shape: tuple[int, int], counts: int) -> Found:
-        """Room for so many runs."""
-        status, message, remark, reason = (
-            np.full(runs, text, dtype=object) for text in ("ok", "", "", "")
-        )
-        values, whole = np.empty((runs, *shape)), np.zeros((runs, counts), dtype=np.int64)
-        told = np.full(runs, np.nan), np.full(runs, np.inf), reason
-        return cls(values, status, message, remark, *told, whole, np.zeros(runs))
+    def empty(cls, shape: tuple[int, int, int], counts: int) -> Found:
+        """Room for values of such a shape."""
+        runs = shape[0]
+        texts = (np.full(runs, text, dtype=object) for text in ("ok", "", ""))
+        told = np.full(runs, np.nan), np.full(runs, np.inf)
+        whole = np.zeros((runs, counts), dtype=np.int64)
+        return cls(np.empty(shape), *texts, *told, whole, np.zeros(runs))
 
-    def write(self, runs: Any, other: Found) -> None:
-        """Write results of some of the runs."""
-        for array, values in zip(self, other, strict=True):
-            array[runs] = values
+    def fail(self, run: int, why: Failure) -> None:
+        """Write a run of which there are no numbers."""
+        self.values[run], self.until[run] = np.nan, 0.0
+        self.status[run], self.message[run] = why.status, why.message
 
-    def refuse(self, refused: Mapping[int, str], status: str = "rejected") -> None:
-        """Write runs (number -> why) of which there are no numbers."""
-        for run, why in refused.items():
-            self.values[run], self.until[run] = np.nan, 0.0
-            self.status[run], self.message[run] = status, why
-
-    def write_trajectory(self, run: int, found: Trajectory, rows: np.ndarray, columns: Any) -> None:
-        """Write a trajectory, of which some rows and columns are kept."""
-        table = np.hstack([found.coordinates, found.speeds, found.outputs])
-        self.values[run] = table[np.ix_(rows, columns)]
+    def write(
+        self, run: int, found: Trajectory, rows: slice | np.ndarray, chosen: Selection
+    ) -> None:
+        """Write what is chosen of a trajectory."""
+        for place, (group, number) in enumerate(chosen.places):
+            self.values[run, :, place] = getattr(found, group)[rows, number]
         self.status[run], self.message[run] = found.status, found.message
         self.remark[run], self.seconds[run] = found.remark, found.seconds
         self.counts[run] = list(found.counts.values())
         if found.trust is not None:
-            trust = found.trust
-            self.indicator[run], self.until[run] = trust.indicator, trust.until
-            self.reason[run] = trust.reason
+            self.indicator[run], self.until[run] = found.trust.indicator, found.trust.until
 
 
-def dataset(
-    model: Model, chosen: Selection, times: np.ndarray, found: Found, first: int = 0
-) -> Any:
-    """Labelled dataset of runs on the dimensions run, time and output.
-
-    Parameters
-    ----------
-    first
-        Number of the first of the runs.
-    """
+def dataset(model: Model, chosen: Selection, times: np.ndarray, found: Found) -> Any:
+    """Labelled dataset of runs on the dimensions run, time and output."""
     import xarray as xr
 
     declared = (*model.definition.outputs, *model.definition.coordinates, *model.definition.speeds)
@@ -159,7 +129,7 @@ def dataset(
         ("remark", "", "what else there is to know"),
         ("indicator", "1", "how far the run goes in what its model knows; 1 is the edge"),
         ("until", "s", "time at which the indicator has first passed 1"),
-        ("seconds", "s", "time spent in the compiled loop, the mean of runs done together"),
+        ("seconds", "s", "time spent in the compiled loop"),
     ):
         attributes = {"long_name": long_name} | ({"units": unit} if unit else {})
         if name == "seconds":
@@ -173,7 +143,7 @@ def dataset(
     for k, (name, long_name) in enumerate(model.counts.items()):
         variables[name] = "run", found.counts[:, k], {"units": "1", "long_name": long_name}
     coordinates = {
-        "run": ("run", np.arange(first, first + len(found.status)), {"long_name": "number"}),
+        "run": ("run", np.arange(len(found.status)), {"long_name": "number"}),
         "time": ("time", times, {"units": "s", "long_name": "time"}),
         "output": ("output", list(chosen.names), {"long_name": "name of the quantity"}),
         "output_unit": (

@@ -161,13 +161,9 @@ def left_validity(
         return "", sample
     name = names[first.index(sample)]
     value = outputs[sample, [quantity.name for quantity in definition.outputs].index(name)]
-    return out_of_validity(definition, name, value, times[sample]), sample
-
-
-def out_of_validity(definition: ModelDefinition, name: str, value: float, time: float) -> str:
-    """That an output has left its range of validity at a time in s."""
     low, high = definition.validity[name]
-    return f"{name} is {value:.4g} at t = {time:.6g} s; the model holds from {low:g} to {high:g}"
+    message = f"{name} is {value:.4g} at t = {times[sample]:.6g} s"
+    return f"{message}; the model holds from {low:g} to {high:g}", sample
 
 
 def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:

@@ -35,20 +35,14 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     if "recorded" not in maneuver.kept:
         ready, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
         inputs = np.empty((len(times), ready.bundle.coefficients.shape[1]))
-        sampled()(ready, times, inputs)
+        _signal_loops()["sampled"](ready, times, inputs)
         inputs.flags.writeable = False
         maneuver.kept["recorded"] = times, inputs
     return maneuver.kept["recorded"]
 
 
 @cache
-def sampled() -> Loop:
-    """The loop that gives inputs at some times."""
-    return signal_loops()["sampled"]
-
-
-@cache
-def signal_loops() -> dict[str, Loop]:
+def _signal_loops() -> dict[str, Loop]:
     """Loops over the polynomials of a signal."""
     return loops(SIGNAL_LOOPS, ("sampled", "extent"))
 
@@ -59,25 +53,18 @@ class Extent(NamedTuple):
     Attributes
     ----------
     low, high
-        Smallest and largest value of each input (..., inputs).
+        Smallest and largest value of each input (inputs,).
     largest
-        Sizes (..., 3, inputs): largest magnitudes of the inputs and of what of them is above 2 Hz,
+        Sizes (3, inputs): largest magnitudes of the inputs and of what of them is above 2 Hz,
         root of the integral of the square of what is above 8 Hz, see `formulations.inputs.extent`.
     since
-        Times (..., inputs) in s at which limits are passed first; infinite if they are not.
+        Times (inputs,) in s at which limits are passed first; infinite if they are not.
     """
 
     low: np.ndarray
     high: np.ndarray
     largest: np.ndarray
     since: np.ndarray
-
-    @classmethod
-    def of(cls, found: np.ndarray) -> "Extent":
-        """The extent that the loop has found (..., 5, inputs)."""
-        low, high, quick, shaken, since = np.moveaxis(found, -2, 0)
-        largest = np.stack([np.maximum(-low, high), quick, shaken], axis=-2)
-        return cls(low, high, largest, since)
 
 
 def extent_of(maneuver: Maneuver, limits: np.ndarray | None = None) -> Extent:
@@ -105,11 +92,14 @@ def _kept_extent(maneuver: Maneuver) -> Extent:
 def _extent(signal: Ready, limits: np.ndarray | None = None) -> Extent:
     inputs = signal.bundle.coefficients.shape[1]
     found = np.empty((5, inputs))
-    signal_loops()["extent"](signal, no_limits(inputs) if limits is None else limits, found)
-    return Extent.of(found)
+    _signal_loops()["extent"](signal, _no_limits(inputs) if limits is None else limits, found)
+    largest = found[1:4].copy()
+    np.maximum(-found[0], found[1], out=largest[0])
+    return Extent(found[0], found[1], largest, found[4])
 
 
-def no_limits(inputs: int) -> np.ndarray:
+@cache
+def _no_limits(inputs: int) -> np.ndarray:
     """Limits (4, inputs) that nothing passes."""
     return np.repeat([[-np.inf], [np.inf], [np.inf], [np.inf]], inputs, axis=1)
 

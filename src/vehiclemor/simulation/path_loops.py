@@ -108,7 +108,7 @@ def delivered(
     """
     samples = len(result)
     points = matrix(scratch, 0, len(states), result.shape[1])
-    observed(states, inputs, observer, observer.kernel, scratch, points)
+    observed(states, inputs, observer, scratch, points)
     for k in range(len(first)):
         first[k] = samples
     known, within = -1, False
@@ -125,8 +125,8 @@ def delivered(
     return 0
 
 
-def observed(states, inputs, observer, kernel, scratch, points):
-    """States and what a kernel makes of them, side by side at the points, the scratch space."""
+def observed(states, inputs, observer, scratch, points):
+    """States and outputs side by side at the points, the scratch space."""
     n, width = observer.states, points.shape[1]
     for row in range(len(states)):
         for i in range(n):
@@ -136,9 +136,9 @@ def observed(states, inputs, observer, kernel, scratch, points):
             points[row, i] = 0.0
     outputs = matrix(scratch, n, len(states), width)
     if len(states) >= LANES:
-        lane_path(states, inputs, kernel, observer.constants, outputs)
+        lane_path(states, inputs, observer.kernel, observer.constants, outputs)
     else:
-        kernel_path(states, inputs, kernel, observer.constants, outputs)
+        kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
 
 
 def point_of(places, sample):

@@ -1,6 +1,4 @@
-"""Batches of runs: each is the run alone, in memory or in a file, in however many threads."""
-
-import weakref
+"""Batches of runs: each is the run alone, in however many threads."""
 
 import numpy as np
 import pytest
@@ -9,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vehiclemor as vm
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import InputError
 from vehiclemor.online import batches
 from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import FINISHED
@@ -60,34 +58,12 @@ def check_alone(model, signals, found: xr.Dataset, starts=None) -> None:
             assert own.until.item() == alone.trust.until
 
 
-def test_what_is_not_chosen_is_made_where_it_is_read(full, monkeypatch):
-    signals, masses = vm.Signals(TIMES, steering(70), "cubic"), np.linspace(1300.0, 1500.0, 70)
-    made, whole = [], batches._Work.__call__
-    monkeypatch.setattr(
-        batches._Work,
-        "__call__",
-        lambda work, part: made.append((len(work.signals), work.chosen.names)) or whole(work, part),
-    )
-    given = {"parameters": {"sprung_mass": masses}, "jobs": 1}
-    found = vm.simulate_many(full, signals, **given)
-    assert made == [(70, ())] * 2
-    made.clear()
-    names, rows, runs = ["roll", "yaw"], [30, 7, 7], [66, 2]
-    read = found["values"].sel(output=names).isel(time=rows, run=runs).values
-    assert made == [(2, ("yaw", "roll"))]
-    chosen = vm.simulate_many(full, signals, **given, outputs=names)
-    np.testing.assert_array_equal(read, chosen["values"].isel(time=rows, run=runs))
-    one = found["values"].sel(output="roll").isel(time=40, run=3)
-    assert one.item() == chosen["values"].sel(output="roll").isel(time=40, run=3).item()
-    assert found["values"].isel(run=[]).values.shape == (0, len(found.time), len(found.output))
-
-
 @pytest.mark.parametrize("kept", [{}, KEPT, {"outputs": "yaw"}], ids=["all", "few", "state"])
 @pytest.mark.parametrize("start", [None, "dropped"])
 @pytest.mark.parametrize("which", ["reduced", "full"])
 def test_runs_are_those_alone(which, start, kept, request):
     model = request.getfixturevalue(which)
-    signals = vm.Signals(TIMES, steering(6), "cubic")
+    signals = vm.many_signals(TIMES, steering(6), "cubic")
     found = vm.simulate_many(model, signals, start, **kept)
     assert found.status.isin(FINISHED).all()
     check_alone(model, signals, found, start)
@@ -96,7 +72,7 @@ def test_runs_are_those_alone(which, start, kept, request):
 def test_every_run_has_a_start_of_its_own(reduced, full):
     own = reduced.model.start("equilibrium")
     moved = np.array([own, 1.02 * own, own, 0.97 * own])
-    signals = vm.Signals(TIMES, steering(4), "zero")
+    signals = vm.many_signals(TIMES, steering(4), "zero")
     for model in (reduced, full):
         for starts in (moved, [own, "dropped", "equilibrium", moved[3]]):
             check_alone(model, signals, vm.simulate_many(model, signals, starts, **KEPT), starts)
@@ -105,11 +81,11 @@ def test_every_run_has_a_start_of_its_own(reduced, full):
 @settings(max_examples=12)
 @given(chunk=st.integers(1, 9), jobs=st.integers(1, 4), runs=st.integers(1, 20))
 def test_neither_threads_nor_chunks_change_a_bit(reduced, chunk, jobs, runs):
-    signals = vm.Signals(TIMES, steering(20, 0.06)[:runs])
+    signals = vm.many_signals(TIMES, steering(20, 0.06)[:runs])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(batches, "CHUNK", chunk)
         found = vm.simulate_many(reduced, signals, jobs=jobs, **KEPT)
-    whole = vm.simulate_many(reduced, vm.Signals(TIMES, steering(20, 0.06)), jobs=1, **KEPT)
+    whole = vm.simulate_many(reduced, vm.many_signals(TIMES, steering(20, 0.06)), jobs=1, **KEPT)
     xr.testing.assert_identical(
         found.drop_vars("seconds").drop_attrs(),
         whole.isel(run=slice(runs)).drop_vars("seconds").drop_attrs(),
@@ -120,7 +96,7 @@ def test_what_fails_is_a_result_beside_the_others(reduced, full):
     u, states = steering(5), reduced.model.definition.states
     # Beyond the steering angles for which the model holds, and a car that is thrown on its side.
     u[3] = 1.2 * np.tanh(TIMES)
-    signals = vm.Signals(TIMES, u, "cubic")
+    signals = vm.many_signals(TIMES, u, "cubic")
     thrown = reduced.model.start("equilibrium")
     thrown[states.index("phi")], thrown[states.index("p")] = 0.9, 8.0
     starts = ["equilibrium", thrown, *["equilibrium"] * 3]
@@ -134,7 +110,7 @@ def test_what_fails_is_a_result_beside_the_others(reduced, full):
         assert np.isnan(found["values"][3]).all()
         assert np.isnan(found["values"][1]).all() == (model is full)
         others = [0, 2, 4]
-        alone = vm.simulate_many(model, vm.Signals(TIMES, u[others], "cubic"), **KEPT)
+        alone = vm.simulate_many(model, vm.many_signals(TIMES, u[others], "cubic"), **KEPT)
         np.testing.assert_array_equal(found["values"][others], alone["values"])
         check_alone(model, signals[1:2], found.isel(run=[1]).assign_coords(run=[0]), [thrown])
 
@@ -147,23 +123,12 @@ def test_maneuvers_of_different_lengths_share_chosen_times(full):
     check_alone(full, maneuvers, found)
 
 
-def test_times_need_not_be_output_times(full):
-    signals, times = vm.Signals(TIMES, steering(3), "cubic"), [0.123, 1.0, 2.7183]
-    found = vm.simulate_many(full, signals, times=times, outputs=["roll", "Fz_FL"])
-    for run, signal in enumerate(signals):
-        # With the end of the run, where its last step ends.
-        own = np.array([*times, TIMES[-1]])
-        alone = full.model.simulate(signal, None, own, "ros34pw2", 2e-3)
-        columns = [full.model.outputs.index(name) for name in ("roll", "Fz_FL")]
-        np.testing.assert_allclose(found["values"][run], alone.outputs[:-1, columns], rtol=1e-12)
-
-
 @pytest.mark.parametrize("method", ["full_order", "path_map"])
 def test_mechanisms_in_batches(method):
     model = vm.rom(MECHANISM) if method == "path_map" else vm.reduce(MECHANISM, method)
     waves = 0.04 * np.sin(np.outer([1.0, 2.0, 2.5], TIMES))
     waves[2] *= 6.0
-    signals = vm.Signals(TIMES, np.stack([waves, 0.0 * waves], axis=2), "cubic")
+    signals = vm.many_signals(TIMES, np.stack([waves, 0.0 * waves], axis=2), "cubic")
     found = vm.simulate_many(model, signals)
     assert found.status.values.tolist()[:2] == ["ok", "ok"]
     assert found.status.item(2) in ("untrusted", "unreachable")
@@ -171,7 +136,10 @@ def test_mechanisms_in_batches(method):
 
 
 def test_parameters_by_run(full):
-    masses, signals = [1400.0, 1500.0, 1500.0, -1.0], vm.Signals(TIMES, steering(4), "cubic")
+    masses, signals = (
+        [1400.0, 1500.0, 1500.0, -1.0],
+        vm.many_signals(TIMES, steering(4), "cubic"),
+    )
     table = vm.simulate_many(full, signals, parameters={"sprung_mass": masses}, **KEPT)
     listed = [{"sprung_mass": mass} for mass in masses]
     xr.testing.assert_equal(
@@ -186,95 +154,12 @@ def test_parameters_by_run(full):
     assert abs(table["values"] - table["values"][0])[1].max() > 1e-3
 
 
-@pytest.mark.parametrize("ending", [".nc", ".zarr"])
-def test_a_file_holds_what_memory_would(ending, reduced, tmp_path, monkeypatch):
-    if ending == ".zarr":
-        pytest.importorskip("zarr")
-    u = steering(11)
-    u[4] = 1.2 * np.tanh(TIMES)
-    signals = vm.Signals(TIMES, u, "cubic")
-    whole = vm.simulate_many(reduced, signals, **KEPT)
-    monkeypatch.setattr(batches, "CHUNK", 3)
-    path = tmp_path / f"runs{ending}"
-    with vm.simulate_many(reduced, signals, path=path, **KEPT) as stored:
-        xr.testing.assert_equal(stored.load().drop_vars("seconds"), whole.drop_vars("seconds"))
-        assert stored.attrs["model"] == CAR
-    assert [found.name for found in tmp_path.iterdir()] == [path.name]
-
-
-def test_few_chunks_are_alive_at_a_time(full, tmp_path, monkeypatch):
-    alive, most = [], []
-    work = batches._Work.__call__
-
-    def watched(self, part):
-        found = work(self, part)
-        alive.append(weakref.ref(found.values))
-        return found
-
-    def counted(model, chosen, times, found, first):
-        most.append(sum(reference() is not None for reference in alive))
-        return dataset(model, chosen, times, found, first)
-
-    dataset = batches.dataset
-    monkeypatch.setattr(batches._Work, "__call__", watched)
-    monkeypatch.setattr(batches, "dataset", counted)
-    monkeypatch.setattr(batches, "CHUNK", 2)
-    signals = vm.Signals(TIMES, steering(40), "cubic")
-    vm.simulate_many(full, signals, jobs=2, path=tmp_path / "runs.nc", **KEPT).close()
-    assert len(most) == 20
-    # Those that wait, one that is written, and one before it.
-    assert max(most) <= 2 * 2 + 3
-
-
-def test_nothing_is_left_of_a_batch_that_breaks(full, tmp_path, monkeypatch):
-    def broken(*_):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr(batches, "CHUNK", 2)
-    signals = vm.Signals(TIMES, steering(8))
-    monkeypatch.setattr(batches._Work, "__call__", broken)
-    with pytest.raises(ZeroDivisionError):
-        vm.simulate_many(full, signals, path=tmp_path / "runs.nc", **KEPT)
-    assert not [*tmp_path.iterdir()]
-
-
-def test_signals_are_a_sequence_of_signals():
-    signals = vm.Signals(TIMES, steering(5), "cubic", output_step=0.1)
-    assert len(signals) == 5
-    assert len(signals[1:4]) == 3
-    np.testing.assert_array_equal(signals[1:4][1].at(TIMES), signals[2].at(TIMES))
-    assert signals[0].samples == 41
-    assert repr(signals) == "Signals(runs=5, duration=4.0, hold='cubic', inputs=())"
-
-
-def test_what_a_caller_does_to_the_samples_later_is_not_seen():
-    t, u = TIMES.copy(), steering(2)
-    signals = vm.Signals(t, u)
-    t *= 2.0
-    u[1, 5] = np.nan
-    np.testing.assert_array_equal(signals.t, TIMES)
-    np.testing.assert_array_equal(signals.u[:, :, 0], steering(2))
-    with pytest.raises(ValueError, match="read-only"):
-        signals.u[0] = 0.0
-
-
-def test_times_between_those_of_runs_one_by_one_are_refused_before_the_first(monkeypatch):
-    mechanism = vm.reduce(MECHANISM, "full_order")
-    signals = vm.Signals(TIMES, np.zeros((2, 41, 2)))
-    own = vm.simulate_many(mechanism, signals, times=[0.5, 1.0])
-    assert own.time.values.tolist() == [0.5, 1.0]
-    monkeypatch.setattr(batches, "_chunks", None)
-    for chosen in (signals, list(signals)):
-        with pytest.raises(InputError, match="full_order gives only the signals' own"):
-            vm.simulate_many(mechanism, chosen, times=[0.505])
-
-
 def test_points_are_parameters_by_run():
     model = vm.model(MECHANISM)
     name = next(n for n, q in model.definition.parameters.items() if q.size == 3)
     point = np.asarray(model.parameters[name])
     points = [point.tolist(), (point + 1e-3).tolist()]
-    signals = vm.Signals(TIMES, np.zeros((2, 41, 2)))
+    signals = vm.many_signals(TIMES, np.zeros((2, 41, 2)))
     found = vm.simulate_many(model, signals, parameters={name: points})
     listed = vm.simulate_many(model, signals, parameters=[{name: p} for p in points])
     np.testing.assert_array_equal(found["values"], listed["values"])
@@ -295,7 +180,11 @@ STATE = [0.0] * 27
         ({"starts": "above"}, "unknown start 'above'"),
         ({"starts": STATE}, "start has shape (27,)"),
         ({"outputs": ["yaww"]}, "unknown output 'yaww'; did you mean yaw"),
-        ({"times": [1.0, 5.0]}, "times must lie within all runs, 0 to 4 s"),
+        (
+            {"times": [1.0, 5.0]},
+            "times: 5 s is no output time of signals[0]: they go from 0 to 4 s",
+        ),
+        ({"times": [0.505]}, "times: 0.505 s is no output time of signals[0]"),
         ({"times": [1.0, 0.5]}, "times must increase"),
         ({"jobs": 0}, "jobs is 0"),
         ({"parameters": {"mass": 1.0}}, "'mass' is not a parameter of"),
@@ -304,39 +193,23 @@ STATE = [0.0] * 27
         ({"parameters": [None] * 2}, "not a mapping for each run"),
         ({"parameters": [{"mass": 1.0}] * 2}, "'mass' is not a parameter of"),
         ({"parameters": [{"sprung_mass": np.ones(1)}] * 2}, "has shape (1,), not ()"),
-        ({"path": f"{'x' * 300}.nc"}, "is not a path (File name too long)"),
-        ({"path": "runs.txt"}, "ends neither in .nc nor in .zarr"),
         ({"model": 3}, "model is 3"),
     ],
 )
 def test_wrong_input_is_one_line(changes, line, full):
-    given = {"model": full, "signals": vm.Signals(TIMES, steering(2))} | changes
+    given = {"model": full, "signals": vm.many_signals(TIMES, steering(2))} | changes
     with pytest.raises(InputError) as error:
         vm.simulate_many(**given)
     assert line in str(error.value)
     assert "\n" not in str(error.value)
 
 
-def test_what_can_not_be_kept_is_refused(full, tmp_path, monkeypatch):
-    signals = vm.Signals(TIMES, steering(2))
+def test_what_can_not_be_kept_is_refused(full, monkeypatch):
+    signals = vm.many_signals(TIMES, steering(2))
     fitted = vm.reduce(full.model, "operator_inference", training="nominal")
     with pytest.raises(InputError, match="is fitted to one car"):
         vm.simulate_many(fitted, signals, parameters={"sprung_mass": 1400.0})
-    (tmp_path / "runs.nc").mkdir()
-    with pytest.raises(FileError, match="exists already"):
-        vm.simulate_many(full, signals, path=tmp_path / "runs.nc")
-    with pytest.raises(FileError, match="there is no such folder"):
-        vm.simulate_many(full, signals, path=tmp_path / "new" / "runs.nc")
-    (tmp_path / "mine.nc").write_text("mine")
-    with pytest.raises(FileError, match="exists already"):
-        vm.simulate_many(full, signals, path=tmp_path / "mine.nc")
-    assert (tmp_path / "mine.nc").read_text() == "mine"
     monkeypatch.setattr(batches, "LARGEST", 1000)
-    with pytest.raises(InputError, match="GB of memory: choose outputs= and times="):
-        vm.simulate_many(full, signals, outputs=["yaw", "roll"])
-    with pytest.raises(InputError, match="GB of memory: choose outputs= and times="):
-        vm.simulate_many(full, signals)["values"].load()
-    with pytest.raises(InputError, match=r"u \(3,\)"):
-        vm.Signals(TIMES, [1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match="run 1 holds what is not finite"):
-        vm.Signals(TIMES, [0.0 * TIMES, np.inf * np.ones(41)])
+    for outputs in (["yaw", "roll"], None):
+        with pytest.raises(InputError, match="GB of memory: choose outputs=, times="):
+            vm.simulate_many(full, signals, outputs=outputs)

@@ -72,7 +72,7 @@ def test_a_pulse_between_two_output_times_is_told_of_when_it_comes(size, hold):
     assert run.status == "untrusted"
     assert "it is steered further or quicker than any training run" in run.message
     assert run.trust.until == pytest.approx(1.7)
-    together = vm.Signals([0, 1.689, 1.692, 1.694, 10], [[0, 0, size, 0, 0], [0] * 5], hold)
+    together = vm.many_signals([0, 1.689, 1.692, 1.694, 10], [[0, 0, size, 0, 0], [0] * 5], hold)
     many = vm.simulate_many(rom, together, "equilibrium", outputs=["yaw"])
     assert many["status"].values.tolist() == ["untrusted", "ok"]
     assert many["until"][0] == pytest.approx(1.7)
@@ -122,7 +122,7 @@ def test_bounds_of_inputs_hold_between_output_times_in_full_order_too():
     for simulate in (car.simulate, shipped(CAR).simulate):
         with pytest.raises(InputError, match=refusal):
             simulate(signal)
-    signals = vm.Signals(times, [values, np.multiply(values, 0.01)])
+    signals = vm.many_signals(times, [values, np.multiply(values, 0.01)])
     many = vm.simulate_many(car, signals, outputs=["yaw"])
     assert many["status"].values.tolist() == ["rejected", "ok"]
     assert "holds from -1.066 to 1.066 rad" in many["message"].values[0]
