@@ -91,10 +91,16 @@ class Found(NamedTuple):
     def empty(cls, shape: tuple[int, int, int], counts: int) -> Found:
         """Room for values of such a shape."""
         runs = shape[0]
-        texts = (np.full(runs, text, dtype=object) for text in ("ok", "", ""))
-        told = np.full(runs, np.nan), np.full(runs, np.inf)
-        whole = np.zeros((runs, counts), dtype=np.int64)
-        return cls(np.empty(shape), *texts, *told, whole, np.zeros(runs))
+        return cls(
+            values=np.empty(shape),
+            status=np.full(runs, "ok", dtype=object),
+            message=np.full(runs, "", dtype=object),
+            remark=np.full(runs, "", dtype=object),
+            indicator=np.full(runs, np.nan),
+            until=np.full(runs, np.inf),
+            counts=np.zeros((runs, counts), dtype=np.int64),
+            seconds=np.zeros(runs),
+        )
 
     def fail(self, run: int, why: Failure) -> None:
         """Write a run of which there are no numbers."""

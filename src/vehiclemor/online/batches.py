@@ -22,7 +22,7 @@ from vehiclemor.online.batch_arguments import (
 from vehiclemor.online.batch_result import Found, dataset, selected
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start
+from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.provenance import attributes
@@ -100,12 +100,15 @@ def simulate_many(
     found = Found.empty(shape, len(reduced.model.counts))
     model_of = _models(reduced)
 
+    def result(run: int) -> Trajectory | Failure:
+        car = reduced if sets is None else model_of(sets[run])
+        if isinstance(car, Failure):
+            return car
+        return attempt(lambda: car.simulate(signals[run], begins[run]))
+
     def work(first: int) -> None:
         for run in range(first, min(first + CHUNK, runs)):
-            car = reduced if sets is None else model_of(sets[run])
-            done = car
-            if not isinstance(car, Failure):
-                done = attempt(lambda: car.simulate(signals[run], begins[run]))  # noqa: B023
+            done = result(run)
             if isinstance(done, Failure):
                 found.fail(run, done)
             else:

@@ -14,8 +14,8 @@ CAR = "independent_suspension_vehicle"
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"to": "matlab"}, "'matlab' is no target"),
-        ({"to": "c", "step": 0.0}, "step: 0 s is not above 0"),
+        ({"to": "matlab"}, "unknown target 'matlab'"),
+        ({"to": "c", "step": 0.0}, "step: 0 s is below 1e-07 s"),
         ({"to": "c", "step": float("nan")}, "nan is not finite"),
         ({"to": "c", "path": "no-such-folder/car"}, "does not exist"),
         ({"to": "c", "path": ""}, "is not a path"),
