@@ -39,8 +39,6 @@ from vehiclemor.study.input_range import InputRange
 
 # Reduced coordinates; the models of this package have at most 9.
 MOST_STATES = 100
-# A kernel of whole steps has all features so many times.
-STEPS = 6
 
 
 def check(part: Any, model: Model) -> None:
@@ -124,7 +122,7 @@ def _parameters(part: Features) -> int:
     _require(0 < part.states <= MOST_STATES and 0 <= part.inputs <= MOST_STATES, "states")
     lines = [*part.lines, *(("term", text) for text in part.terms)]
     lines += [("watched", text) for text, _ in part.watched]
-    _require(sum(len(text) for _, text in lines) <= MOST_CHARACTERS // STEPS, "features")
+    _require(sum(len(text) for _, text in lines) <= MOST_CHARACTERS, "features")
     known = {f"z{i}" for i in range(part.states)} | {f"u{i}" for i in range(part.inputs)}
     sizes, most = [], 0
     for number, (name, text) in enumerate(lines):
@@ -140,9 +138,7 @@ def _parameters(part: Features) -> int:
         _apart("groups", columns, part.states + PLANAR)
         _require(bool(terms and columns), "groups")
         total += sum(own[j] for j in terms) + len(terms) * padded(len(columns))
-    _require(total <= MOST_SIZE // STEPS, "features")
-    fits = all(size > 0 for size in part.diagonal) and sum(part.diagonal) <= part.states
-    _require(fits, "diagonal")
+    _require(total <= MOST_SIZE, "features")
     return most
 
 
@@ -183,7 +179,7 @@ def _check_vehicle(part: ReducedVehicle) -> None:
 def _check_system(part: System) -> None:
     dim, n = len(part.reference), len(part.constants)
     _shaped("system", (part.reference, dim), (part.error_scale, dim), (part.constants, n))
-    _require(not part.fused and not part.diagonal and not part.directions.size, "fused")
+    _require(not part.directions.size, "directions")
     for name in ("active", "rotating", "partners"):
         _apart(name, getattr(part, name).tolist(), dim)
     _require(len(part.rotating) % 2 == 1 or not part.rotating.size, "rotating")

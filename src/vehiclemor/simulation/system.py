@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -53,7 +52,7 @@ REASONS = {
     SINGULAR: "the matrix of a linear system is singular",
     STEP_TOO_SMALL: "the step size has become too small",
 }
-# Kernels that a formulation calls; a fused step comes besides.
+# Kernels that a formulation calls; one of whole steps comes besides.
 CALLED = {
     "full": ("derivative",),
     "vehicle_frame": ("derivative",),
@@ -84,10 +83,6 @@ class System(ShortRepr):
         Numbers of the states that the right-hand side depends on.
     rotating
         Numbers of the heading and of the pairs of states that turn with it; may be empty.
-    fused
-        Integrator -> kernel that takes whole steps of it.
-    diagonal
-        Numbers of states by diagonal block of the Jacobian, where a fused step relies on them.
     partners
         Number of the state that each becomes in the mirror image; empty where there is none.
     directions
@@ -102,8 +97,6 @@ class System(ShortRepr):
     error_scale: np.ndarray
     active: np.ndarray
     rotating: np.ndarray
-    fused: Mapping[str, str] = field(default_factory=dict)
-    diagonal: tuple[tuple[int, ...], ...] = ()
     partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -112,7 +105,7 @@ class System(ShortRepr):
         dim, n, half = len(self.reference), len(self.constants), len(self.reference) // 2
         results = {"derivative": dim, "speeds": half, "second_order": half * (half + 1)}
         for name, source in self.kernels.sources.items():
-            if source.arguments[0] == "_x" and name not in self.fused.values():
+            if source.arguments[0] == "_x":
                 given = (dim, self.inputs, n)
                 source.check(*given, *([results[name]] if name in results else ()))
 
@@ -201,17 +194,13 @@ class System(ShortRepr):
         )
         return Frame(blocks, columns, tuple(self.rotating.tolist()))
 
-    def steps(self, solver: str) -> str:
-        """What takes whole steps of a full run: `fused`, `stepped`, or nothing."""
-        if solver in self.fused:
-            return "fused"
+    def whole_steps(self, solver: str) -> bool:
+        """Whether a kernel takes whole steps of a run that is not projected."""
         few = len(self.reference) <= catalogue.MOST_STATES
-        return "stepped" if few and catalogue.integrator(solver).stepped else ""
+        return few and catalogue.integrator(solver).stepped is not None
 
     def step_address(self, solver: str) -> int:
         """Address of the kernel that takes whole steps of an integrator."""
-        if solver in self.fused:
-            return address_of(self.kernels, self.fused[solver])
         stepped = catalogue.integrator(solver).stepped
         assert stepped
         sources = kernel_sources(stepped.text(self.frame, self.inputs))
@@ -223,9 +212,7 @@ class System(ShortRepr):
         if key not in self._ready:
             chosen = catalogue.integrator(solver)
             grid, stored = catalogue.STEP_GRID, catalogue.Stored(catalogue.NOTHING)
-            if solver in self.fused and chosen.block_operators:
-                stored = chosen.block_operators(self.frozen_jacobian, self.diagonal)
-            elif chosen.stepped and self.steps(solver) == "stepped":
+            if chosen.stepped and self.whole_steps(solver):
                 blocks = self.frame.diagonal(self.frozen_jacobian)
                 stored = catalogue.Stored(
                     self.frame.packed([chosen.stepped.tables(block) for block in blocks])
@@ -366,7 +353,7 @@ class System(ShortRepr):
         full = windows.formulation == "full"
         if windows.formulation != catalogue.SENSITIVITIES:
             catalogue.check_formulation(name, full)
-        steps = self.steps(name) if full else ""
+        whole_steps = full and self.whole_steps(name)
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
@@ -374,7 +361,7 @@ class System(ShortRepr):
         longest = float(solver.longest_step or np.inf)
         arguments = RunArguments(
             nothing,
-            self.called(formulation, name if steps else ""),
+            self.called(formulation, name if whole_steps else ""),
             signal,
             spans,
             windows.subspaces,
@@ -384,5 +371,9 @@ class System(ShortRepr):
             nothing,
             nothing,
         )
-        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, steps)
-        return catalogue.time_loop(chosen, formulation, steps), arguments, (n, floats, dim + 8)
+        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, whole_steps)
+        return (
+            catalogue.time_loop(chosen, formulation, whole_steps),
+            arguments,
+            (n, floats, dim + 8),
+        )

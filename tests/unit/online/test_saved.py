@@ -294,7 +294,6 @@ ARRAYS = [
         ("known", {"function": "vehiclemor.reduction.trust:trust_of"}),
         ("reduced.fields.coefficients", {"array": "reduced.nothing"}),
         (f"{FEATURES}.terms.tuple", ["z0", "z1"]),
-        (f"{FEATURES}.diagonal.tuple", [9, 9]),
         (f"{FEATURES}.states", 10**9),
         (f"{FEATURES}.states", True),
         (f"{FEATURES}.lateral", -1),

@@ -63,7 +63,7 @@ def test_all_models_run_in_the_same_loop(standard, vehicle, compiled):
         found = []
         for model, man in ((vehicle, straight), (standard(), QUIET)):
             model.simulate(man, times=np.array([0.1]), solver=solver, tolerance=1e-3)
-            found.append(catalogue.time_loop(own, "full", model.system.steps(solver)))
+            found.append(catalogue.time_loop(own, "full", model.system.whole_steps(solver)))
         assert found[0] is found[1]
 
 

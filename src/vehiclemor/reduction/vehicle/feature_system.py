@@ -8,7 +8,7 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.reduction.vehicle.feature_kernels import columns_text, diagonal_blocks, kernel_text
+from vehiclemor.reduction.vehicle.feature_kernels import columns_text, rates_text
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.simulation.paths import along
 from vehiclemor.simulation.system import System
@@ -30,7 +30,7 @@ def _column_kernels(features: Features) -> Kernels:
 # A fit makes systems of the same features again and again.
 @cache
 def _kernels(features: Features, parameters: int) -> Kernels:
-    return Kernels(kernel_sources(kernel_text(features, parameters)))
+    return Kernels(kernel_sources(rates_text(features, parameters)))
 
 
 def feature_system(
@@ -58,7 +58,6 @@ def feature_system(
         block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
     constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
     dim = features.states + PLANAR
-    fused = {"ros34pw2": "ros34pw2_step"} | ({"etdrk4": "etdrk4_step"} if features.diagonal else {})
     return System(
         _kernels(features, len(parameters)),
         constants,
@@ -67,6 +66,4 @@ def feature_system(
         error_scale,
         np.arange(dim - 2),
         np.zeros(0, dtype=np.int64),
-        fused,
-        diagonal=diagonal_blocks(features.diagonal),
     )

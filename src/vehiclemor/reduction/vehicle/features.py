@@ -34,9 +34,6 @@ class Features:
         Expression of each feature.
     groups
         (numbers of features, columns of C) of each block of C that is not zero; all if empty.
-    diagonal
-        Sizes of the diagonal blocks, from the first reduced coordinate on, outside of which the
-        Jacobian of z' is zero at the reference; a kernel of the exponential method uses them.
     watched
         (expression, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
         what the features were made for.
@@ -50,7 +47,6 @@ class Features:
     lines: tuple[tuple[str, str], ...]
     terms: tuple[str, ...]
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
-    diagonal: tuple[int, ...] = ()
     watched: tuple[tuple[str, str], ...] = ()
     lateral: int = 0
 

@@ -39,5 +39,5 @@ def fitted_lifting(
     chosen = forward_selection(columns[:, order], values, len(given), nonlinear or count)
     kept = sorted(order[i] for i in chosen)
     terms = tuple(features.terms[i] for i in kept)
-    lifted = replace(features, terms=terms, groups=(), diagonal=())
+    lifted = replace(features, terms=terms, groups=())
     return ridge_fit(columns[:, kept], deviations, ridge), lifted

@@ -212,9 +212,7 @@ def feature_table(
     alive = f"({AFTER_LANDING!r} + {(1.0 / STEERED - AFTER_LANDING)!r} * ({steered}))"
     watched += [(f"{alive} * {e}", "heave and pitch") for e in own[k:]]
     terms = (*odd, *even)
-    features = Features(
-        n + 1, inputs, tuple(lines), terms, groups, modes.blocks, tuple(watched), len(MEANINGS)
-    )
+    features = Features(n + 1, inputs, tuple(lines), terms, groups, tuple(watched), len(MEANINGS))
     counts = k + inputs, 2 + n - k
     known = *counts, ranges, hull, trusted
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *known)

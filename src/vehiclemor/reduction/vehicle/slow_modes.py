@@ -43,8 +43,6 @@ class SlowModes:
         Mode of the speed (n,), scaled so that U grows by one.
     symmetric
         The other modes that steering does not move, as the transient of a start.
-    blocks
-        Sizes of the diagonal blocks of `rates`.
     """
 
     lateral: int
@@ -57,7 +55,6 @@ class SlowModes:
     speed_left: np.ndarray
     speed_right: np.ndarray
     symmetric: Transient
-    blocks: tuple[int, ...]
 
     def coordinates(
         self, deviations: np.ndarray, inputs: np.ndarray
@@ -122,7 +119,6 @@ def slow_modes(
         left[still].real * scale,
         right[:, still].real / scale,
         Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
-        _blocks(rates),
     )
 
 
@@ -154,7 +150,6 @@ def as_of(shape: VehicleShape, like: SlowModes) -> SlowModes:
         right=found.right @ back,
         drive=turn @ found.drive,
         feedthrough=turn @ found.feedthrough,
-        blocks=tuple(size for size in (k, len(turn) - k) if size),
     )
 
 
@@ -162,16 +157,6 @@ def _uppers(modes: SlowModes) -> np.ndarray:
     """Eigenvalues of the symmetric modes, one of each conjugate pair."""
     values = np.linalg.eigvals(modes.rates[modes.lateral :, modes.lateral :])
     return values[values.imag >= 0.0]
-
-
-def _blocks(rates: np.ndarray) -> tuple[int, ...]:
-    """Sizes of the diagonal blocks: 2 for a conjugate pair, else 1."""
-    sizes: list[int] = []
-    while sum(sizes) < len(rates):
-        i = sum(sizes)
-        paired = i + 1 < len(rates) and abs(rates[i, i + 1]) > STILL
-        sizes.append(2 if paired else 1)
-    return tuple(sizes)
 
 
 def real_modes(

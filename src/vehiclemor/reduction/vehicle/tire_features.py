@@ -70,9 +70,7 @@ class Text:
         watched = [(f"p[0] * {text}", name) for text, name in self.watched]
         watched.sort(key=lambda of: of[1] == OF_SPEED)
         lines, lateral = tuple(self.lines), max(len(watched) - 1, 0)
-        return Features(
-            STATES, inputs, lines, tuple(terms), groups, (4, 1), tuple(watched), lateral
-        )
+        return Features(STATES, inputs, lines, tuple(terms), groups, tuple(watched), lateral)
 
 
 def argument_values(speed: float, z: np.ndarray, u: np.ndarray) -> np.ndarray:

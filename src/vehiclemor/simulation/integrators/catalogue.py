@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import NamedTuple
@@ -68,7 +68,7 @@ class Stored(NamedTuple):
 
 
 class Stepped(NamedTuple):
-    """Whole steps of a full model as one kernel.
+    """Whole steps as one kernel.
 
     Attributes
     ----------
@@ -104,16 +104,12 @@ class Integrator:
     operators
         Makes what is stored of a frozen Jacobian (dim, dim) and the active states; none for a
         method with fresh Jacobians or without any.
-    fused_modules
-        Modules for systems with a kernel that takes whole steps.
     formulation
         Of the full system.
-    rows, squares, fused_squares, numbers
+    rows, squares, numbers
         Scratch space: vectors and matrices of the system's dimension, and single numbers.
-    block_operators
-        Makes operators of diagonal blocks alone, where a kernel that takes whole steps wants those.
     stepped
-        How it takes whole steps of a full model.
+        How it takes whole steps of a system that is not projected.
     """
 
     summary: str
@@ -122,13 +118,10 @@ class Integrator:
     modules: tuple[str, ...]
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
     operators: Callable[[np.ndarray, np.ndarray], Stored] | None = None
-    fused_modules: tuple[str, ...] = ()
     formulation: str = "full"
     rows: int = 24
     squares: int = 0
-    fused_squares: int = 0
     numbers: int = 16
-    block_operators: Callable[[np.ndarray, Sequence[Sequence[int]]], Stored] | None = None
     stepped: Stepped | None = None
 
 
@@ -186,11 +179,6 @@ def repeated_functions(jacobian: np.ndarray, blocks: int) -> Stored:
     return Stored(wide, shared)
 
 
-def block_matrix_functions(jacobian: np.ndarray, blocks: Sequence[Sequence[int]]) -> Stored:
-    """The same of diagonal blocks alone, numbers of the states by block."""
-    return Stored(exponential_functions.block_functions(jacobian, blocks, STEP_GRID))
-
-
 INTEGRATORS = {
     "dopri5": Integrator(
         "Dormand-Prince 5(4), explicit",
@@ -213,8 +201,6 @@ INTEGRATORS = {
         ("step_grid", "cubic", "ros34pw2"),
         tableaus.ros34pw2(),
         inverses,
-        ("step_grid", "cubic", "ros34pw2", "fused_ros34pw2"),
-        fused_squares=2,
         stepped=Stepped(
             w_step, transposed_inverses, ("step_grid", "cubic", "ros34pw2", "stepped_ros34pw2")
         ),
@@ -233,14 +219,11 @@ INTEGRATORS = {
         ),
         ("step_grid", "cubic", "etdrk4"),
         operators=matrix_functions,
-        block_operators=block_matrix_functions,
-        fused_modules=("step_grid", "cubic", "etdrk4", "fused_etdrk4"),
         rows=32,
-        fused_squares=7,
         stepped=Stepped(
             exponential_step,
             partial(exponential_functions.exponential_tables, grid=STEP_GRID),
-            ("step_grid", "etdrk4", "fused_etdrk4", "cubic", "stepped_etdrk4"),
+            ("step_grid", "cubic", "etdrk4", "stepped_etdrk4"),
         ),
     ),
     "exponential_adams": Integrator(
@@ -326,17 +309,15 @@ def rhs_loop(formulation: str) -> Loop:
     return loops(modules, ("rhs_at",))["rhs_at"]
 
 
-def time_loop(chosen: Integrator, formulation: str, steps: str = "") -> Loop:
+def time_loop(chosen: Integrator, formulation: str, whole_steps: bool = False) -> Loop:
     """The compiled time loop of an integrator and a formulation.
 
     Parameters
     ----------
-    steps
-        `fused` or `stepped` if a kernel takes whole steps.
+    whole_steps
+        Whether a kernel takes them.
     """
-    own = chosen.fused_modules if steps == "fused" else chosen.modules
-    if steps == "stepped" and chosen.stepped:
-        own = chosen.stepped.modules
+    own = chosen.stepped.modules if whole_steps and chosen.stepped else chosen.modules
     if formulation == SENSITIVITIES:
         own = (*own, "adams_blocks")
     modules = (
@@ -348,12 +329,11 @@ def time_loop(chosen: Integrator, formulation: str, steps: str = "") -> Loop:
         return loops(modules, ("integrate",))["integrate"]
 
 
-def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, steps: str) -> int:
+def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, whole_steps: bool) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs."""
-    squares = chosen.fused_squares if steps == "fused" else chosen.squares
-    # Vectors of a stepped kernel are padded, block by block.
-    row = dim + 8 if steps == "stepped" else dim
-    own = chosen.rows * row + squares * dim * dim + 3 * inputs + chosen.numbers
+    # Vectors of a kernel of whole steps are padded, block by block.
+    row = dim + 8 if whole_steps else dim
+    own = chosen.rows * row + chosen.squares * dim * dim + 3 * inputs + chosen.numbers
     return scratch_end(n, inputs) + own
 
 
@@ -367,9 +347,7 @@ LOOP_SOURCES = (
     *(
         f"simulation.integrators.{name}"
         for own in INTEGRATORS.values()
-        for name in dict.fromkeys(
-            (*own.modules, *own.fused_modules, *(own.stepped.modules if own.stepped else ()))
-        )
+        for name in dict.fromkeys((*own.modules, *(own.stepped.modules if own.stepped else ())))
     ),
     "simulation.integrators.adams_blocks",
     "simulation.integrators.structures",

@@ -9,7 +9,7 @@ so that defective matrices, those of stabilised constraints, are no exception.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -68,20 +68,3 @@ def exponential_tables(jacobian: np.ndarray, grid: Iterable[float]) -> np.ndarra
         table[3], table[4] = first.T, 2.0 * second.T
         table[5], table[6] = (2.0 * second - 4.0 * third).T, (4.0 * third - second).T
     return tables
-
-
-def block_functions(
-    jacobian: np.ndarray, blocks: Sequence[Sequence[int]], grid: Iterable[float]
-) -> np.ndarray:
-    """Entries (step sizes, 1, 7 entries) of the tables' diagonal blocks, for fused steps.
-
-    Parameters
-    ----------
-    blocks
-        Numbers of the states of each block.
-    """
-    steps, parts = list(grid), []
-    for numbers in blocks:
-        block = exponential_tables(jacobian[np.ix_(numbers, numbers)], steps)
-        parts.append(block.swapaxes(2, 3).reshape(len(steps), TABLES, -1))
-    return np.ascontiguousarray(np.concatenate(parts, axis=2).reshape(len(steps), 1, -1))

@@ -1,4 +1,4 @@
-"""Text of kernels that take whole steps of a full model with a frozen Jacobian.
+"""Text of kernels that take whole steps of a system with a frozen Jacobian.
 
 With two or four dozen states the loops of `ros34pw2` and `etdrk4` take as long as the right-hand
 side.  These kernels do what a step does there in vectors of known length, and execute the

@@ -1,18 +1,17 @@
-"""The exponential method for a full model: a whole step is one kernel.
+"""The exponential method: a whole step is one kernel.
 
-See `step_text.exponential_step`; what is not here is as in `fused_etdrk4`.
+See `step_text.exponential_step`.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.etdrk4 import quadrature_weights
-from vehiclemor.simulation.integrators.fused_etdrk4 import keep_past
 from vehiclemor.simulation.integrators.step_grid import nearest_index
-from vehiclemor.simulation.integrators.structures import FUSED_STEP, RHS_CALLS, Work
+from vehiclemor.simulation.integrators.structures import RHS_CALLS, STEP_KERNEL, Work
 
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("step",)
+INLINED = ("accept", "step", "keep_past")
 
 
 def work_space(buffer, first, integers, dim, inputs):
@@ -50,6 +49,13 @@ def begin(problem, t, method, work):
     keep_past(work)
 
 
+def keep_past(work):
+    """Copy state and right-hand side to where the kernel looks for those of the step before."""
+    dim = len(work.y)
+    for i in range(2 * dim):
+        work.given[2 * dim + i] = work.given[i]
+
+
 def step(problem, t, h, method, work, counts):
     """Try a step; it is always possible."""
     given, values, u = work.given, work.values, problem.u
@@ -66,6 +72,12 @@ def step(problem, t, h, method, work, counts):
         for i in range(len(u)):
             values[stage * len(u) + i] = u[i]
     equations, tables = problem.equations, method.operators[index]
-    call_kernel(equations.kernels, FUSED_STEP, given, tables, equations.constants, work.result)
+    call_kernel(equations.kernels, STEP_KERNEL, given, tables, equations.constants, work.result)
     counts[RHS_CALLS] += 4
     return True
+
+
+def accept(problem, t, h, method, work, counts):
+    """Keep the beginning of the step for the next one's estimate of the error."""
+    keep_past(work)
+    work.memory[0] = h

@@ -1,4 +1,4 @@
-"""The W-method for a full model: a whole step is one kernel, see `step_text.w_step`.
+"""The W-method: a whole step is one kernel, see `step_text.w_step`.
 
 What is not here is as in `ros34pw2`.
 """
@@ -7,9 +7,9 @@ from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.step_grid import index_above
 from vehiclemor.simulation.integrators.structures import (
-    FUSED_STEP,
     LINEAR_SOLVES,
     RHS_CALLS,
+    STEP_KERNEL,
     Work,
 )
 
@@ -54,7 +54,7 @@ def step(problem, t, h, method, work, counts):
         for i in range(len(u)):
             values[stage * len(u) + i] = u[i]
     equations, operator = problem.equations, method.operators[work.places[0]]
-    call_kernel(equations.kernels, FUSED_STEP, given, operator, equations.constants, work.result)
+    call_kernel(equations.kernels, STEP_KERNEL, given, operator, equations.constants, work.result)
     counts[RHS_CALLS] += 3
     counts[LINEAR_SOLVES] += 4
     return True

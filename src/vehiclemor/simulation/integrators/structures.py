@@ -6,7 +6,7 @@ from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, V
 from vehiclemor.sample_loops import Pieces
 
 # Places of a system's kernels in its list of addresses; see `System`.
-DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, FUSED_STEP, TANGENT = range(6)
+DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, STEP_KERNEL, TANGENT = range(6)
 # Why a run has ended: all well, too many evaluations, not finite, singular matrix, tiny step.
 FINISHED, TOO_MANY_CALLS, NOT_FINITE, SINGULAR, STEP_TOO_SMALL = range(5)
 # Places of the counts of a run.
@@ -268,7 +268,7 @@ class Work(NamedTuple):
     memory
         The integrator's own numbers (4,).
     given, values, result
-        Arguments and result of a fused step.
+        Arguments and result of a kernel that takes whole steps.
     """
 
     y: Vector

@@ -125,17 +125,6 @@ def test_kernels_are_the_features_that_are_fitted(reduced: ReducedVehicle) -> No
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-10)
 
 
-def test_whole_steps_in_a_kernel_are_the_steps_of_the_loop(reduced: ReducedVehicle) -> None:
-    system, start = reduced.system, reduced.model.start()
-    y = reduced.encoded(start, np.zeros(1))
-    runs = [
-        s.run(lane_change, y, whole_space(len(y)), Solver("ros34pw2", 1e-2))
-        for s in (system, replace(system, fused={}))
-    ]
-    assert runs[0].counts[1] == runs[1].counts[1] > 20
-    np.testing.assert_allclose(runs[0].path, runs[1].path, rtol=1e-9, atol=1e-10)
-
-
 def _held(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
     del frequency, amplitude
     return np.full((len(times), 1), 0.3)
