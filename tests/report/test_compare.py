@@ -240,8 +240,8 @@ def test_costs_are_consistent(results_folder):
     newton, strongest = table.loc["baseline"], table.loc["strongest"]
     assert newton["speed_up"] == 1.0
     assert strongest["speed_up_strongest"] == 1.0
-    assert strongest["residual_evaluations"] < 1.1 * 1001
-    assert strongest["jacobian_evaluations"] == 1
+    # It begins nearer.
+    assert strongest["iterations"] < 0.5 * newton["iterations"]
     assert newton["iterations"] == newton["jacobian_evaluations"]
     assert table.loc["replay", "iterations"] == 0
 

@@ -83,7 +83,6 @@ STRONGEST = TimingCase("strongest", "full order, strongest", "full_order", "stro
 ALGEBRAIC_BASELINES = (
     TimingCase("baseline", "full order, Newton", "full_order"),
     STRONGEST,
-    TimingCase("dense", "full order, dense", "full_order", settings={"solver": "newton_dense"}),
     TimingCase(
         "newton_1e-6", "full order, Newton, 1e-6", "full_order", settings={"tolerance": 1e-6}
     ),

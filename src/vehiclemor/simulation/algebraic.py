@@ -38,7 +38,7 @@ from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
 LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
-SOLVERS = ("newton", "newton_dense", "chord", "newton_lanes")
+SOLVERS = ("newton", "newton_lanes")
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -163,7 +163,7 @@ class AlgebraicModel(Model):
 
     def _buffer(self) -> np.ndarray:
         n = len(self.coordinates)
-        return np.empty(4 * n + 3 * len(self.inputs) + n * (2 * n + 1))
+        return np.empty(n * (n + 4) + 3 * len(self.inputs))
 
     def simulate(
         self,
@@ -185,11 +185,8 @@ class AlgebraicModel(Model):
             Increasing times (samples,) in s.
         solver
             `newton`, the default: fresh Jacobians, generated elimination, started at the previous
-            sample.  `newton_dense`: the same with dense elimination and partial pivoting.
-            `chord`: constant inverse of the design position, started at a quadratic extrapolation;
-            where it does not contract, a fresh inverse, then Newton's method.  `newton_lanes`:
-            Newton's method started at a quadratic extrapolation, the samples in vector lanes; where
-            that fails, `newton`.
+            sample.  `newton_lanes`: started at a quadratic extrapolation, the samples in vector
+            lanes; where that fails, `newton`.
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default.
 
@@ -261,9 +258,8 @@ class AlgebraicModel(Model):
                 return found
         path = np.full((len(inputs), len(self.coordinates)), np.nan)
         solution = newton_loops.Solution(path, new_counts())
-        loop, how = self._full_order(solver)
         iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
-        run = loop.prepared(self._ready_mechanism, given, how, iteration, solution, buffer)
+        run = self._newton.prepared(self._ready_mechanism, given, iteration, solution, buffer)
         status, seconds = timed(run)
         if not status:
             return self.trajectory(times, inputs, path, solution.counts.tolist(), seconds)
@@ -286,30 +282,16 @@ class AlgebraicModel(Model):
 
     @cached_property
     def _lanes(self) -> LaneRuns:
-        loop, kernels = self._full_order("newton_lanes")
+        names = "newton_step", "outputs"
+        addresses = [address_of(self.kernels, name, LANES) for name in names]
+        kernels = ready(LaneKernels(np.array(addresses, dtype=np.int64)))
         sizes = len(self.coordinates), len(self.inputs), len(self.outputs)
+        loop = self.loop("lane_path", "simulation.lane_loops")
         return LaneRuns(loop, self._ready_mechanism, kernels, sizes)
 
-    def _full_order(self, solver: str) -> tuple[Loop, Any]:
-        """Loop of a solver, and what it needs beside the mechanism; kept for further runs."""
-        if solver not in self._kept:
-            how: Any
-            if solver in ("newton", "newton_dense"):
-                modules, how = ("newton_path",), int(solver == "newton_dense")
-            elif solver == "chord":
-                modules = "chord_path", "simulation.chord_loops"
-                jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
-                how = np.linalg.inv(jacobian).T.copy()
-            else:
-                modules, names = ("lane_path", "simulation.lane_loops"), ("newton_step", "outputs")
-                addresses = [address_of(self.kernels, name, LANES) for name in names]
-                how = ready(LaneKernels(np.array(addresses, dtype=np.int64)))
-            self._kept[solver] = self.loop(*modules), how
-        return self._kept[solver]
-
     @cached_property
-    def _kept(self) -> dict[str, tuple[Loop, Any]]:
-        return {}
+    def _newton(self) -> Loop:
+        return self.loop("newton_path")
 
     @cached_property
     def _ready_mechanism(self) -> Ready:

@@ -206,19 +206,12 @@ def small_solve(a, r):
     return sign
 
 
-def newton(q, u, mechanism, dense, iteration, work):
+def newton(q, u, mechanism, iteration, work):
     """Newton's method from q, which it changes: its iterations, negative where it has failed."""
     constants, step, full = mechanism.constants, work.step, work.full
     first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
-        if dense:
-            residual_jacobian(q, u, constants, full)
-            if not small_solve(full, N):
-                return -count
-            for i in range(N):
-                step[i] = full[i, N]
-        else:
-            newton_step(q, u, constants, step)
+        newton_step(q, u, constants, step)
         for i in range(N):
             q[i] -= step[i]
         if all_below(step, N, iteration.tolerance):
@@ -255,7 +248,7 @@ def moved(q, u, place, target, mechanism, iteration, work):
         u[place] = target
         if abs(target - before) > length:
             u[place] = before + math.copysign(length, target - before)
-        taken = newton(q, u, mechanism, 0, iteration, work)
+        taken = newton(q, u, mechanism, iteration, work)
         iterations += abs(taken)
         if taken > 0 and within(q, mechanism.stops):
             length = min(2.0 * length, iteration.largest_increment)
@@ -301,15 +294,11 @@ def approach(q, u, target, mechanism, iteration, work):
 def newton_path(
     mechanism: Mechanism,
     inputs: Matrix,
-    dense: Int,
     iteration: Iteration,
     solution: Solution,
     buffer: Vector,
 ) -> Int:
     """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
-
-    The step comes from the generated straight-line elimination or, if `dense`, from elimination
-    with partial pivoting, as a solver that knows nothing about the model would do it.
 
     Inputs begin at zero.  An increment above the largest is cut into substeps.  Where Newton's
     method does not contract, the sample is approached from the design position instead.
@@ -325,7 +314,7 @@ def newton_path(
         for substep in range(1, substeps + 1):
             for i in range(INPUTS):
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
-            taken = newton(q, u, mechanism, dense, iteration, work)
+            taken = newton(q, u, mechanism, iteration, work)
             iterations += abs(taken)
             if taken < 0:
                 taken = approach(q, u, target, mechanism, iteration, work)

@@ -26,11 +26,9 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class AlgebraicSettings(Settings):
     """How algebraic equations are solved."""
 
-    solver: Literal["newton", "newton_dense", "chord", "newton_lanes"] = Field(
+    solver: Literal["newton", "newton_lanes"] = Field(
         "newton",
-        description="newton: fresh Jacobians; newton_dense: without the generated elimination; "
-        "chord: constant inverse and predictor; newton_lanes: newton with predictor, eight samples "
-        "at once",
+        description="newton: fresh Jacobians; newton_lanes: with predictor, eight samples at once",
     )
     tolerance: StepTolerance = NEWTON_TOLERANCE
 
@@ -119,7 +117,7 @@ METHOD = Method(
     settings={"ae": AlgebraicSettings, "ode": DynamicSettings, "dae": DynamicSettings},
     # The defaults are the paper's kind of baseline; the strongest solver found stands beside them.
     presets={
-        "ae": _strongest("chord", 1e-6),
+        "ae": _strongest("newton_lanes", 1e-4),
         "ode": _strongest("ros34pw2", 2e-3),
         "dae": _strongest("ros34pw2", 7e-4),
     },
