@@ -8,7 +8,7 @@ from pydantic import BaseModel
 import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.cli.key_values import parsed
-from vehiclemor.codegen import derivation, object_cache
+from vehiclemor.codegen import cache, derivation
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
 from vehiclemor.report.description.schema import SCHEMAS, words
@@ -117,7 +117,7 @@ def test_words_of_types():
 
 
 def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, tmp_path):
-    monkeypatch.setattr(object_cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(derivation, "cache_folder", lambda: tmp_path)
     starts = {name: vm.describe(name)["starts"] for name in names("model")}
     assert starts["double_wishbone"] == ["equilibrium"]

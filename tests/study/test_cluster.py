@@ -23,7 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.texts.markdown import blocks
-from vehiclemor.codegen import object_cache
+from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError, MachineError
 from vehiclemor.study import cluster as engine
 from vehiclemor.study.cell_file import ENDING
@@ -192,14 +192,14 @@ def file_of(name: str, topic: str, folder: str) -> bytes:
         time.sleep(0.5)
         return f"made for {folder}".encode()
 
-    with object_cache.asking(partial(from_others, topic)):
-        return object_cache.fetched(name, make)
+    with cache.asking(partial(from_others, topic)):
+        return cache.fetched(name, make)
 
 
 def test_what_the_cache_lacks_is_the_drivers_or_is_made_once(client, tmp_path, monkeypatch):
     driver = str(tmp_path / "driver")
-    monkeypatch.setattr(object_cache, "_chosen", lambda: OWN_CACHE.get(driver))
-    object_cache.fetched("kernels/known.o", lambda: b"the driver's")
+    monkeypatch.setattr(cache, "_chosen", lambda: OWN_CACHE.get(driver))
+    cache.fetched("kernels/known.o", lambda: b"the driver's")
     with engine.reached(client.scheduler.address, 1) as elsewhere:
         topic = elsewhere.keywords["topic"]
 
@@ -222,19 +222,19 @@ def test_what_the_cache_lacks_is_the_drivers_or_is_made_once(client, tmp_path, m
 
 
 def test_a_file_that_was_changed_on_its_way_is_not_used():
-    sent = object_cache.packed("kernels/a.o", b"machine code")
-    assert object_cache.unpacked("kernels/a.o", sent) == b"machine code"
+    sent = cache.packed("kernels/a.o", b"machine code")
+    assert cache.unpacked("kernels/a.o", sent) == b"machine code"
     for place in range(len(sent)):
         changed = sent[:place] + bytes([sent[place] ^ 1]) + sent[place + 1 :]
-        assert object_cache.unpacked("kernels/a.o", changed) is None
-    assert object_cache.unpacked("kernels/b.o", sent) is None
+        assert cache.unpacked("kernels/a.o", changed) is None
+    assert cache.unpacked("kernels/b.o", sent) is None
 
 
 def test_the_driver_hands_out_nothing_but_its_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "cache"))
     (tmp_path / "secret").write_text("hash\nkeep this")
-    assert object_cache.held("../secret") is None
-    assert object_cache.held("kernels/none.o") is None
+    assert cache.held("../secret") is None
+    assert cache.held("kernels/none.o") is None
 
 
 # Batches

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.codegen.object_cache import cache_folder
+from vehiclemor.codegen.cache import cache_folder
 
 PACKAGE = Path(vm.__file__).parent
 MOST_LINES = 400

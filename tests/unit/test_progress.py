@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from vehiclemor import progress
-from vehiclemor.codegen.object_cache import fetched
+from vehiclemor.codegen.cache import fetched
 from vehiclemor.progress import StandardError, first_use, making, telling
 
 BEGAN = "first use of a model: deriving and compiling; kept for later runs"

@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.codegen.cache import compiler_identity, fetched, once, source_digest
 from vehiclemor.codegen.machine_code import MachineCode
-from vehiclemor.codegen.object_cache import compiler_identity, fetched
-from vehiclemor.codegen.once import once
-from vehiclemor.codegen.sources import source_digest
 
 
 @dataclass(frozen=True)

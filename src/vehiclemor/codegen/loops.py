@@ -15,11 +15,9 @@ from typing import Any, get_args
 
 import numpy as np
 
+from vehiclemor.codegen.cache import compiler_identity, fetched, once, source_digest
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.machine_code import MachineCode
-from vehiclemor.codegen.object_cache import compiler_identity, fetched
-from vehiclemor.codegen.once import once
-from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 

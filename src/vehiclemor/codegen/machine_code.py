@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from vehiclemor.codegen.once import once
+from vehiclemor.codegen.cache import once
 
 
 class MachineCode:

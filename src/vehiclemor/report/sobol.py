@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.cache import source_digest
 from vehiclemor.errors import InputError
 from vehiclemor.files import make_folder
 from vehiclemor.resources import data_folder, data_names

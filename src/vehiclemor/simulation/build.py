@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.arguments import real_array
+from vehiclemor.codegen.cache import kernel_hash
 from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
-from vehiclemor.codegen.object_cache import kernel_hash
 from vehiclemor.errors import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.object_cache import cache_folder, held, packed
+from vehiclemor.codegen.cache import cache_folder, held, packed
 from vehiclemor.errors import InputError, MachineError, one_line
 from vehiclemor.files import temporary_path, write_text
 from vehiclemor.study.cluster_worker import Place, Sent, on_worker

@@ -8,8 +8,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vehiclemor.codegen.object_cache import asking, packed, unpacked
-from vehiclemor.codegen.once import once
+from vehiclemor.codegen.cache import asking, once, packed, unpacked
 from vehiclemor.errors import FileError, InputError, MachineError
 from vehiclemor.files import probe_folder
 from vehiclemor.study.cell_file import encoded

@@ -6,7 +6,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.cache import source_digest
 from vehiclemor.registry import component
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")

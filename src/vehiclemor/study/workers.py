@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vehiclemor.codegen.object_cache import cache_folder
+from vehiclemor.codegen.cache import cache_folder
 from vehiclemor.errors import MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate, layout_of
 from vehiclemor.study.experiment import Experiment

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from tests.unit import standard_problems
+from vehiclemor.codegen import cache
 from vehiclemor.codegen import derivation as kept
-from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation, derived
 from vehiclemor.codegen.kernel_text import operation_counts, reference_source
 from vehiclemor.multibody import definition
@@ -291,12 +291,12 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("models/a.py", "models/parts/b.py", "symbolic/c.py", "other.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(f"# {name}\n")
-    monkeypatch.setattr(sources, "PACKAGE", root)
+    monkeypatch.setattr(cache, "PACKAGE", root)
     return root
 
 
 def digest() -> str:
-    return sources.source_digest(("models",), ("other.py",), ())
+    return cache.source_digest(("models",), ("other.py",), ())
 
 
 def test_a_digest_follows_every_file_of_its_layers(package: Path) -> None:
@@ -321,22 +321,22 @@ def test_a_digest_ignores_what_is_not_of_its_layers(package: Path) -> None:
     (package / "symbolic" / "c.py").write_text("changed\n")
     (package / "models" / "notes.txt").write_text("no source\n")
     assert digest() == before
-    assert sources.source_digest(("models", "symbolic"), ("other.py",), ()) != before
+    assert cache.source_digest(("models", "symbolic"), ("other.py",), ()) != before
 
 
 def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
     """Changing the vehicle, the tape or the emitter changes the digest."""
-    files = {path.name for layer in kept.LAYERS for path in (sources.PACKAGE / layer).rglob("*.py")}
+    files = {path.name for layer in kept.LAYERS for path in (cache.PACKAGE / layer).rglob("*.py")}
     assert {"equations.py", "tape.py", "kernel_text.py", "llvm_kernels.py"} <= files
 
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
     layers = ("models",)
-    assert sources.source_digest(
-        layers, (), (definition.ModelDefinition,)
-    ) == sources.source_digest(layers, (), ())
-    plugged = sources.source_digest(layers, (), (standard_problems,))
-    assert plugged != sources.source_digest(layers, (), ())
+    assert cache.source_digest(layers, (), (definition.ModelDefinition,)) == cache.source_digest(
+        layers, (), ()
+    )
+    plugged = cache.source_digest(layers, (), (standard_problems,))
+    assert plugged != cache.source_digest(layers, (), ())
 
 
 def test_derived_is_what_derivation_keeps(folder: Path) -> None:

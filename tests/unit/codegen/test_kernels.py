@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from vehiclemor.codegen import cache
 from vehiclemor.codegen import kernels as module
-from vehiclemor.codegen import object_cache
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 
 TEXT = """
@@ -80,13 +80,13 @@ def test_another_text_compiler_or_processor_is_another_file(folder, monkeypatch)
 
 
 def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
-    identity = object_cache.compiler_identity.__wrapped__
+    identity = cache.compiler_identity.__wrapped__
     before = identity()
-    for package in object_cache.COMPILER_PACKAGES:
+    for package in cache.COMPILER_PACKAGES:
         with monkeypatch.context() as patch:
-            real = object_cache.version
+            real = cache.version
             patch.setattr(
-                object_cache, "version", lambda n, p=package, r=real: "0.0.1" if n == p else r(n)
+                cache, "version", lambda n, p=package, r=real: "0.0.1" if n == p else r(n)
             )
             assert identity() != before
     import llvmlite.binding as llvm
@@ -100,11 +100,11 @@ def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
 
 
 def test_the_hash_of_a_model_follows_text_and_compiler(monkeypatch):
-    digest = object_cache.kernel_hash("x = 1\n")
-    assert digest == object_cache.kernel_hash("x = 1\n")
-    assert digest != object_cache.kernel_hash("x = 2\n")
-    monkeypatch.setattr(object_cache, "compiler_identity", lambda: "another")
-    assert digest != object_cache.kernel_hash("x = 1\n")
+    digest = cache.kernel_hash("x = 1\n")
+    assert digest == cache.kernel_hash("x = 1\n")
+    assert digest != cache.kernel_hash("x = 2\n")
+    monkeypatch.setattr(cache, "compiler_identity", lambda: "another")
+    assert digest != cache.kernel_hash("x = 1\n")
 
 
 def test_machine_code_has_only_the_functions_that_were_written():

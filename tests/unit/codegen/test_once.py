@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from vehiclemor.codegen.cache import once
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.once import once
 
 THREADS = 8
 

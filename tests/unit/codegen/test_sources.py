@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.cache import source_digest
 
 EQUATIONS = "def derive():\n    return {}\n"
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.codegen.process_lock import locked
+from vehiclemor.codegen.cache import locked
 from vehiclemor.errors import FileError
 from vehiclemor.files import write_text
 from vehiclemor.resources import checkout_data, data_folder

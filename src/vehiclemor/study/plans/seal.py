@@ -9,7 +9,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.cache import source_digest
 from vehiclemor.study.plans.boxes import boxes_of, drawn
 from vehiclemor.study.plans.choice import Row
 from vehiclemor.study.plans.protocol import DRAWN, Protocol

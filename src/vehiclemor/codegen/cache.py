@@ -2,35 +2,106 @@
 
 Object code is executed, so a file counts only if it and its folders are this user's own and nobody
 else can write them, and if it is as it was written; else it is named once, and made again.
+
+Names hold hashes of the source that the content is made from.  Of several processes that miss a
+file one makes it, of several threads too.
 """
 
 import atexit
 import gc
 import hashlib
+import inspect
 import logging
 import os
 import platform
 import shutil
 import stat
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from functools import cache
+from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
+from threading import RLock
+from types import ModuleType
+from typing import Any, BinaryIO, TypeVar
 
-from vehiclemor.codegen.process_lock import locked
 from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 from vehiclemor.progress import making
 
+PACKAGE = Path(__file__).resolve().parents[1]
+Made = TypeVar("Made")
 # Gives a file by its name, or by making it.
 Asked = Callable[[str, Callable[[], bytes]], bytes]
 _OTHERS: ContextVar[Asked | None] = ContextVar("others", default=None)
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
+
+
+def source_digest(layers: Sequence[str], files: Sequence[str], components: Sequence[object]) -> str:
+    """Hash of layers and files of this package, and of plug-ins.
+
+    Parameters
+    ----------
+    layers
+        Folders of the package, with all that is in them.
+    files
+        Further files of the package.
+    components
+        Of a plug-in, all of its top-level package counts.
+    """
+    paths = [path for layer in layers for path in sorted((PACKAGE / layer).rglob("*.py"))]
+    paths += [PACKAGE / name for name in files]
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(path.relative_to(PACKAGE).as_posix().encode())
+        digest.update(path.read_bytes())
+    for component in components:
+        for text in _plug_in_source(component):
+            digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+def _plug_in_source(thing: object) -> list[bytes]:
+    """Source texts of the package, or of the single file with its neighbours, of a component."""
+    module = _module_of(thing)
+    if module is None or module.__file__ is None:
+        return [repr(thing).encode()]
+    top = module.__name__.split(".")[0]
+    if top == "vehiclemor":
+        return []
+    folders = list(getattr(sys.modules.get(top), "__path__", ()))
+    if folders:
+        paths = [path for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
+        return [path.read_bytes() for path in paths]
+    return [path.read_bytes() for path in sorted(_neighbours(module, set()))]
+
+
+def _module_of(thing: object) -> ModuleType | None:
+    """The module that a component is, or that its functions or its class come from."""
+    if isinstance(thing, ModuleType):
+        return thing
+    for name in ("derive", "fit", "signal"):
+        if callable(function := getattr(thing, name, None)):
+            return inspect.getmodule(function)
+    return inspect.getmodule(thing) or inspect.getmodule(type(thing))
+
+
+def _neighbours(module: ModuleType, found: set[Path]) -> set[Path]:
+    """File of a module, and those in its folder of what it has imported."""
+    if module.__file__ is None or Path(module.__file__) in found:
+        return found
+    found.add(Path(module.__file__))
+    for value in list(vars(module).values()):
+        other = value if isinstance(value, ModuleType) else inspect.getmodule(value)
+        origin = getattr(other, "__file__", None)
+        if other is not None and origin and Path(origin).parent == Path(module.__file__).parent:
+            _neighbours(other, found)
+    return found
 
 
 @cache
@@ -225,3 +296,52 @@ def _keep(folders: list[Path], name: str, content: bytes) -> None:
             with suppress(OSError):
                 folders.append(_temporary())
                 _keep(folders, name, content)
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Alone with the file at a path; the system ends the lock of a process that dies.
+
+    Where it has no locks, or the folder can't be written, each makes the file for itself.
+    """
+    lock = path.with_name(f"{path.name}.lock")
+    file = _lock_of(lock)
+    try:
+        yield
+    finally:
+        if file:
+            # Who waits finds what was made, and who comes later does too.
+            lock.unlink(missing_ok=True)
+            file.close()
+
+
+def _lock_of(lock: Path) -> BinaryIO | None:
+    try:
+        from fcntl import LOCK_EX, flock
+
+        lock.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        file = lock.open("wb")
+        flock(file, LOCK_EX)
+    except (ImportError, OSError):
+        return None
+    return file
+
+
+def once(make: Callable[..., Made]) -> Callable[..., Made]:
+    """The function, with a result by its arguments that is made by one thread alone.
+
+    Machine code needs it: its addresses are handed out, so it must never be made twice and the
+    first be thrown away, as `functools.cache` may do.
+    """
+    made: dict[tuple[Any, ...], Made] = {}
+    lock = RLock()
+
+    @wraps(make)
+    def found(*arguments: Any) -> Made:
+        if arguments not in made:
+            with lock:
+                if arguments not in made:
+                    made[arguments] = make(*arguments)
+        return made[arguments]
+
+    return found

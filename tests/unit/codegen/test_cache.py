@@ -15,20 +15,20 @@ import pytest
 
 from tests.unit import standard_problems
 from vehiclemor.codegen import (
+    cache,
     compiler,
     derivation,
     kernels,
     llvm_kernels,
     loops,
-    object_cache,
 )
+from vehiclemor.codegen.cache import cache_folder, fetched
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.object_cache import cache_folder, fetched
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.paths import PATH_LOOPS
 
-PACKAGE = Path(object_cache.__file__).parents[1]
+PACKAGE = Path(cache.__file__).parents[1]
 FLIPS = 200
 NAME = "kernels/some-0123.o"
 OTHERS = "other users can write it, see chmod go-w"
@@ -212,7 +212,7 @@ def test_what_others_may_have_planted_on_the_way_is_not_read(
     folder, fetch, made, caplog, plant, told
 ):
     plant(folder, fetch)
-    assert object_cache.held(NAME) is None
+    assert cache.held(NAME) is None
     for _ in range(2):
         assert fetch() == b"some content"
     assert len(made) == 2
@@ -278,9 +278,9 @@ def test_the_environment_chooses_the_folder(tmp_path, monkeypatch):
 
     monkeypatch.delenv("VEHICLEMOR_CACHE", raising=False)
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
-    object_cache._folders.cache_clear()
+    cache._folders.cache_clear()
     assert cache_folder() == tmp_path / "own" / "vehiclemor"
-    object_cache._folders.cache_clear()
+    cache._folders.cache_clear()
     monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "chosen"))
     assert cache_folder() == tmp_path / "chosen"
 
@@ -298,7 +298,7 @@ def test_a_process_that_goes_elsewhere_keeps_its_cache(tmp_path, monkeypatch, fe
 
 def test_the_cache_of_one_process_is_removed_at_its_end(tmp_path):
     (tmp_path / "file").write_text("")
-    code = "from vehiclemor.codegen.object_cache import cache_folder; print(cache_folder())"
+    code = "from vehiclemor.codegen.cache import cache_folder; print(cache_folder())"
     chosen = {"VEHICLEMOR_CACHE": str(tmp_path / "file"), "TMPDIR": str(tmp_path)}
     command = [sys.executable, "-c", code]
     ran = subprocess.run(
