@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
     from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.comparison.kinds import compare as compare
-    from vehiclemor.report.html.document import write_report as write_report
     from vehiclemor.report.leaderboard import leaderboard as leaderboard
+    from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signal_arrays import many_signals as many_signals
@@ -54,7 +54,7 @@ _DEFINED_IN = {
     "leaderboard": "vehiclemor.report.leaderboard",
     "maneuver": "vehiclemor.maneuver",
     "many_signals": "vehiclemor.signal_arrays",
-    "write_report": "vehiclemor.report.html.document",
+    "write_report": "vehiclemor.report.page",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
     **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),

@@ -17,8 +17,8 @@ from vehiclemor.report.comparison.study import grid_rows
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
-from vehiclemor.report.html.study_table import error_table, places
 from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
+from vehiclemor.report.page import error_tables
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
 
@@ -143,10 +143,9 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     now = {(r["method"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
     more = {key[:2] for key, count in now.items() if count != before[key]["warned"]}
     assert more == {("mine", "dropped")}
-    told = [row for row in places(data) if row["warned"] and row["remark"].endswith("Mars")]
-    last = [line[-1] for line in error_table(data, told).rows]
-    assert [c.kind for c in last] == ["other"]
-    assert last[0].text == "ok (trained on this run): not driven; not to be trusted on Mars"
+    (table,) = error_tables(data).values()
+    told = [status for status in table["status"] if status.endswith("Mars")]
+    assert told == ["ok (trained on this run): not driven; not to be trusted on Mars"]
     data["status"][:] = "diverged"
     assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
     assert plot_result(data, None, "errors").axes

@@ -141,7 +141,7 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(results, capsys, monkey
     with pytest.raises(InputError, match=r"alone-ok-histories.*IndexError"):
         vm.figures([str(results / "alone-ok.toml")], results / "some", results)
     page = vm.write_report([str(results / "alone-ok.toml")], results / "page.html", results)
-    head, _, rest = page.read_text(encoding="utf-8").partition("<main")
+    head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
     assert "Left out: histories of alone-ok (IndexError: index 51" in head
     assert "RMS errors" in rest
 

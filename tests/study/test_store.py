@@ -433,19 +433,6 @@ def test_other_tools_read_files_that_end_with_their_hash(tmp_path):
         read_dataset(renamed, "source", "vehiclemor")
 
 
-def test_cells_of_an_older_version_are_left_alone(tmp_path, caplog, computed):
-    caplog.set_level("INFO", "vehiclemor")
-    (tmp_path / "small.toml").write_text(GRID)
-    (old := tmp_path / "cells" / f"{KEY}.nc").parent.mkdir()
-    old.write_bytes(b"netCDF")
-    run(tmp_path / "small.toml", tmp_path)
-    assert old.read_bytes() == b"netCDF"
-    assert len(computed) == 2
-    told = [line for line in caplog.messages if "older version" in line]
-    line = "1 cells of an older version (*.nc) are left alone; what is missing is computed"
-    assert told == [f"{tmp_path / 'cells'}: {line}"]
-
-
 # Whose results these are
 
 

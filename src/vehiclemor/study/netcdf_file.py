@@ -201,7 +201,7 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
         with netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             if INTEGRITY in file.groups and not sealed:
-                raise ValueError("not what was written, or of an older version")
+                raise ValueError("not what was written")
             yield file
     except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
         if machine := machine_reason(error):

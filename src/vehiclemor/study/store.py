@@ -10,7 +10,6 @@ import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,15 +48,6 @@ def prepare_folder(folder: Path) -> None:
     for part in (folder / "cells", folder / "studies"):
         make_folder(part)
         probe_folder(part)
-    _tell_of_older(folder / "cells")
-
-
-@cache
-def _tell_of_older(cells: Path) -> None:
-    """Name, once, what an older version has left: a netCDF file for each cell."""
-    if older := sum(1 for _ in cells.glob("*.nc")):
-        text = "%s: %d cells of an older version (*.nc) are left alone; what is missing is computed"
-        _LOG.info(text, cells, older)
 
 
 def remove_partial(folder: Path) -> None:

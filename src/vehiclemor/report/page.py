@@ -1,0 +1,236 @@
+"""Results as one HTML file: verdicts, tables, vector pictures, provenance and settings."""
+
+import json
+from base64 import b64encode
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+import xarray as xr
+from matplotlib.figure import Figure
+
+from vehiclemor.arguments import count, file_path, quoted
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.files import write_text
+from vehiclemor.registry import names
+from vehiclemor.report.comparison.paper import paper_comparison
+from vehiclemor.report.default_studies import nominal, perturbed, unseen
+from vehiclemor.report.errors import counted_ends, flat, warned_runs
+from vehiclemor.report.figures.curves import PATH
+from vehiclemor.report.figures.pareto import figure_pareto
+from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
+from vehiclemor.report.figures.saving import METADATA, styled
+from vehiclemor.report.labels import TRAINED, trained_runs, unit_of
+from vehiclemor.report.predictive.rows import protocol_rows
+from vehiclemor.report.result_selection import drawn
+from vehiclemor.report.verdicts import VERDICTS, counted
+from vehiclemor.study.failure import attempt_apart
+from vehiclemor.study.netcdf_file import read_dataset
+from vehiclemor.study.plans.study_file import PARAMETER
+from vehiclemor.study.run import run_studies
+
+# A table of a study with more rows is summed up.
+MOST_ROWS = 200
+PICTURES = {
+    "histories": "Outputs over the time, differences from full order below",
+    "paths": "Paths in the plane, distances from full order below",
+    "errors": "RMS errors",
+}
+COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
+# Columns of tables, as `compare --json` names them.
+VERDICT = "item verdict variant start published bound reproduced unit measure reason"
+TARGET = "item bound measured unit verdict reason threshold_source"
+CONTESTANT = "method role winner misses silent flagged score seconds ratio_equal offline_seconds"
+DRAW = "date digest runs method misses silent flagged"
+NOTE = (
+    "misses: runs outside of a bound; silent: of these with the status ok; flagged: runs of which "
+    "the model says that it has left what it knows; score: largest error over its bound; "
+    "ratio_equal: times faster than full order at equal error. Fewest silent misses first"
+)
+
+
+class Section(NamedTuple):
+    """A study, protocol or comparison: tables and SVG (base 64) by captions."""
+
+    name: str
+    title: str
+    intro: str
+    tables: Mapping[str, pd.DataFrame]
+    pictures: Sequence[tuple[str, str]] = ()
+    attributes: Mapping[str, object] | None = None
+
+
+def write_report(
+    studies: str | Sequence[str] = (),
+    out: str | Path = "report.html",
+    results: str | Path = "results",
+    jobs: int = 1,
+) -> Path:
+    """Write results as one HTML file that needs no network and no other file.
+
+    Parameters
+    ----------
+    studies
+        Names of studies or collections, TOML files, run first where results are missing, or models,
+        of which their studies by default are meant.  None: all that is stored, as it is.
+    out
+        The file.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name is wrong, nothing is stored, or the file can't be written.
+    """
+    path, folder = file_path("out", out), file_path("results", results)
+    studies = [studies] if isinstance(studies, str) else studies
+    if not (isinstance(studies, Sequence) and all(isinstance(name, str) for name in studies)):
+        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
+    left_out: dict[str, str] = {}
+    sections: list[Section] = []
+    if studies:
+        chosen = [name for study in studies for name in _studies_of(study, folder)]
+        every = [d for n in chosen for d in run_studies(n, folder, count("jobs", jobs)).values()]
+        # Two studies may have one name, but not one file.
+        found = {Path(d.encoding.get("source", d.attrs["study"])).stem: d for d in every}
+    else:
+        found = _stored(folder, left_out)
+    if "paper" in studies:
+        made = partial(_paper, folder, jobs)
+        sections += attempt_apart("comparison with the paper", left_out, made)
+    for name, dataset in found.items():
+        section = _protocol if "row" in dataset.dims else _study
+        made = attempt_apart(name, left_out, partial(section, name, dataset, folder, left_out))
+        sections += [part._replace(attributes=dataset.attrs) for part in made]
+        if not made and not studies:
+            left_out[name] += "; if other source has stored it, vehiclemor run makes it again"
+    if not sections:
+        raise InputError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
+    return write_text(path, _page(sections, left_out))
+
+
+def _studies_of(name: str, folder: Path) -> list[str]:
+    if name not in names("model"):
+        return [name]
+    return [kind(name, folder) for kind in (nominal, perturbed, unseen)]
+
+
+def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
+    """All combined datasets of studies that are stored; `left_out` is told what can't be read."""
+    found: dict[str, xr.Dataset] = {}
+    for path in sorted((folder / "studies").glob("*.nc")):
+        try:
+            found[path.stem] = read_dataset(path, "source", "vehiclemor")
+        except FileError as error:
+            left_out[str(path)] = str(error).removeprefix(f"{path}: ")
+    found = {n: d for n, d in found.items() if "status" in d and "study" in d.attrs}
+    if not found:
+        raise InputError(f"{folder}: no results of a study; vehiclemor run STUDY makes them")
+    return found
+
+
+def _page(sections: Sequence[Section], left_out: Mapping[str, str]) -> str:
+    from jinja2 import Environment, FileSystemLoader
+
+    loader = FileSystemLoader(Path(__file__).parent)
+    environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["indented"] = lambda text: json.dumps(json.loads(text), indent=2)
+    template = environment.get_template("page.html.jinja")
+    return template.render(sections=sections, left_out=left_out)
+
+
+def _paper(folder: Path, jobs: int) -> Section:
+    """Verdicts on what the paper prints."""
+    rows = paper_comparison(folder, jobs)
+    shown = rows[VERDICT.split()].replace({"verdict": VERDICTS}).groupby(rows["model"], sort=False)
+    tables = {f"Verdicts: {model}": part for model, part in shown}
+    intro = (
+        "Masoudi, Uchida, McPhee (2015), doi:10.1115/1.4029390: every printed number and claim "
+        f"beside what is reproduced. {len(rows)} rows: {counted(rows['verdict'])}."
+    )
+    return Section("published", "Published beside reproduced", intro, tables)
+
+
+def _protocol(name: str, dataset: xr.Dataset, folder: Path, left_out: dict[str, str]) -> Section:
+    """Targets of what was chosen, all contestants, and the draws under the same rules."""
+    rows = protocol_rows(dataset, folder)
+    targets, methods, draws = (
+        pd.DataFrame([row for row in rows if row["kind"] == kind and row.get("same_rules", True)])
+        for kind in ("target", "method", "draw")
+    )
+    methods = methods.sort_values(["silent", "misses", "score"])
+    errors = [key for key in methods if str(key).startswith("worst_")]
+    tables = {
+        "Verdicts on what was chosen": targets.reindex(columns=TARGET.split()).replace(
+            {"verdict": VERDICTS}
+        ),
+        f"Contestants on the judged runs. {NOTE}": methods[[*CONTESTANT.split(), *errors]],
+        "Draws of the ledger under the same rules": draws.reindex(columns=DRAW.split()),
+    }
+    made = partial(
+        _svg, "Worst error over bound, over time", partial(figure_pareto, {name: dataset})
+    )
+    pictures = attempt_apart(f"errors over times of {name}", left_out, made)
+    intro = f"{methods['runs'].iloc[0]} judged runs of {dataset.attrs['model']}."
+    return Section(name, str(dataset.attrs["title"]), intro, tables, pictures)
+
+
+def _study(name: str, dataset: xr.Dataset, _: Path, left_out: dict[str, str]) -> Section:
+    """Errors of every run of a study on a grid, and every picture that it has the data for."""
+    held = {"histories": bool(dataset.sizes.get("time")), "errors": True}
+    held["paths"] = held["histories"] and set(PATH) <= set(dataset["output"].values)
+    pictures: list[tuple[str, str]] = []
+    for kind in filter(held.get, PICTURES):
+        for start in dataset["start"].values if kind != "errors" else [None]:
+            part, point = drawn(dataset, kind, {"start": start} if start else {})
+            caption = f"{PICTURES[kind]}{f' at {point}' if point else ''}"
+            made = partial(_svg, caption, partial(plot_result, part, None, kind))
+            pictures += attempt_apart(f"{kind} of {name}", left_out, made)
+    intro = f"Study of {dataset.attrs['model']}: {counted_ends(dataset)}."
+    return Section(name, str(dataset.attrs["title"]), intro, error_tables(dataset), pictures)
+
+
+def error_tables(dataset: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Errors of every run of a study, with its status and cell; of many the extremes alone."""
+    outputs, dims = shown_outputs(dataset), dataset["status"].dims
+    heads = {f"rms_{o}": f"RMS error of {o} ({unit_of(dataset, o)})" for o in outputs}
+    table = flat(dataset, tuple(outputs)).rename(columns=heads)
+    axes = [str(d) for d in dims if d != "method" and dataset.sizes[d] > 1]
+    if len(table) > MOST_ROWS:
+        by = ["method", *(["start"] if "start" in axes else [])]
+        good = table[table["status"] == "ok"].groupby(by, sort=False)[[*heads.values()]]
+        extremes = good.agg(["count", "min", "median", "max"]).reset_index()
+        extremes.columns = [": ".join(filter(None, names)) for names in extremes]
+        return {"Errors of the runs that are ok; the netCDF file has every run": extremes}
+    said = dataset["remark"].where(warned_runs(dataset) & (dataset["status"] == "ok"), "")
+    said, cells, trained = (
+        values.transpose(*dims).values.ravel()
+        for values in (said, dataset["cell_key"], trained_runs(dataset))
+    )
+    marks = pd.Series(trained).map({True: f" ({TRAINED})", False: ""})
+    told = (table["message"] + said).map(lambda text: f": {text}" if text else "")
+    for sampled in [str(n) for n, c in dataset.coords.items() if c.dims == ("sample",)]:
+        table[sampled] = dataset[sampled].sel(sample=table["sample"]).values
+        axes.append(sampled)
+    counts = [name for name in COUNTS if name in table]
+    shown = table[["method", *dict.fromkeys(axes), *heads.values(), *counts]]
+    shown = shown.rename(columns=lambda key: key.removeprefix(PARAMETER))
+    return {"Every run": shown.assign(status=table["status"] + marks + told, cell=cells)}
+
+
+def _svg(caption: str, draw: Callable[[], Figure]) -> tuple[str, str]:
+    target = BytesIO()
+    with styled():
+        draw().savefig(target, format="svg", metadata=METADATA["svg"])
+    return caption, b64encode(target.getvalue()).decode()
