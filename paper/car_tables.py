@@ -10,11 +10,11 @@ from typing import Any
 import pandas as pd
 from fragments import ROOT
 
-from vehiclemor.errors import InputError
 from vehiclemor.report.design_studies import design_space
-from vehiclemor.report.leaderboard import leaderboard
+from vehiclemor.report.predictive.rows import draws_of, method_rows, protocol_of
 from vehiclemor.report.printing import fixed, short
 from vehiclemor.report.tables import markdown
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.protocol import load_protocol
 
 OF_CARS = "predictive-cars-"
@@ -49,12 +49,8 @@ def latin_hypercube(folder: Path) -> str:
 
 def drawn(folder: Path) -> str:
     """Draws over cars and inputs whose results are stored."""
-    try:
-        rows = leaderboard(folder)
-    except InputError:
-        return ""
     parts = []
-    for _, part in rows[rows["study"].str.startswith(OF_CARS) & rows["sealed"]].groupby("study"):
+    for part in contestants(folder):
         first = part.iloc[0]
         columns = {
             heading: [printed(value) for value in part[name]]
@@ -66,6 +62,18 @@ def drawn(folder: Path) -> str:
         when = first["drawn_on"][:10]
         parts.append(f"{_title(first['title'])}, {first['runs']} runs drawn on {when}:\n\n{table}")
     return "\n".join(parts)
+
+
+def contestants(folder: Path) -> list[pd.DataFrame]:
+    """Of each stored protocol over cars whose runs were drawn: its contestants."""
+    found = []
+    for path in sorted((folder / "studies").glob(f"{OF_CARS}*.nc")):
+        dataset = read_dataset(path, "source", "vehiclemor")
+        if (dataset["scenario_set"] == "drawn").any():
+            rows = method_rows(dataset, protocol_of(dataset), draws_of(dataset, folder))
+            head = {name: dataset.attrs[name] for name in ("title", "drawn_on")}
+            found.append(pd.DataFrame(rows).assign(**head))
+    return found
 
 
 def _number(value: float) -> str:

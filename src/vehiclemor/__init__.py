@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from vehiclemor.online.sensitivities import sensitivities as sensitivities
     from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.comparison.kinds import compare as compare
-    from vehiclemor.report.leaderboard import leaderboard as leaderboard
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
@@ -51,7 +50,6 @@ _DEFINED_IN = {
     "export": "vehiclemor.exporting.export",
     "compare": "vehiclemor.report.comparison.kinds",
     "figures": "vehiclemor.report.regenerate",
-    "leaderboard": "vehiclemor.report.leaderboard",
     "maneuver": "vehiclemor.maneuver",
     "many_signals": "vehiclemor.signal_arrays",
     "write_report": "vehiclemor.report.page",
@@ -70,7 +68,6 @@ __all__ = [
     "describe",
     "export",
     "figures",
-    "leaderboard",
     "load",
     "maneuver",
     "maneuvers",

@@ -1,4 +1,4 @@
-"""A study, a protocol or a collection of somebody else's: tables, figures and the leaderboard."""
+"""A study, a protocol or a collection of somebody else's: tables and figures."""
 
 import json
 import re
@@ -12,14 +12,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import vehiclemor as vm
 from tests.report.figure_texts import check_texts
 from vehiclemor.cli import main
-from vehiclemor.errors import InputError
 from vehiclemor.report.comparison.study import grid_rows
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.saving import styled
-from vehiclemor.report.leaderboard import leaderboard, leaderboard_text, rank
 from vehiclemor.report.page import error_tables
-from vehiclemor.study.netcdf_file import read_dataset, write_dataset
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
@@ -278,65 +276,3 @@ def test_samples_are_drawn_over_what_was_sampled():
     # Of four quantities the errors follow the third.
     assert figure.axes[3].get_xlabel() == "third (kg)"
     check_texts_of(figure)
-
-
-def row_of(**changes):
-    row = {"silent": 0, "misses": 0, "ratio_equal": 1.0}
-    return row | changes
-
-
-def test_the_rule_of_the_leaderboard():
-    better_to_worse = [
-        row_of(ratio_equal=4.0),
-        row_of(),
-        row_of(ratio_equal=float("nan")),
-        row_of(misses=3, ratio_equal=9.0),
-        row_of(misses=1, silent=1, ratio_equal=9.0),
-        row_of(misses=9, silent=1),
-    ]
-    shuffled = [better_to_worse[i] for i in (3, 1, 5, 0, 4, 2)]
-    assert sorted(shuffled, key=rank) == better_to_worse
-
-
-def test_the_leaderboard_holds_all_stored_protocols_and_names_what_is_none(place, said, capsys):
-    said("compare", place / "road.toml")
-    studies = place / "results" / "studies"
-    board = leaderboard(place / "results")
-    assert list(board["place"]) == [1, 2, 3, 4]
-    assert set(board["method"]) == {"full order 1e-3", "full order 1e-6", "replay", "mine"}
-    assert not board.attrs["left_out"]
-    whole = (studies / "predictive-road.nc").read_bytes()
-    (studies / "predictive-torn.nc").write_bytes(whole[: len(whole) // 2])
-    (studies / "predictive-text.nc").write_text("no dataset")
-    old = read_dataset(studies / "predictive-road.nc", "source", "vehiclemor")
-    write_dataset(old.drop_vars("loop_seconds"), studies / "predictive-loopless.nc")
-    write_dataset(old.drop_vars("trusted_until"), studies / "predictive-old.nc")
-    foreign = old.assign_attrs(configuration='{"title": "no protocol"}')
-    write_dataset(foreign, studies / "predictive-foreign.nc")
-    try:
-        status, text = said("leaderboard")
-        assert status == 0
-        assert text.count(" 1 ") >= 1
-        for words in ("fewest silent misses", "mine *", "replay (b)", "(f)", "road (quarter_car"):
-            assert words in text
-        # Two that can be read have the same rows: their methods are counted over both.
-        assert re.search(r"quarter_car_modes +2 +8 ", text)
-        left_out = leaderboard(place / "results").attrs["left_out"]
-        reasons = {Path(path).stem.removeprefix("predictive-"): r for path, r in left_out.items()}
-        assert set(reasons) == {"torn", "text", "old", "foreign"}
-        assert "trusted_until" in reasons["old"]
-        assert main(["leaderboard", "--json", "--out", str(place / "results")]) == 0
-        printed = capsys.readouterr()
-        assert len(json.loads(printed.out)) == 8
-        assert all(name in printed.err for name in ("torn", "text", "old", "foreign"))
-    finally:
-        for name in ("torn", "text", "loopless", "old", "foreign"):
-            (studies / f"predictive-{name}.nc").unlink()
-
-
-def test_a_folder_without_protocols_has_no_leaderboard(tmp_path, capsys):
-    with pytest.raises(InputError, match="no results of protocols"):
-        vm.leaderboard(tmp_path)
-    assert main(["leaderboard", "--out", str(tmp_path)]) == 2
-    assert "vehiclemor run predictive" in capsys.readouterr().err
-    assert "Leaderboard" in leaderboard_text([])

@@ -52,12 +52,10 @@ def test_what_is_kept_stands_in_the_table(tmp_path, monkeypatch):
 
 def test_draws_over_cars_alone_stand_in_their_table(tmp_path, monkeypatch):
     assert car_tables.drawn(tmp_path) == ""
-    row = {"title": "A car: drawn", "drawn_on": "2026-11-22T10", "sealed": True, "runs": 299}
+    row = {"title": "A car: drawn", "drawn_on": "2026-11-22T10", "runs": 299}
     row |= {"method": "m", "misses": 3, "silent": 1, "flagged": 7, "score": 2.25}
     row |= {"ratio_equal": 1.5, "winner": True}
-    studies = {"predictive-cars-a": True, "predictive-a": True, "predictive-cars-b": False}
-    rows = [row | {"study": study, "sealed": sealed} for study, sealed in studies.items()]
-    monkeypatch.setattr(car_tables, "leaderboard", lambda _: pd.DataFrame(rows))
+    monkeypatch.setattr(car_tables, "contestants", lambda _: [pd.DataFrame([row])])
     text = car_tables.drawn(tmp_path)
     assert text.startswith("A car, 299 runs drawn on 2026-11-22:\n\n|  | missed | silent |")
     assert text.count("299 runs") == 1

@@ -14,7 +14,6 @@ from vehiclemor.cli.ending import ended
 from vehiclemor.cli.exit_status import MEANING
 from vehiclemor.cli.export import export
 from vehiclemor.cli.figures import figures
-from vehiclemor.cli.leaderboard import leaderboard
 from vehiclemor.cli.list import list_components
 from vehiclemor.cli.new_plugin import new_plugin
 from vehiclemor.cli.plot import plot
@@ -43,7 +42,6 @@ COMMANDS = {
     "run": run,
     "status": status,
     "compare": compare,
-    "leaderboard": leaderboard,
     "figures": figures,
     "report": report,
     "export": export,
