@@ -20,9 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import faults
 import in_use
-import scaling
 import sensitivities
 from car_tables import TABLES
 from fragments import (
@@ -43,7 +41,7 @@ if TYPE_CHECKING:
 
 FACTS = ROOT / "paper" / "facts.json"
 # Kinds of sources that one file of the results folder holds; and those of a script each.
-SCRIPTS = {"faults": faults, "in_use": in_use, "scaling": scaling, "sensitivities": sensitivities}
+SCRIPTS = {"in_use": in_use, "sensitivities": sensitivities}
 FILES = {"benchmark": "benchmark.json"} | {kind: script.FILE for kind, script in SCRIPTS.items()}
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")

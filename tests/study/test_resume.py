@@ -81,6 +81,14 @@ def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_pa
     assert_same(uninterrupted, resumed)
 
 
+def test_two_drivers_at_once_give_the_same_dataset(study, uninterrupted, tmp_path):
+    command = [sys.executable, "-m", "vehiclemor", "run", str(study), "--out", str(tmp_path)]
+    drivers = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for _ in range(2)]
+    assert [driver.wait(timeout=240) for driver in drivers] == [0, 0]
+    assert not list(tmp_path.rglob(f"{TEMPORARY}*"))
+    assert_same(uninterrupted, run_studies(str(study), tmp_path)["small"])
+
+
 def test_unreachable_cells_are_results(uninterrupted):
     status = uninterrupted["status"].sel(amplitude_factor=3.0)
     assert (status == "unreachable").all()
