@@ -30,11 +30,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         solver), errors, `offline_us`, and the number of runs after which a reduced model has paid
         for its training against either baseline (missing where it never does).
     """
-    return cost_rows(model, timing_of(model, folder))
-
-
-def cost_rows(model: str, data: xr.Dataset) -> pd.DataFrame:
-    """The cost table of a stored timing of a model."""
+    data = timing_of(model, folder)
     rows = [
         _row(data.sel(start=start, case=case), list(component("model", model).shown.counts))
         for start in data["start"].values

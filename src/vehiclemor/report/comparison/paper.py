@@ -1,6 +1,5 @@
 """Published beside reproduced: every number, every claim with a criterion, verdict and reason."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -9,7 +8,6 @@ from vehiclemor.registry import component, names
 from vehiclemor.report.comparison.design import FINDS, SAVES, design_rows
 from vehiclemor.report.comparison.rows import (
     COLUMNS,
-    Results,
     Row,
     claim_rows,
     error_rows,
@@ -30,32 +28,11 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        As of `paper_rows`.
-    """
-    results = run_studies("paper", folder, jobs)
-    return paper_rows(results, {model: cost_table(model, folder) for model in printed_models()})
-
-
-def _compared() -> list[Number]:
-    numbers = load_published().numbers.values()
-    return [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
-
-
-def printed_models() -> list[str]:
-    """Models of which the paper prints an error or a time, and that the suite has."""
-    models = dict.fromkeys(number.model for number in _compared())
-    return [model for model in models if model in names("model")]
-
-
-def paper_rows(results: Results, costs: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """The comparison from the paper's studies and the cost tables of its models.
-
-    Returns
-    -------
-    pandas.DataFrame
         One row for each published number or claim, start and variant of the method, with the
         columns `COLUMNS`, described at `rows.Row`.
     """
+    results = run_studies("paper", folder, jobs)
+    costs = {model: cost_table(model, folder) for model in printed_models()}
     errors: list[Row] = []
     times: list[Row] = []
     unknown: list[Row] = []
@@ -79,3 +56,14 @@ def paper_rows(results: Results, costs: Mapping[str, pd.DataFrame]) -> pd.DataFr
     rows = pd.DataFrame([*errors, *times, *unknown, *claims], columns=list(COLUMNS))
     place = {model: number for number, model in enumerate(costs)}
     return rows.sort_values("model", key=lambda c: c.map(place), kind="stable", ignore_index=True)
+
+
+def _compared() -> list[Number]:
+    numbers = load_published().numbers.values()
+    return [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
+
+
+def printed_models() -> list[str]:
+    """Models of which the paper prints an error or a time, and that the suite has."""
+    models = dict.fromkeys(number.model for number in _compared())
+    return [model for model in models if model in names("model")]
