@@ -154,7 +154,7 @@ def _paper(folder: Path, jobs: int) -> Section:
     """Verdicts on what the paper prints."""
     rows = paper_comparison(folder, jobs)
     shown = rows[VERDICT.split()].replace({"verdict": VERDICTS}).groupby(rows["model"], sort=False)
-    tables = {f"Verdicts: {model}": part for model, part in shown}
+    tables = {f"Verdicts: {model}": pd.DataFrame(part) for model, part in shown}
     intro = (
         "Masoudi, Uchida, McPhee (2015), doi:10.1115/1.4029390: every printed number and claim "
         f"beside what is reproduced. {len(rows)} rows: {counted(rows['verdict'])}."
@@ -225,7 +225,7 @@ def error_tables(dataset: xr.Dataset) -> dict[str, pd.DataFrame]:
         axes.append(sampled)
     counts = [name for name in COUNTS if name in table]
     shown = table[["method", *dict.fromkeys(axes), *heads.values(), *counts]]
-    shown = shown.rename(columns=lambda key: key.removeprefix(PARAMETER))
+    shown = shown.set_axis([str(key).removeprefix(PARAMETER) for key in shown], axis="columns")
     return {"Every run": shown.assign(status=table["status"] + marks + told, cell=cells)}
 
 
