@@ -194,7 +194,7 @@ def test_a_picture_of_a_method_that_has_failed(tmp_path, monkeypatch, capsys):
     endings.register(monkeypatch)
     arguments = ["simulate", "double_wishbone", "--method", "endings", "--set", "end=error"]
     assert main([*arguments, "--plot", str(tmp_path / "a.png")]) == 1
-    assert "error RuntimeError: a bug" in capsys.readouterr().out
+    assert "RuntimeError: a bug" in capsys.readouterr().out
     assert (tmp_path / "a.png").stat().st_size > 1000
 
 

@@ -79,7 +79,7 @@ class TrainingReach:
         """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
         if not self.inputs.size:
             return 0.0, np.inf
-        used = float((extent_of(maneuver).largest / self.inputs).max())
+        used = float(np.maximum.reduce(extent_of(maneuver).largest / self.inputs, axis=None))
         return used, np.inf if used <= 1.0 else inputs_beyond(maneuver, self.inputs).min()
 
     def settled(self, excited: np.ndarray) -> float:
