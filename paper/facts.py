@@ -22,15 +22,12 @@ from typing import TYPE_CHECKING, Any
 
 import in_use
 import sensitivities
-from car_tables import TABLES
 from fragments import (
     ROOT,
     manifest,
     printed_numbers,
     rendered,
     rewritten,
-    tables_in,
-    with_tables,
 )
 
 from vehiclemor import VehiclemorError
@@ -202,9 +199,9 @@ def _commit() -> str:
 
 
 def stored_facts() -> dict[str, dict[str, dict[str, Any]]]:
-    """What `facts.json` holds: `sources`, `facts` and `tables`."""
+    """What `facts.json` holds: `sources` and `facts`."""
     if not FACTS.exists():
-        return {"sources": {}, "facts": {}, "tables": {}}
+        return {"sources": {}, "facts": {}}
     return json.loads(FACTS.read_text(encoding="utf-8"))
 
 
@@ -240,17 +237,7 @@ def measure(folder: Path, jobs: int, stored_only: bool) -> list[str]:
         ]
         text = (ROOT / file).read_text(encoding="utf-8")
         write_text(ROOT / file, rewritten(text, new))
-    tables, today = known.get("tables", {}), datetime.now(UTC).date().isoformat()
-    for file in declared.tables:
-        text = (ROOT / file).read_text(encoding="utf-8")
-        for name in tables_in(text):
-            if new := TABLES[name](folder):
-                tables[name] = {"date": today, "commit": _commit(), "text": new}
-            else:
-                stale.append(f"table {name}: nothing is stored in {folder}")
-        new = with_tables(text, {name: str(table["text"]) for name, table in tables.items()})
-        write_text(ROOT / file, new)
-    write_text(FACTS, _lines({"sources": origins, "facts": facts, "tables": tables}))
+    write_text(FACTS, _lines({"sources": origins, "facts": facts}))
     return stale
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,10 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"\{([^{}|]+)\|([^{}|]+)\}")
 PRINTED = r"(-?\d[\d.]*(?:e-?\d+)?|nan|inf)"
 DECIMAL = re.compile(r"(?<![\w.-])\d+(?:\.\d+(?:e-?\d+)?|e-?\d+)(?![\w.]*\w)")
-# A table that is written whole.
-TABLE = re.compile(r"<!-- table (\S+) -->\n(.*?)<!-- end -->", re.DOTALL)
-# Code, addresses, headings of tables and tables that are written whole hold no other measurements.
-UNREAD = re.compile(rf"{TABLE.pattern}|```.*?```|`[^`]*`|\]\([^)]*\)|<[^>]*>", re.DOTALL)
+# Code and addresses hold no measurements.
+UNREAD = re.compile(r"```.*?```|`[^`]*`|\]\([^)]*\)|<[^>]*>", re.DOTALL)
 
 
 class Fragments(FileSchema):
@@ -45,13 +43,10 @@ class Manifest(FileSchema):
         Short name -> study, or kind of a table and its model.
     varying
         Sources whose numbers depend on the clock, or on rounding.
-    tables
-        Texts with tables that are written whole, between `<!-- table NAME -->` and `<!-- end -->`.
     """
 
     sources: dict[str, str]
     varying: list[str]
-    tables: list[str]
     fragments: list[Fragments]
     verbatim: list[Verbatim]
 
@@ -118,21 +113,6 @@ def rewritten(text: str, numbers: Iterable[tuple[Printed, str]]) -> str:
     for (first, last), new in sorted(places.items(), reverse=True):
         text = text[:first] + new + text[last:]
     return text
-
-
-def tables_in(text: str) -> dict[str, str]:
-    """Tables of a text that are written whole, by name."""
-    return {table[1]: table[2] for table in TABLE.finditer(text)}
-
-
-def with_tables(text: str, tables: Mapping[str, str]) -> str:
-    """A text with other tables in the places of its own, as far as they are given."""
-
-    def other(table: re.Match[str]) -> str:
-        new = tables.get(table[1], table[2])
-        return f"<!-- table {table[1]} -->\n{new}<!-- end -->"
-
-    return TABLE.sub(other, text)
 
 
 def uncovered(declared: Manifest, file: str) -> list[str]:

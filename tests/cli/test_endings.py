@@ -110,16 +110,16 @@ def test_runs_that_are_not_trusted_are_counted_apart(tmp_path, capsys):
     path = tmp_path / "other.toml"
     path.write_text(
         """
-title = "another car than that of the training"
+title = "other inputs than those of the training"
 model = "double_wishbone"
-cars = "nominal"
+training = "nominal"
 keep = "metrics"
 methods = [{ method = "pod" }, { method = "full_order" }]
-grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09] }
+grid = { amplitude_factor = [1.0, 1.3] }
 """
     )
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
-    assert "4 grid points, 4 cells: 4 ok (2 not to be trusted);" in " ".join(
+    assert "4 grid points, 4 cells: 4 ok (1 not to be trusted);" in " ".join(
         capsys.readouterr().out.split()
     )
 

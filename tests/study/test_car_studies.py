@@ -1,6 +1,4 @@
-"""Studies over cars: axes and samples of parameters, and what is trained on."""
-
-import itertools
+"""Studies over parameters: axes and samples of them, and what is trained on."""
 
 import numpy as np
 import pytest
@@ -8,8 +6,6 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.errors import FileError
-from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.report.figures.sampled_errors import figure_samples
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.sampling import sampled
 from vehiclemor.study.plans.study_file import Sampling, StudyFile
@@ -56,41 +52,6 @@ grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" 
             np.testing.assert_array_equal(here[name], alone[name])
 
 
-CARS = """
-methods = [
-  {{ method = "pod", label = "nominal", cars = "nominal" }},
-  {{ method = "pod", label = "refitted" }},
-  {{ method = "pod", label = "trained", cars = "ends" }},
-]
-[car_sets]
-ends = [{{ "tie_rod_inner.z" = -0.1 }}, {{ "tie_rod_inner.z" = -0.09 }}]
-[grid]
-"parameters.tie_rod_inner.z" = {}
-"""
-
-
-def test_bases_come_from_the_cars_that_are_named(study):
-    found = study(SUSPENSION + CARS.format("[-0.1, -0.095, -0.09]"))
-    errors = found["rms_error"].sel(output="toe")
-    car = vm.model("double_wishbone", {"tie_rod_inner.z": -0.095})
-    middle = errors.isel({"parameters.tie_rod_inner.z": 1}).squeeze()
-    alone = float(vm.simulate(car, "pod")["rms_error"].sel(output="toe"))
-    assert float(middle.sel({"method": "refitted"})) == alone
-    settings = vm.model("double_wishbone").definition
-    method = vm.registry.component("method", "pod")
-    complete = method.settings["ae"]()
-    maneuver = vm.registry.component("maneuver", settings.maneuver)
-    for label, heights in (("nominal", [None]), ("trained", [-0.1, -0.09])):
-        cars = [vm.model("double_wishbone", {"tie_rod_inner.z": z} if z else {}) for z in heights]
-        runs = [TrainingRun(trained, maneuver, "equilibrium") for trained in cars]
-        error = (
-            method.fit(car, runs, complete).simulate(maneuver, "equilibrium").outputs
-            - car.simulate(maneuver, "equilibrium").outputs
-        )
-        expected = np.sqrt((error**2).mean(axis=0))[car.outputs.index("toe")]
-        assert float(middle.sel({"method": label})) == pytest.approx(expected, rel=1e-9)
-
-
 def test_samples_are_a_dimension_with_the_sampled_values(study):
     found = study(
         SUSPENSION
@@ -114,37 +75,6 @@ ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], amplitude_factor = [0.5
         )
         expected = float(alone["signal_range"].sel(output="toe"))
         assert float(ranges[index]) == expected
-
-
-def test_cars_that_are_trained_on_are_told_apart_by_what_learns_from_them(study, tmp_path):
-    found = study(
-        SUSPENSION
-        + """
-methods = [{ method = "pod" }, { method = "full_order" }, { method = "path_map" }]
-[car_sets]
-ends = [{ "tie_rod_inner.z" = -0.1 }, { "tie_rod_inner.z" = -0.09 }]
-[grid]
-cars = ["own", "ends"]
-[sampling]
-plan = "latin_hypercube"
-count = 3
-seed = 1
-ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09] }
-"""
-    )
-    keys = found["cell_key"].squeeze().transpose("method", "cars", "sample").values
-    assert [len(set(own.ravel())) for own in keys] == [6, 3, 3]
-    rows = vm.compare(str(tmp_path / "mine.toml"), out=tmp_path / "results")
-    errors = rows[rows["output"] == "toe"].set_index("method")
-    labels = ["pod, cars own", "pod, cars ends", "full_order", "path_map"]
-    assert list(errors.index) == labels
-    assert (errors["runs"] == 3).all()
-    for cars in ("own", "ends"):
-        own = found["rms_error"].sel({"method": "pod", "cars": cars, "output": "toe"})
-        assert errors.loc[f"pod, cars {cars}", "largest"] == float(own.max())
-    figure = figure_samples(found, ["toe"])
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts[:3] == ["POD, cars own", "POD, cars ends", "path map"]
 
 
 @pytest.mark.parametrize("plan", ["latin_hypercube", "sobol"])
@@ -172,7 +102,6 @@ def test_training_policies_and_maneuvers_are_axes():
             "training": ["matched", "nominal", "travel_and_rack"],
             "maneuver": ["sine_travel", "chirp_travel"],
             "amplitude_factor": [0.9],
-            "cars": ["own", "nominal"],
             "parameters.tie_rod_inner.z": [-0.09],
         },
         "methods": [{"method": "pod"}],
@@ -183,11 +112,10 @@ def test_training_policies_and_maneuvers_are_axes():
         for cell in grid.unique.values()
         for run in cell.training
     }
-    cars = ((), (("tie_rod_inner.z", -0.09),))
     # The tested ones, the model's own, and the named one.
     runs = [("sine_travel", 0.9), ("chirp_travel", 0.9), ("sine_travel", 1.0)]
     runs.append(("travel_and_rack", 1.0))
-    assert seen == {(*run, car) for run, car in itertools.product(runs, cars)}
+    assert seen == {(*run, (("tie_rod_inner.z", -0.09),)) for run in runs}
 
 
 @pytest.mark.parametrize(
@@ -198,11 +126,6 @@ def test_training_policies_and_maneuvers_are_axes():
         ('grid = { "parameters.tie_rod_inner.z" = ["low"] }', "'low' is not a number"),
         ('grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "is it in millimetres"),
         ("parameters = { tie_rod = 1.0 }", "'tie_rod' is not a parameter"),
-        ("grid = { cars = [1.0] }", r"unknown cars 1\.0; known: nominal, own"),
-        ('cars = "all"', "unknown cars 'all'; known: nominal, own"),
-        ("cars = []", "cars is empty"),
-        ('car_sets = { ends = [{ "tie_rod_inner.z" = 90.0 }] }', "car_sets.ends: .*millimetres"),
-        ('grid = { cars = ["owned"] }', "did you mean own"),
         ('grid = { training = ["mached"] }', "did you mean matched"),
         ('grid = { maneuver = ["sine_travl"] }', "did you mean sine_travel"),
         ('grid = { start = ["equilibrum"] }', "unknown start 'equilibrum'"),
@@ -243,7 +166,6 @@ ranges = { "parameters.sprung_mass" = [5e4, 1e5] }
     [
         ('grid = { "parameters.sprung_mass" = [1e3, 1e5] }', "sprung_mass = 100000.*can't stand"),
         ("parameters = { sprung_mass = 1e5 }", "can't stand"),
-        ("cars = [{ sprung_mass = 1e5 }]", "cars: sprung_mass = 100000.*can't stand"),
         (SAMPLED, "sprung_mass = .*can't stand"),
     ],
 )

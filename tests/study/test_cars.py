@@ -1,4 +1,4 @@
-"""Runs of other cars than the study's: each is what a model with these parameters gives alone."""
+"""Runs with other parameters: each is what a model with these gives alone."""
 
 from dataclasses import replace
 
@@ -9,7 +9,6 @@ import vehiclemor as vm
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import sine_travel
 from vehiclemor.registry import component
-from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import make_experiment
 from vehiclemor.study.method_settings import complete_settings
@@ -63,54 +62,28 @@ def test_a_component_of_a_point_is_a_parameter(suspension):
         vm.model(suspension.name, {"tie_rod_inner.z": [0.0, 0.0]})
 
 
-@pytest.mark.parametrize("cars", [None, ((),), ((), MOVED)], ids=["own", "nominal", "set"])
-def test_the_fit_of_a_car_is_the_method_on_its_equations_and_the_training_cars(suspension, cars):
+def test_the_fit_with_other_parameters_is_the_method_on_that_model(suspension):
     test = Scenario(sine_travel, "equilibrium", None, MOVED)
-    training = training_set(suspension, "pod", "matched", test, cars=cars)
+    training = training_set(suspension, "pod", "matched", test)
     found = evaluate(experiment(suspension, "pod", training, (test,), "metrics", rank=3))
-    moved, method = vm.model(suspension.name, dict(MOVED)), component("method", "pod")
-    trained = {None: [moved], ((),): [suspension], ((), MOVED): [suspension, moved]}[cars]
-    runs = [training_run(car, Scenario(sine_travel, "equilibrium")) for car in trained]
-    settings = complete_settings(suspension, "pod", {"rank": 3})
-    complete = method.settings["ae"](**settings)
-    alone = method.fit(moved, runs, complete).simulate(sine_travel, "equilibrium")
+    moved = vm.model(suspension.name, dict(MOVED))
+    alone = vm.reduce(moved, "pod", rank=3, training="nominal").simulate()
     error = alone.outputs - moved.simulate(sine_travel, "equilibrium").outputs
-    expected = np.sqrt((error**2).mean(axis=0))
-    np.testing.assert_allclose(found["rms_error"], expected, rtol=1e-12)
+    np.testing.assert_allclose(found["rms_error"], np.sqrt((error**2).mean(axis=0)), rtol=1e-12)
 
 
-def test_tests_of_several_cars_are_each_compared_with_their_own_full_order(suspension, monkeypatch):
-    fits = []
-    method = component("method", "pod")
-    monkeypatch.setattr(
-        "vehiclemor.reduction.methods.pod.METHOD",
-        replace(method, fit=lambda car, *given: fits.append(car) or method.fit(car, *given)),
-    )
-    cars = ((), MOVED, (("tie_rod_inner.z", -0.1),))
-    tests = tuple(
-        Scenario(sine_travel.perturbed(f), "equilibrium", None, c) for c in cars for f in (1.0, 1.2)
-    )
-    own = (Scenario(sine_travel, "equilibrium", None, None),)
-    evaluation._kept_fit.cache_clear()
-    together = evaluate(experiment(suspension, "pod", own, tests, rank=3))
-    assert len(fits) == len(cars)
-    assert len(set(together["scenario"].values.tolist())) == len(tests)
-    for place, test in enumerate(tests):
-        alone = evaluate(
-            experiment(
-                suspension, "pod", (replace(own[0], parameters=test.parameters),), (test,), rank=3
-            )
-        )
-        for name in ("rms_error", "largest_output"):
-            np.testing.assert_array_equal(together[name][place], alone[name][0])
+def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(suspension):
+    runs = Scenario(sine_travel, "equilibrium"), Scenario(sine_travel, "equilibrium", None, MOVED)
+    found = evaluate(experiment(suspension, "pod", runs[:1], runs[1:], rank=3))
+    assert found["status"].item() == "rejected"
+    assert "another" in found["message"].item()
+    with pytest.raises(ValueError, match="of one model"):
+        experiment(suspension, "pod", runs[:1], runs, rank=3)
 
 
 def test_a_car_is_part_of_the_key_and_no_car_leaves_it_as_it_was(vehicle):
     nominal, heavy = lane_change(), lane_change(HEAVY)
     assert "parameters" not in nominal.content
     assert nominal.run_key != heavy.run_key
-    keys = {
-        experiment(vehicle, "pod", (t,), (nominal,)).key
-        for t in (nominal, heavy, lane_change(None))
-    }
-    assert len(keys) == 3
+    keys = {experiment(vehicle, "pod", (t,), (nominal,)).key for t in (nominal, heavy)}
+    assert len(keys) == 2

@@ -275,15 +275,12 @@ def test_the_ledger_of_the_package_can_be_read(name, tmp_path):
 
 @pytest.mark.parametrize("name", sorted(data_names("protocols")))
 def test_rules_that_are_called_the_same_differ_by_a_null_key_alone(name):
-    def without(content):
-        if isinstance(content, dict):
-            items = content.items()
-            return {k: without(v) for k, v in items if not (k == "cars" and v is None)}
-        return [without(entry) for entry in content] if isinstance(content, list) else content
-
     own = load_protocol(name)
     content = own.definition.model_dump(include={"sensitive", "drawn", "drawn_outside"})
     content["bounds"] = {o: [b.measure, b.bound] for o, b in own.definition.bounds.items()}
-    text = json.dumps([without(content), parameters_of(own.model)], sort_keys=True)
+    for draw in (content["drawn"], content["drawn_outside"]):
+        for box in draw["boxes"] if draw else ():
+            box["cars"] = None
+    text = json.dumps([content, parameters_of(own.model)], sort_keys=True)
     before = hashlib.sha256(text.encode()).hexdigest()
     assert same_rules().get(before, rules(own)) == rules(own)

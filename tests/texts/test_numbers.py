@@ -41,15 +41,6 @@ def test_every_fact_is_used_and_has_an_origin():
         assert origin["commit"]
 
 
-def test_every_table_in_a_text_is_what_was_stored():
-    stored = facts.stored_facts()["tables"]
-    for file in DECLARED.tables:
-        text = (fragments.ROOT / file).read_text(encoding="utf-8")
-        for name, table in fragments.tables_in(text).items():
-            assert name in facts.TABLES
-            assert table == (stored[name]["text"] if name in stored else "Not measured yet.\n")
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_no_measured_number_stands_outside_of_a_fragment(name):
     if not any(name.endswith(other) for other in UNMEASURED):
@@ -77,9 +68,7 @@ def page(tmp_path, monkeypatch):
         "{[s: rms_error; pod; rank=3] | .1e} rad at r = 3 over",
     ]
     part = Fragments(file="page.md", texts=texts)
-    declared = Manifest(
-        sources={"s": "study"}, varying=[], tables=[], fragments=[part], verbatim=[]
-    )
+    declared = Manifest(sources={"s": "study"}, varying=[], fragments=[part], verbatim=[])
     data = xr.Dataset(
         {
             "rms_error": (("rank", "method"), [[0.1, 0.2], [4.26e-5, 0.3]], {"units": "rad"}),
@@ -109,23 +98,6 @@ def test_what_is_not_stored_stays_and_is_named(page, monkeypatch):
     (line,) = facts.measure(folder, 1, stored_only=True)
     assert "study" in line
     assert ((folder / "page.md").read_text(), (folder / "facts.json").read_text()) == before
-
-
-def test_a_table_is_written_whole_where_it_is_stored(page, monkeypatch):
-    folder, declared = page
-    words = "Tables\n\n<!-- table cars -->\nold | 9.9\n<!-- end -->\nend\n"
-    (folder / "table.md").write_text(words)
-    declared.tables.append("table.md")
-    assert fragments.uncovered(declared, "table.md") == []
-    found = {"text": ""}
-    monkeypatch.setattr(facts, "TABLES", {"cars": lambda _: found["text"]})
-    (line,) = facts.measure(folder, 1, stored_only=False)
-    assert "table cars" in line
-    assert (folder / "table.md").read_text() == words
-    found["text"] = "new | 1.5\n| \\1 |\n"
-    assert facts.measure(folder, 1, stored_only=False) == []
-    assert (folder / "table.md").read_text() == words.replace("old | 9.9\n", found["text"])
-    assert facts.stored_facts()["tables"]["cars"]["text"] == found["text"]
 
 
 def test_a_fragment_that_is_gone_or_ambiguous_is_named(page):

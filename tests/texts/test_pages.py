@@ -121,7 +121,7 @@ def test_the_example_study_runs(here, capsys):
     runpy.run_path("example.py")
     told = capsys.readouterr().out
     assert "frequency_factor" in told
-    assert "each car" in told
+    assert "path_map" in told
     for words in console_commands(STUDY_FILES):
         assert main(words[1:]) == 0, words
 

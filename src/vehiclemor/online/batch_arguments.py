@@ -112,7 +112,7 @@ def parameter_sets(
     """Parameters (name, value) of each run, none if all have the model's own."""
     if parameters is None:
         return None
-    # What is fitted to one car says so.
+    # What is trained on runs says so.
     reduced.for_parameters({})
     of = reduced.model.definition
     if isinstance(parameters, Mapping):

@@ -64,7 +64,7 @@ def simulate_many(
         these, or states (runs, n).
     parameters
         In SI units: name -> value for all runs, or values by run; or one mapping for each run.  Of
-        a model whose method gives other cars than its own, see `ReducedOrderModel.for_parameters`.
+        a model whose method learns from no run, see `ReducedOrderModel.for_parameters`.
     outputs
         Names of outputs, coordinates or speeds to be kept; by default all outputs.
     times

@@ -14,23 +14,16 @@ import numpy as np
 
 from vehiclemor.codegen.foreign_texts import MOST_CHARACTERS, MOST_SIZE, check_line
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.reduction.cars import Cars
-from vehiclemor.reduction.methods import path_map, polynomial_residual
+from vehiclemor.reduction.methods import guarded, path_map, polynomial_residual
 from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
-from vehiclemor.reduction.projection.car_subspaces import Subspaces
-from vehiclemor.reduction.projection.dynamic import DynamicProjection
-from vehiclemor.reduction.projection.pod_settings import Formulation
 from vehiclemor.reduction.reduced_system import FullStates, ReducedSystem
 from vehiclemor.reduction.validation import checked_fit
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.slow_cars import SlowVehicle
-from vehiclemor.reduction.vehicle.two_track_cars import TwoTrackVehicle
-from vehiclemor.reduction.vehicle.two_track_fit import FEATURES
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import FORMULATIONS, ProjectionWindows
 from vehiclemor.simulation.system import System
@@ -47,9 +40,6 @@ def check(part: Any, model: Model) -> None:
         for name, kind in _declared(type(part)).items():
             _require(_is(getattr(part, name), kind), name)
     match part:
-        case Cars():
-            components = len(model.parameters.flat())
-            _shaped("cars", (part.values, max(len(part.values), 1), components))
         case InputRange():
             kinds = 1 if model.kind == "ae" else 3
             _shaped("largest", (part.largest, kinds, len(model.inputs)))
@@ -68,7 +58,7 @@ def check(part: Any, model: Model) -> None:
                 _shaped(name, (getattr(part, name), samples, len(getattr(model, name))))
         case GuardedModel():
             for each in (part.fast, part.safe):
-                checked_fit(part.fast_name, each)
+                checked_fit(guarded.NAME, each)
         case AlgebraicProjection():
             n = len(part.model.coordinates)
             _require(len(part.edges) == len(part.bases) + 1, "edges")
@@ -156,15 +146,6 @@ def _check_vehicle(part: ReducedVehicle) -> None:
     for vectors in (part.transient.left, part.transient.right):
         _require(not modes or vectors.shape == (modes, n), "transient")
     _require(modes <= n, "transient")
-    if isinstance(part, SlowVehicle) and part.box is not None:
-        box, free = part.box, sum(len(terms) for terms, _ in part.box.table.free)
-        _shaped("box", (box.coefficients, *part.coefficients.shape))
-        _shaped("box", (box.changes, 1 + len(box.cars.varied), free))
-        _require(box.table.features == own, "box")
-    if isinstance(part, TwoTrackVehicle) and part.box is not None:
-        # Of these another car's features are made.
-        texts = {*own.terms, *lifted.terms}
-        _require(all(set(part.box.chosen[kind]) <= texts for kind in FEATURES), "box")
     reach = part.reach
     if reach.inputs.size:
         _shaped("reach", (reach.inputs, 3, inputs))
@@ -200,22 +181,6 @@ def _check_reduced_system(part: ReducedSystem) -> None:
     for name in results.keys() & system.kernels.sources.keys():
         system.kernels.sources[name].check(dim, system.inputs, len(system.constants), results[name])
     _check_windows(spaces, dim)
-    if isinstance(part, DynamicProjection) and part.subspaces is not None:
-        _check_subspaces(part.subspaces, dim)
-
-
-def _check_subspaces(part: Subspaces, dim: int) -> None:
-    width, windows = len(part.weight), len(part.local)
-    _require(width in (dim, dim // 2) and len(part.edges) == windows + 1 > 1, "subspaces")
-    _require(part.formulation in get_args(Formulation), "formulation")
-    _shaped("weight", (part.weight, width, width))
-    cars = len(part.local[0].means)
-    _require(cars in (1, len(part.cars.values)), "cars")
-    for local in part.local:
-        rank = local.origin.shape[-1]
-        _require(rank <= width, "origin")
-        _shaped("means", (local.means, cars, dim), (local.origin, width, rank))
-        _shaped("tangents", (local.tangents, cars, width, rank))
 
 
 def _check_windows(part: ProjectionWindows, dim: int) -> None:

@@ -31,13 +31,11 @@ from vehiclemor.simulation.model import Model
 # Where the classes and functions are that are parts of reduced models; `bounds` checks their sizes.
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
 PARTS = (
-    *("AlgebraicProjection", "Basis", "Box", "CarChecks", "Cars", "Cells", "Chosen", "Drive"),
-    *("DynamicProjection", "ExactVehicle", "FeatureTable", "Features", "FullOrderModel"),
-    *("FullStates", "GuardedModel", "HeadingFrame", "Input", "InputRange", "LocalBases"),
-    *("Offline", "PathMapModel", "PolynomialResidualModel", "ProjectionWindows", "Ranges"),
-    *("ReducedSystem", "ReducedVehicle", "ReplayModel", "Sampled", "Sizes", "SlowModes"),
-    *("SlowVehicle", "Subspaces", "System", "TrainingReach", "Trajectory", "Transient"),
-    *("Trust", "TwoTrackVehicle", "VehicleShape", "_nothing_told", "_own_path", "_same_state"),
+    *("AlgebraicProjection", "Basis", "Cells", "DynamicProjection", "ExactVehicle", "Features"),
+    *("FullOrderModel", "FullStates", "GuardedModel", "HeadingFrame", "InputRange", "Offline"),
+    *("PathMapModel", "PolynomialResidualModel", "ProjectionWindows", "ReducedSystem"),
+    *("ReducedVehicle", "ReplayModel", "System", "TrainingReach", "Trajectory", "Transient"),
+    *("Trust", "VehicleShape", "_nothing_told", "_own_path", "_same_state"),
     *("every_state", "judge"),
 )
 # Methods that are.

@@ -51,15 +51,15 @@ def reduced_sensitivities(
     Raises
     ------
     InputError
-        Moreover if the reduced model has no state, is fitted to one car, has subspaces that follow
-        from the car, or gives its full states by other than one kernel.
+        Moreover if the reduced model has no state, is trained on runs, or gives its full states by
+        other than one kernel.
     """
     model, own = reduced.model, reduced.state_space
     along = components(model, names)
     if not isinstance(own, ReducedSystem) or not _lifts(own):
         raise InputError(
-            f"{reduced.method}: its runs have no derivatives by parameters; those of projections "
-            f"of the state, frozen_inertia, independent_coordinates and softened_slip have"
+            f"{reduced.method}: its runs have no derivatives by parameters; those of "
+            f"frozen_inertia, independent_coordinates and softened_slip have"
         )
     with_tangents(own.spaces)
     maneuver = checked_maneuver(maneuver, model.definition)
@@ -102,14 +102,6 @@ def _of_cars(
             if value != component.value
         }
         car: Any = reduced.for_parameters(changed).state_space
-        if any(
-            not np.array_equal(getattr(car.spaces, name), getattr(own.spaces, name))
-            for name in ("means", "trial_basis", "test_basis")
-        ):
-            raise InputError(
-                f"{reduced.method}: its subspaces follow from {', '.join(changed)}, so its runs "
-                f"have no derivatives (they don't with inner_product='euclidean' and one basis)"
-            )
         state = car.encode(car.model.start(start), inputs)
         return np.concatenate([car.system.constants, state])
 

@@ -25,7 +25,6 @@ from vehiclemor.study.input_range import InputRange, input_range
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.plans.training import Given, training_set
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.training_cars import Box, of_cars
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -113,41 +112,32 @@ class ReducedOrderModel(ShortRepr):
         begun = self.model.starts[0] if start is None else start
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             run = self.reduced.simulate(chosen, begun)
-        if self.outside and (run.status == "untrusted" or not (run.trust and run.trust.reason)):
-            return run.judged(self.outside)
         if run.trust or self._range is None:
             return run
         own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
         return run.judged(self._range.trust(self.model, Scenario(chosen, own)))
 
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
-        """The reduced model of another car: what follows from its parameters is made anew.
-
-        Beyond the `cars` of the training, or doubted by runs of its own, it is not trusted.
+        """The model with other parameters, reduced by a method that learns from no run.
 
         Parameters
         ----------
         parameters
-            Name -> value in SI units of what differs from this car.
+            Name -> value in SI units of what differs from this model.
 
         Raises
         ------
         VehiclemorError
-            If a parameter is wrong, the car can't stand, or the method is fitted to one car.
+            If a parameter is wrong, the model can't stand, or the method is trained on runs.
         """
-        from vehiclemor.reduction.validation import of_car
+        from vehiclemor.reduction.validation import for_model
         from vehiclemor.simulation.build import reparametrised
         from vehiclemor.study.method_settings import for_method
 
-        car, method = reparametrised(self.model, parameters), component("method", self.method)
+        model, method = reparametrised(self.model, parameters), component("method", self.method)
         settings = for_method(self.model, self.method, self.settings)
-        reduced = of_car(method, self.reduced, car, settings)
-        return replace(self, model=car, reduced=reduced, known=self.input_range)
-
-    @cached_property
-    def outside(self) -> Trust | None:
-        """What is told of the car, if it lies beyond those of the training or is doubted."""
-        return self.input_range.outside(component("method", self.method), self.model, self.reduced)
+        reduced = for_model(method, self.reduced, model, settings)
+        return replace(self, model=model, reduced=reduced, known=self.input_range)
 
     @cached_property
     def _range(self) -> InputRange | None:
@@ -276,7 +266,7 @@ class ReducedOrderModel(ShortRepr):
         not in a state.
         """
         states, u, _ = self._samples(state, inputs)
-        found = self.outside or self.state_space.trust(states, u)
+        found = self.state_space.trust(states, u)
         if found is None and self._range is not None:
             found = self._range.trust_of_inputs(self.inputs, u)
         left = self._left_validity(states, u)
@@ -353,7 +343,6 @@ def reduce(
     method: str,
     *,
     training: Given | None = None,
-    cars: Box | Sequence[Mapping[str, Any]] = (),
     preset: str = "recommended",
     **settings: object,
 ) -> ReducedOrderModel:
@@ -369,11 +358,6 @@ def reduce(
         `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
         the model's own protocol, which is the default of the methods that compete there.  Or the
         name of a maneuver, a maneuver, a signal, a scenario, or a list of these.
-    cars
-        Cars whose runs are learnt from beside the model's own, each with a few of the training:
-        names of parameters with the two ends of their ranges, in which some cars are chosen, or a
-        list of cars, each its parameters in SI units.  `for_parameters` then gives the reduced
-        model of any car between them.
     preset, **settings
         Of the method; see `describe()`.
 
@@ -395,9 +379,7 @@ def reduce(
         raise InputError(reason)
     complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
     checked_settings(definition, ready, complete)
-    if isinstance(cars, Mapping) and not cars:
-        raise InputError("cars: a box without parameters")
-    scenarios = of_cars(ready, training_set(ready, method, training), cars)
+    scenarios = training_set(ready, method, training)
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
         reduced = fitted(definition, ready, runs, complete)

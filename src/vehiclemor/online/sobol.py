@@ -1,4 +1,4 @@
-"""Sobol indices: how much of an objective's spread over a box of cars is whose."""
+"""Sobol indices: how much of an objective's spread over a box of parameters is whose."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def sobol_indices(
     Parameters
     ----------
     model
-        Full model, its name, or a reduced model that knows other cars than its own.
+        Full model, its name, or a reduced model whose method learns from no run.
     objectives
         Names of objectives, see `objectives()`.
     box

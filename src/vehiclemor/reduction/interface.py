@@ -100,9 +100,8 @@ class Method(ShortRepr):
     refusal
         Model of such a kind -> why the method can't reduce it all the same; empty if it can.
     learns_from
-        Cars whose runs `fit` may learn from: `own`, that of the model alone; `any`, others too, as
-        each run's own `model` tells; `inputs`: of runs it looks at the inputs at most, so that it
-        is as good for one car as for another.
+        What `fit` looks at: `runs` of the model that it reduces; of runs the `inputs` at most, so
+        that nothing is learnt of the model's parameters.
     own_limits
         Whether its runs tell themselves when they leave what the model knows, or it knows no
         bounds; else a run beyond the inputs of the training runs is not trusted.
@@ -127,7 +126,7 @@ class Method(ShortRepr):
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all
-    learns_from: Literal["own", "any", "inputs"] = "own"
+    learns_from: Literal["runs", "inputs"] = "runs"
     own_limits: bool = False
     follows_time: bool = False
     fits_others: bool = False

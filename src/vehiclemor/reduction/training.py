@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
+from vehiclemor.multibody.vehicle_parameters import DROP
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 HISTORIES = ("time", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
+# Parameters that say how a run starts, not which model it is of.
+OF_STARTS = ("initial_speed", *DROP)
 
 
 @dataclass(frozen=True)
@@ -49,3 +52,16 @@ class TrainingRun(ShortRepr):
 
 
 Training = Sequence[TrainingRun]
+
+
+def difference(model: Model, other: Model) -> str:
+    """The first parameter in which two models differ; empty if they are one."""
+    if model.parameters is other.parameters:
+        return ""
+    others = other.parameters.values()
+    differing = (
+        name
+        for name, value in model.parameters.values().items()
+        if name not in OF_STARTS and not np.array_equal(value, others[name])
+    )
+    return next(differing, "")

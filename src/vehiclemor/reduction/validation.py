@@ -9,10 +9,9 @@ from pydantic import ValidationError
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError, PlugInError, blamed, printable
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
-from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.training import Training, difference
 from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
@@ -77,12 +76,12 @@ def fitted(
     Raises
     ------
     InputError
-        If it learns from its own car alone and a training run is of another one, or `fit` refuses.
+        If it learns from runs and one of the training is of another model, or `fit` refuses.
     """
-    for run in training if method.learns_from == "own" else ():
+    for run in training if method.learns_from == "runs" else ():
         if name := difference(model, run.model):
             raise InputError(
-                f"{method.name} learns from runs of the car that it reduces alone: {name} of a "
+                f"{method.name} learns from runs of the model that it reduces alone: {name} of a "
                 f"training run is another"
             )
     more = (others,) if others and method.fits_others else ()
@@ -90,22 +89,22 @@ def fitted(
         return checked_fit(method.name, method.fit(model, training, settings, *more))
 
 
-def of_car(method: Method, reduced: ReducedModel, model: Model, settings: Any) -> ReducedModel:
-    """A reduced model remade for another car: what follows from its parameters, and no fit.
+def for_model(method: Method, reduced: ReducedModel, model: Model, settings: Any) -> ReducedModel:
+    """What a method that learns from no run gives of a model with other parameters.
 
     Raises
     ------
     InputError
-        If the method does not know how.
+        If the method learns from runs.
     """
-    if (remade := getattr(reduced, "for_car", None)) is not None:
-        with blamed(f"method {method.name!r}: for_car", remade):
+    if method.learns_from != "inputs":
+        raise InputError(
+            f"{method.name} is trained on runs of one model: reduce that with the other parameters"
+        )
+    if (remade := getattr(reduced, "for_model", None)) is not None:
+        with blamed(f"method {method.name!r}: for_model", remade):
             return checked_fit(method.name, remade(model))
-    if method.learns_from == "inputs":
-        return fitted(method, model, (), settings)
-    raise InputError(
-        f"{method.name} is fitted to one car: reduce the model with the other parameters"
-    )
+    return fitted(method, model, (), settings)
 
 
 def checked_fit(method: str, reduced: Any) -> Any:

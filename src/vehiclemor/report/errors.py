@@ -111,24 +111,6 @@ def counted_ends(dataset: xr.Dataset) -> str:
     return ends_text(ends.tolist(), int(doubted.sum())) + told
 
 
-def by_cars(dataset: xr.Dataset, kept: Sequence[str]) -> xr.Dataset:
-    """Variables of cells of a study whose axis `cars` has become a part of its methods.
-
-    What a method was trained on makes another of it; one that learns from no car stays one.
-    """
-    if dataset.sizes.get("cars", 1) == 1:
-        return dataset[list(kept)]
-    dataset = dataset[[*kept, "cell_key"]]
-    parts: list[xr.Dataset] = []
-    for method in dataset["method"].values:
-        part = dataset.sel({"method": [method]})
-        learns = bool((part["cell_key"] != part["cell_key"].isel(cars=0)).any())
-        for cars in part["cars"].values[: None if learns else 1]:
-            label = f"{method}, cars {cars}" if learns else str(method)
-            parts.append(part.sel(cars=cars, drop=True).assign_coords(method=[label]))
-    return xr.concat(parts, "method", combine_attrs="override")
-
-
 def flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:
     """One row for each cell of a study: its place in the grid, errors, counts, status."""
     grid = list(dataset["status"].dims)

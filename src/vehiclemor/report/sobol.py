@@ -50,8 +50,6 @@ class SobolFile(FileSchema):
 def sobol_dataset(model: str, results: Path) -> xr.Dataset:
     """Indices of a model on the dimension `model`, from the results folder or computed now.
 
-    Reduced models that learn from runs do from those of the maneuver, of cars all over the box.
-
     Raises
     ------
     InputError
@@ -87,14 +85,10 @@ def sobol_dataset(model: str, results: Path) -> xr.Dataset:
 def _indices(declared: SobolFile, own: Contestant) -> xr.Dataset:
     from vehiclemor.online.rom import reduce
     from vehiclemor.online.sobol import sobol_indices
-    from vehiclemor.registry import component
     from vehiclemor.simulation.build import build
 
     full, maneuver = build(declared.model, None, declared.parameters), declared.maneuver
-    how: dict[str, Any] = dict(own.settings)
-    if component("method", own.method).learns_from == "any":
-        how |= {"training": [component("maneuver", maneuver)], "cars": declared.box}
-    reduced = reduce(full, own.method, **how)
+    reduced = reduce(full, own.method, **own.settings)
     return sobol_indices(
         reduced, declared.objectives, declared.box, maneuver=maneuver, samples=declared.samples
     )

@@ -15,7 +15,7 @@ from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import checked_run, checked_settings, fitted, of_car
+from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
 from vehiclemor.reduction.vehicle.acceptance import no_vehicle
 from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
@@ -29,12 +29,10 @@ from vehiclemor.study.input_range import input_range
 from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.method_settings import Settings, default_settings, for_method
 from vehiclemor.study.result import (
-    FitCost,
     Outcome,
     errors_dataset,
     fit_cost,
     metrics_dataset,
-    total_cost,
 )
 from vehiclemor.study.scenario import (
     Overrides,
@@ -42,7 +40,6 @@ from vehiclemor.study.scenario import (
     car_of,
     in_training,
     start_of,
-    trained_for,
     training_run,
     with_parameters,
 )
@@ -64,7 +61,7 @@ class Fit(NamedTuple):
     model
         The experiment's.
     car
-        What differs from it in the car whose equations are reduced; training runs may be of others.
+        What differs from it in the model that is reduced.
     settings
         As text.
     """
@@ -74,11 +71,6 @@ class Fit(NamedTuple):
     method: str
     settings: str
     training: tuple[Scenario, ...]
-
-    @property
-    def shared(self) -> bool:
-        """Whether it is for another car than those that all of it is learnt from."""
-        return bool(self.car) and all(run.parameters != self.car for run in self.training)
 
 
 @dataclass
@@ -119,16 +111,12 @@ def evaluate(
 def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -> xr.Dataset:
     refused = refusal(model, experiment)
     solve = kept_reference if kept else recent_reference
-    fitted, car, costs = Fitted(Failure("error", "")), None, dict[Any, FitCost]()
+    if kept or refused:
+        fitted = Fitted(refused or kept_fit(model, experiment))
+    else:
+        fitted = recent_fit(model, experiment)
     outcomes: list[Outcome | Failure] = []
     for scenario in experiment.test:
-        if scenario.parameters != car:
-            car = scenario.parameters
-            if kept or refused:
-                fitted = Fitted(refused or kept_fit(model, experiment, scenario))
-            else:
-                fitted = recent_fit(model, experiment, scenario)
-            costs[car] = fit_cost(fitted.reduced)
         outcome: Any = refused
         if errors and not refused:
             outcome = attempt(partial(solve, model, scenario), "the full-order reference: ")
@@ -136,7 +124,7 @@ def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -
             outcome = _tested(model, fitted, scenario, outcome, experiment)
         outcomes.append(outcome)
     if experiment.keep == "errors":
-        return errors_dataset(model, experiment, outcomes, total_cost(costs.values()))
+        return errors_dataset(model, experiment, outcomes, fit_cost(fitted.reduced))
     car = car_of(model, experiment.test[0])
     seen = not isinstance(outcomes[0], Failure) and _seen(model, experiment)
     return metrics_dataset(car, experiment, outcomes[0], fitted.reduced, seen)
@@ -209,30 +197,22 @@ recent_reference = lru_cache(maxsize=RECENT)(reference_run)
 kept_reference = lru_cache(maxsize=1024)(reference_run)
 
 
-def _wanted(model: Model, experiment: Experiment, test: Scenario | None = None) -> Fit:
-    test = test or experiment.test[0]
-    training, settings = trained_for(experiment.training, test), _text(experiment.settings)
-    return Fit(model, test.parameters or (), experiment.method, settings, training)
+def _wanted(model: Model, experiment: Experiment) -> Fit:
+    settings = _text(experiment.settings)
+    car = experiment.test[0].parameters
+    return Fit(model, car, experiment.method, settings, experiment.training)
 
 
-def fresh_fit(
-    model: Model, experiment: Experiment, test: Scenario | None = None
-) -> ReducedModel | Failure:
-    """Fit the method on the training scenarios, and on nothing else.
-
-    Parameters
-    ----------
-    test
-        Scenario of the car to which it is fitted; the first by default.
-    """
-    return _fit(_wanted(model, experiment, test))
+def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
+    """Fit the method on the training scenarios, and on nothing else."""
+    return _fit(_wanted(model, experiment))
 
 
-def recent_fit(model: Model, experiment: Experiment, test: Scenario) -> Fitted:
+def recent_fit(model: Model, experiment: Experiment) -> Fitted:
     """As `fresh_fit`, but what was lately fitted alike is used again."""
     method: Method = component("method", experiment.method)
     try:
-        return _recent_fit(_wanted(model, experiment, test), method.fit)
+        return _recent_fit(_wanted(model, experiment), method.fit)
     except _FitError as bug:
         return Fitted(bug.args[0])
 
@@ -250,11 +230,9 @@ def _unless_bug(fitted: ReducedModel | Failure) -> ReducedModel | Failure:
     return fitted
 
 
-def kept_fit(
-    model: Model, experiment: Experiment, test: Scenario | None = None
-) -> ReducedModel | Failure:
+def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
-    return _shared_fit(_wanted(model, experiment, test), experiment.settings)
+    return _shared_fit(_wanted(model, experiment), experiment.settings)
 
 
 def _shared_fit(fit: Fit, settings: Settings) -> ReducedModel | Failure:
@@ -277,10 +255,6 @@ def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
 
     def made() -> ReducedModel:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
-        if fit.shared:
-            of_all = _kept_fit(fit._replace(car=()))
-            if not isinstance(of_all, Failure) and hasattr(of_all, "for_car"):
-                return of_car(method, of_all, with_parameters(fit.model, fit.car), complete)
         return fitted(method, *_given(fit), complete, others)
 
     with one_thread():
@@ -288,7 +262,7 @@ def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
 
 
 def _given(fit: Fit) -> tuple[Model, list[TrainingRun]]:
-    """The car that a method is fitted to, and what it learns from."""
+    """The model that a method is fitted to, and what it learns from."""
     return with_parameters(fit.model, fit.car), [training_run(fit.model, s) for s in fit.training]
 
 
@@ -330,14 +304,14 @@ def _tested(
         car, start = car_of(model, scenario), start_of(model, scenario)
         if experiment.keep == "errors":
             trajectory = _sound(car, reduced, scenario, start)
-            trajectory = warned(model, experiment, scenario, trajectory, reduced)
+            trajectory = warned(model, experiment, scenario, trajectory)
             return Outcome(trajectory, reference, estimate=_estimate(car, trajectory))
         # The first run loads machine code and warms caches, another is timed where it is compared.
         if not fitted.warm and reference is not None:
             checked_run(car, scenario.maneuver, start, reduced)
             fitted.warm = True
         trajectory = _sound(car, reduced, scenario, start)
-        trajectory = _remarked(model, experiment, scenario, trajectory, reduced)
+        trajectory = _remarked(model, experiment, scenario, trajectory)
         if reference is None:
             return Outcome(trajectory, None)
         with blamed(f"method {experiment.method!r}: best_approximation", reduced):
@@ -354,28 +328,21 @@ def _tested(
     return attempt(run)
 
 
-def warned(
-    model: Model, experiment: Experiment, test: Scenario, run: Trajectory, reduced: Any
-) -> Trajectory:
-    """A run; it is not trusted beyond the training's cars, and inputs if its model is silent."""
+def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
+    """A run; it is not trusted beyond the training's inputs if its model is silent."""
     # What has learned from nothing is the full order of a protocol's second runs.
-    if (run.trust and run.trust.reason) or not experiment.training:
+    if not experiment.training:
         return run
     method: Method = component("method", experiment.method)
-    judges_itself = run.trust or method.own_limits
-    if judges_itself and method.learns_from == "inputs":
+    if run.trust or method.own_limits:
         return run
-    known = input_range(model, trained_for(experiment.training, test), method.follows_time)
-    if outside := known.outside(method, car_of(model, test), reduced):
-        return run.judged(outside)
-    return run if judges_itself else run.judged(known.trust(model, test))
+    known = input_range(model, experiment.training, method.follows_time)
+    return run.judged(known.trust(model, test))
 
 
-def _remarked(
-    model: Model, experiment: Experiment, test: Scenario, run: Trajectory, reduced: Any
-) -> Trajectory:
+def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
     """A run with a remark where a protocol would not trust it; its status is the method's own."""
-    judged = warned(model, experiment, test, run, reduced)
+    judged = warned(model, experiment, test, run)
     if judged.status == run.status:
         return run
     told = f"not to be trusted {judged.message}"

@@ -73,6 +73,8 @@ def make_experiment(
     """An experiment with present kernels, parameters and source; settings are complete ones."""
     if keep != "errors" and len(test) != 1:
         raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
+    if any(scenario.parameters != test[0].parameters for scenario in test):
+        raise ValueError("the test scenarios of an experiment are of one model")
     return Experiment(
         model.name,
         model.kernel_hash,

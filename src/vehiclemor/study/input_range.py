@@ -3,14 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.car_checks import doubted
-from vehiclemor.reduction.cars import Cars, cars_of
-from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.trust import (
     EDGE,
     NOTHING,
@@ -44,8 +40,6 @@ class InputRange:
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
         Duration of the longest run in s; a kinematic model has no memory, and any is known.
-    cars
-        Those of the training runs; nothing is told of them where None.
     histories
         Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
         the model follows the times of its training; else none.
@@ -55,16 +49,7 @@ class InputRange:
     speed: float
     reach: float
     longest: float
-    cars: Cars | None = None
     histories: np.ndarray | None = None
-
-    def outside(self, method: Method, car: Model, reduced: Any) -> Trust | None:
-        """What is told of a car beyond those of the training, or that its reduced model doubts.
-
-        A method that is exact for every car has none that lie beyond.
-        """
-        told = self.cars.trust(car) if self.cars and method.learns_from != "inputs" else None
-        return told if told and told.reason else doubted(reduced)
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""
@@ -118,18 +103,17 @@ def input_range(
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
     reach = max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0
-    cars = cars_of(car_of(model, scenario) for scenario in training)
     if model.kind == "ae":
         values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
         largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
-        return InputRange(largest, middle, reach * EDGE, np.inf, cars)
+        return InputRange(largest, middle, reach * EDGE, np.inf)
     longest = max(maneuver.duration for maneuver in maneuvers)
     histories = None
     if follows_time:
         times = np.linspace(0.0, longest, maneuvers[0].samples)
         histories = np.array([maneuver.at(times) for maneuver in maneuvers])
     largest = largest_inputs(maneuvers)
-    return InputRange(largest, middle, reach * EDGE, longest * EDGE, cars, histories)
+    return InputRange(largest, middle, reach * EDGE, longest * EDGE, histories)
 
 
 def _speed(model: Model, scenario: Scenario) -> float:

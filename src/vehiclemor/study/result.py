@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -120,13 +120,6 @@ def fit_cost(reduced: ReducedModel | Failure) -> FitCost:
         return FitCost(0, np.nan, 0)
     offline = reduced.offline
     return FitCost(reduced.effective_rank, offline.seconds, offline.evaluations)
-
-
-def total_cost(costs: Iterable[FitCost]) -> FitCost:
-    """Largest rank and summed costs of the fits to several cars."""
-    ranks, seconds, evaluations = zip(*costs, strict=True)
-    spent = [second for second in seconds if not np.isnan(second)]
-    return FitCost(max(ranks), sum(spent) if spent else np.nan, sum(evaluations))
 
 
 def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:

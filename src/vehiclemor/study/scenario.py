@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -55,14 +55,13 @@ class Scenario:
     speed
         Initial speed in m/s; None is that of the model's parameters, if it has any.
     parameters
-        What differs from the model's parameters in this run.  None, of a training scenario: nothing
-        differs from the car that is tested.
+        What differs from the model's parameters in this run.
     """
 
     maneuver: Maneuver
     start: str | tuple[float, ...]
     speed: float | None = None
-    parameters: Overrides | None = ()
+    parameters: Overrides = ()
 
     @property
     def label(self) -> str:
@@ -72,7 +71,7 @@ class Scenario:
         words = [run.name, *factors, self.start if isinstance(self.start, str) else "own state"]
         if self.speed is not None:
             words.append(f"{self.speed:g} m/s")
-        words += [f"{name} {_short(value)}" for name, value in self.parameters or ()]
+        words += [f"{name} {_short(value)}" for name, value in self.parameters]
         return ", ".join(words)
 
     @property
@@ -172,7 +171,7 @@ def car_of(model: Model, scenario: Scenario) -> Model:
     VehiclemorError
         If a parameter is wrong, or the car can't be assembled or can't stand.
     """
-    return with_parameters(model, scenario.parameters or ())
+    return with_parameters(model, scenario.parameters)
 
 
 def with_parameters(model: Model, parameters: Overrides) -> Model:
@@ -184,7 +183,7 @@ def start_of(model: Model, scenario: Scenario) -> Start:
     """What its car starts from: a name, or at another speed than its own the state (n,)."""
     if scenario.speed is None or scenario.speed == own_speed(car_of(model, scenario)):
         return scenario.start
-    return _state_at(model, (*(scenario.parameters or ()), (SPEED, scenario.speed)), scenario.start)
+    return _state_at(model, (*scenario.parameters, (SPEED, scenario.speed)), scenario.start)
 
 
 # More than the runs of a protocol, over which all rows go.
@@ -203,16 +202,9 @@ def training_run(model: Model, scenario: Scenario) -> TrainingRun:
     return TrainingRun(car_of(model, scenario), scenario.maneuver, start_of(model, scenario))
 
 
-def trained_for(training: Sequence[Scenario], test: Scenario) -> tuple[Scenario, ...]:
-    """Training scenarios of which those of the tested car have the parameters of a test."""
-    own = test.parameters
-    return tuple(replace(s, parameters=own) if s.parameters is None else s for s in training)
-
-
 def in_training(model: Model, training: Sequence[Scenario], test: Scenario) -> bool:
     """Whether a run is among those of a training, or the beginning of one, whatever its name."""
-    runs = trained_for(training, test)
-    return any(run == test or _alike(model, run, test) for run in runs)
+    return any(run == test or _alike(model, run, test) for run in training)
 
 
 def _alike(model: Model, run: Scenario, test: Scenario) -> bool:

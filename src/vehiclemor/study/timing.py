@@ -221,11 +221,11 @@ def _rounds(
     # Each has a name of its own, so that progress never goes back.
     work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
-    fits = [_warm_fits(model, e, wanted[index]) for index, e in enumerate(experiments)]
+    fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
     seconds = np.full((rounds[0] + 1, *shape, 2), np.nan)
     for turn in range(rounds[0] + 1):
         for place, test in enumerate(tests):
-            for index, reduced in enumerate(fit[place] for fit, _ in fits):
+            for index, (reduced, _) in enumerate(fits):
                 # The first round loads machine code, and tells how long a run takes.
                 long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
                 if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
@@ -255,32 +255,18 @@ def called(run: Callable[[], Trajectory], repeats: int) -> tuple[float, float] |
     return float(whole), float(loop)
 
 
-def _warm_fits(
-    model: Model, experiment: Experiment, wanted: np.ndarray
-) -> tuple[list[ReducedModel | None], float]:
-    """Fitted models for every test, and the seconds of fitting one to each car."""
-    cars: dict[object, tuple[ReducedModel | None, float]] = {}
-    for scenario in experiment.test:
-        if scenario.parameters not in cars:
-            # One car tells how long a fit takes.
-            needed = not cars and bool(wanted.any())
-            cars[scenario.parameters] = _warm_fit(model, experiment, scenario, needed)
-    reduced = [cars[scenario.parameters][0] for scenario in experiment.test]
-    return reduced, sum(seconds for _, seconds in cars.values())
-
-
 def _warm_fit(
-    model: Model, experiment: Experiment, test: Scenario, needed: bool
+    model: Model, experiment: Experiment, needed: bool
 ) -> tuple[ReducedModel | None, float]:
     """A fitted model, and the median seconds of fits that found their machine code loaded."""
-    fitted = kept_fit(model, experiment, test)
+    fitted = kept_fit(model, experiment)
     if isinstance(fitted, Failure):
         return None, np.nan
     if not needed or fitted.offline.seconds > LONG_FIT:
         return fitted, fitted.offline.seconds
     seconds: list[float] = []
     while len(seconds) < FITS and sum(seconds) < FIT_SECONDS:
-        fitted = fresh_fit(model, experiment, test)
+        fitted = fresh_fit(model, experiment)
         if isinstance(fitted, Failure):
             return None, np.nan
         seconds.append(fitted.offline.seconds)

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 import vehiclemor as vm
 from vehiclemor.errors import InputError
 from vehiclemor.simulation.input_polynomials import extent_of
-from vehiclemor.study.plans.boxes import boxes_of, drawn
+from vehiclemor.study.plans.boxes import drawn
 from vehiclemor.study.plans.protocol import load_protocol
 
 CAR = "independent_suspension_vehicle"
@@ -84,7 +84,6 @@ def test_steering_of_the_protocol_is_within_what_is_known(name):
     reach = getattr(rom.reduced, "fast", rom.reduced).reach
     known = [*protocol.sets["training"], *protocol.sets["validation"]]
     plan = protocol.definition.drawn
-    plan = plan.model_copy(update={"boxes": boxes_of(protocol.definition, plan)})
     drawn_runs = drawn(protocol.model, plan, "any", "drawn", known)
     for scenario in (*protocol.sets["validation"], *drawn_runs):
         assert reach.driven(scenario.maneuver)[0] <= 1.0

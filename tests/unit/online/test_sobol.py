@@ -65,19 +65,6 @@ def test_what_has_no_effect_has_the_index_zero_and_no_warning(recwarn):
     assert not recwarn.list
 
 
-def test_runs_beyond_the_cars_of_a_reduced_model_are_counted(travel, box):
-    given = {"maneuver": travel, "samples": 8, "jobs": 1}
-    # With fewer modes the runs that check each car doubt it.
-    known = vm.reduce(WISHBONE, "pod", training="nominal", cars=box, rank=7)
-    inside = vm.sobol_indices(known, "bump_steer", box, **given)
-    assert (inside.attrs["untrusted"], inside.attrs["remark"]) == (0, "")
-    wide = {name: (low - 3.0 * (high - low), high) for name, (low, high) in box.items()}
-    beyond = vm.sobol_indices(known, "bump_steer", wide, **given)
-    # A quarter of each range is known.
-    assert 0.8 * beyond.attrs["runs"] < beyond.attrs["untrusted"] <= beyond.attrs["runs"]
-    assert "the cars of the training have" in beyond.attrs["remark"]
-
-
 @pytest.mark.parametrize(
     ("changes", "line"),
     [

@@ -5,7 +5,6 @@ L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Ma
 
 import numpy as np
 
-from vehiclemor.reduction.car_checks import fitted_and_checked
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.projection.pod_settings import (
     PRESETS,
@@ -45,9 +44,7 @@ def fit(
 ) -> ReducedModel:
     """One POD subspace for the whole of the training runs."""
     edges = np.array([0.0, training[0].maneuver.duration])
-    return fitted_and_checked(
-        lambda car, runs: fit_subspaces(car, runs, edges, settings), model, training
-    )
+    return fit_subspaces(model, training, edges, settings)
 
 
 METHOD = Method(
@@ -58,5 +55,4 @@ METHOD = Method(
     presets=PRESETS,
     check=check_subspaces,
     fit=fit,
-    learns_from="any",
 )

@@ -63,10 +63,6 @@ class FullOrderModel(ShortRepr):
         """Number of coordinates."""
         return len(self.model.coordinates)
 
-    def for_car(self, model: Model) -> "FullOrderModel":
-        """The full order of another car."""
-        return FullOrderModel(model, self.solver, self.tolerance)
-
     def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
         """Full-order trajectory at the output times; it may have diverged.
 

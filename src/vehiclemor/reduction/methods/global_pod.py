@@ -109,5 +109,4 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
-    learns_from="any",
 )

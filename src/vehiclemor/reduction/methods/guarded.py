@@ -14,12 +14,11 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.reduction.cars import Cars, cars_of
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.validation import checked_settings, fitted, of_car, validated
+from vehiclemor.reduction.validation import checked_settings, fitted, validated
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
@@ -64,10 +63,6 @@ class GuardedModel(ShortRepr):
         Method of the safe model.
     back
         How many seconds before the fast model leaves the safe one takes over.
-    fast_name
-        Method of the fast model.
-    cars, car
-        Those of the training; what they tell of the car whose models these are, if it is another.
     """
 
     fast: ReducedModel
@@ -77,9 +72,6 @@ class GuardedModel(ShortRepr):
     offline: Offline
     solver: str
     tolerance: float
-    fast_name: str = "slow_manifold"
-    cars: Cars | None = None
-    car: Trust | None = None
 
     @property
     def effective_rank(self) -> int:
@@ -103,22 +95,8 @@ class GuardedModel(ShortRepr):
         """That of the fast model, which tells where it is not to be trusted any more."""
         return self.ahead.state_space  # type: ignore[attr-defined]
 
-    def for_car(self, model: DynamicModel) -> "GuardedModel":
-        """Both models of another car; beyond those of the training the safe one alone runs."""
-        fast, safe = (
-            of_car(component("method", name), part, model, _online(name, part, model))
-            for name, part in ((self.fast_name, self.fast), (self.safe_name, self.safe))
-        )
-        told = self.cars.trust(model) if self.cars else None
-        return replace(self, fast=fast, safe=safe, offline=_both(fast, safe), car=told)
-
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The fast run; from where it can't be trusted on, the safe one."""
-        if self.car and self.car.reason:
-            run = self.safe.simulate(maneuver, start)
-            told = handed_over(0.0, self.safe_name, self.car.reason)
-            remark = "; ".join(part for part in (told, run.remark) if part)
-            return replace(run, remark=remark, trust=self.car)
         run = self.ahead.simulate(maneuver, start)
         if run.status == "ok" and run.trust:
             return run
@@ -182,20 +160,12 @@ def fit(
         _both(fast, safe),
         settings.solver,
         settings.tolerance,
-        settings.fast,
-        cars_of(run.model for run in training),
     )
 
 
 def _both(*models: ReducedModel) -> Offline:
     parts = [model.offline for model in models]
     return Offline(sum(o.seconds for o in parts), sum(o.evaluations for o in parts))
-
-
-def _online(name: str, model: Any, car: DynamicModel) -> Any:
-    """Settings with which a model that needs no training is made again."""
-    known = {n: getattr(model, n) for n in ONLINE if hasattr(model, n)}
-    return validated(component("method", name), car.kind, known)
 
 
 def check(model: DynamicModel, settings: GuardedSettings) -> None:
@@ -244,6 +214,5 @@ METHOD = Method(
     refusal=no_steered_vehicle,
     check=check,
     fit=fit,
-    learns_from="any",
     fits_others=True,
 )

@@ -188,7 +188,7 @@ class PathMapModel(ShortRepr):
             f"{_named(self.model, self.ranges)}"
         )
 
-    def for_car(self, model: AlgebraicModel) -> "PathMapModel":
+    def for_model(self, model: AlgebraicModel) -> "PathMapModel":
         """The map of another mechanism, between the same inputs."""
         number = int(self.cells.numbers.max())
         return _mapped(model, self.ranges, self.degree, number, self.stops)

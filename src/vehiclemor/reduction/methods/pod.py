@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.car_checks import fitted_and_checked
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.projection.pod_settings import (
@@ -73,15 +72,11 @@ def check(model: Model, settings: PodSettings) -> None:
 def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel:
     """One POD subspace for each control period of the training runs."""
     edges = window_edges(training[0].maneuver.duration, settings.control_period)
+    reduced = fit_subspaces(model, training, edges, settings)
     restart = getattr(settings, "restart", "own")
-
-    def made(car: Model, runs: Training) -> ReducedModel:
-        reduced = fit_subspaces(car, runs, edges, settings)
-        if isinstance(reduced, DynamicProjection) and restart != "own":
-            return RestartedProjection(**vars(reduced), moved=restart == "full_model")
-        return reduced
-
-    return fitted_and_checked(made, model, training)
+    if isinstance(reduced, DynamicProjection) and restart != "own":
+        return RestartedProjection(**vars(reduced), moved=restart == "full_model")
+    return reduced
 
 
 METHOD = Method(
@@ -92,6 +87,5 @@ METHOD = Method(
     presets=PRESETS,
     check=check,
     fit=fit,
-    learns_from="any",
     follows_time=True,
 )

@@ -245,5 +245,4 @@ METHOD = Method(
     refusal=refusal,
     check=check,
     fit=fit,
-    learns_from="any",
 )

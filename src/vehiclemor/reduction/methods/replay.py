@@ -11,22 +11,20 @@ import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
-from vehiclemor.reduction.cars import cars_of, difference
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
 @dataclass(frozen=True)
 class ReplayModel(ShortRepr):
-    """Stored training trajectories, and the models that they are of."""
+    """Stored training trajectories."""
 
     model: Model
     recorded: tuple[Trajectory, ...]
-    models: tuple[Model, ...]
     offline: Offline
 
     @property
@@ -37,9 +35,6 @@ class ReplayModel(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The training trajectory whose input is nearest (root mean square) to the maneuver's.
 
-        Of several cars with the same input that of the nearest car, and it says so if this is
-        another one.
-
         Runs of the maneuver's own output times come first.  If there are none, inputs are compared
         over the time that a run and the maneuver share, and the run is read at the maneuver's
         times: between samples linearly, after its end its last value.
@@ -47,39 +42,22 @@ class ReplayModel(ShortRepr):
         self.model.start(start)
         times = maneuver.times
         inputs = maneuver.at(times)
-        runs = list(zip(self.recorded, self.models, strict=True))
-        alike = [run for run in runs if np.array_equal(run[0].time, times)]
-        cars = cars_of(self.models)
-        own = cars.place(self.model)
-        nearest, model = min(
-            alike or runs,
-            key=lambda run: (
-                _distance(run[0], times, inputs),
-                float(np.sum((cars.place(run[1]) - own) ** 2)),
-            ),
-        )
+        alike = [run for run in self.recorded if np.array_equal(run.time, times)]
+        nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
         if not alike:
             nearest = replace(
                 nearest,
                 coordinates=_resampled(nearest.time, nearest.coordinates, times),
                 speeds=_resampled(nearest.time, nearest.speeds, times),
             )
-        # Another car may do anything else.
-        other = difference(self.model, model)
-        told = Trust(np.inf, 0.0, f"it is the run of a car with another {other}") if other else None
-        run = replace(
+        return replace(
             nearest,
             time=times,
             inputs=inputs,
-            outputs=model.outputs_at(nearest.states, inputs),
+            outputs=self.model.outputs_at(nearest.states, inputs),
             counts=dict.fromkeys(self.model.counts, 0),
             seconds=0.0,
         )
-        return run.judged(told)
-
-    def for_car(self, model: Model) -> "ReplayModel":
-        """The same trajectories; another car may be nearer."""
-        return replace(self, model=model, offline=Offline())
 
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
@@ -106,7 +84,7 @@ def fit(model: Model, training: Training, settings: Settings) -> ReplayModel:
     began = time.process_time()
     recorded = tuple(run.recorded() for run in training)
     cost = offline_cost(began, model, recorded)
-    return ReplayModel(model, recorded, tuple(run.model for run in training), cost)
+    return ReplayModel(model, recorded, cost)
 
 
 METHOD = Method(
@@ -114,6 +92,5 @@ METHOD = Method(
     summary="returns the training trajectory, whatever the input: the null hypothesis",
     settings=dict.fromkeys(KINDS, Settings),
     fit=fit,
-    learns_from="any",
     own_limits=True,
 )

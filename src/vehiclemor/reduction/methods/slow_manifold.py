@@ -37,14 +37,12 @@ from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
-from vehiclemor.reduction.vehicle.slow_cars import Member, fitted_box, member, own_and_others
 from vehiclemor.reduction.vehicle.slow_features import (
     FeatureTable,
     feature_table,
     ranges_of,
-    widest,
 )
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes, as_of, slow_modes
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import (
     Target,
     finishes,
@@ -54,8 +52,6 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 
-# Runs of its own car that a box of cars is fitted to, beside fewer of each other one.
-OWN = 36
 # Accuracy of the reduced runs that are compared with training runs.
 REFIT_TOLERANCE = 1e-6
 # Heading (rad) below which its error counts absolutely.
@@ -109,18 +105,11 @@ class SlowManifoldSettings(OnlineSettings):
 def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.process_time()
-    training, others = own_and_others(model, training)
     runs = [run.recorded() for run in training]
     shape = VehicleShape(model)
     modes = slow_modes(shape, settings.fastest, settings.symmetric)
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
     ranges = ranges_of(shape, modes, samples.deviations, samples.inputs)
-    members: list[Member] = []
-    if others:
-        modes = as_of(shape, modes)
-        members = [member(some, modes) for some in (spread(training, OWN / len(training)), *others)]
-        own = ranges_of(shape, modes, samples.deviations, samples.inputs)
-        ranges = widest([own, *(m.ranges for m in members)])
     table = feature_table(
         shape, modes, ranges, settings.nonlinearity, settings.hull, settings.trusted
     )
@@ -129,10 +118,6 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
         reduced = _fitted_on_runs(reduced, table, goals, settings)
-    if members:
-        (odd, _), (even, _) = reduced.features.groups
-        table = replace(table, features=reduced.features, odd=list(odd), even=list(even))
-        reduced = fitted_box(reduced, table, training, members).for_car(model)
     reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,
@@ -214,7 +199,6 @@ def _fitted_on_runs(
 METHOD = Method(
     name="slow_manifold",
     summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
-    learns_from="any",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
     refusal=no_steered_vehicle,

@@ -15,7 +15,6 @@ from dataclasses import replace
 from pydantic import Field
 
 from vehiclemor.multibody.components.tire_coefficients import FIALA
-from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
@@ -23,10 +22,8 @@ from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
-from vehiclemor.reduction.vehicle.two_track_cars import box_of, in_box
 from vehiclemor.reduction.vehicle.two_track_fit import (
     COORDINATES,
-    Chosen,
     Sizes,
     fitted_to,
     free_coefficients,
@@ -85,24 +82,20 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
     own = straight(model, training)
     runs = [run.recorded() for run in own]
     sizes = Sizes(*(getattr(settings, name) for name in Sizes._fields))
-    chosen: Chosen = {}
-    reduced, samples = fitted_to(model, runs, sizes, chosen)
+    reduced, samples = fitted_to(model, runs, sizes)
     if settings.sweeps:
         goals = targets(reduced, own, runs, stride=1)
         free = free_coefficients(reduced)
         reduced = improved(reduced, goals, free, settings.sweeps, power=1.0)
         reduced = improved(reduced, goals, free, settings.sweeps)
         reduced = lifted_anew(reduced, own, samples)
-    reduced = replace(
+    return replace(
         reduced,
         reach=training_reach(reduced, own, runs),
         offline=offline_cost(began, model, runs, len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
     )
-    if not any(difference(model, run.model) for run in training):
-        return reduced
-    return in_box(reduced, box_of(reduced, training, own, runs, (sizes, chosen)))
 
 
 METHOD = Method(
@@ -111,6 +104,5 @@ METHOD = Method(
     reference="10.1007/978-3-658-05068-9",
     settings=dict.fromkeys(("ode", "dae"), TwoTrackSettings),
     refusal=refusal,
-    learns_from="any",
     fit=fit,
 )

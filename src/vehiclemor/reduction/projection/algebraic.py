@@ -1,13 +1,12 @@
 """Reduced algebraic equations on one affine subspace in each time window."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.car_checks import CarChecks, checked
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
@@ -38,8 +37,6 @@ class AlgebraicProjection(SolvedAnywhere):
         Test bases (n, r) of the windows; None for least squares.
     tolerance
         Largest step of the last iteration (reduced coordinates).
-    checks, doubt
-        As of `DynamicProjection`.
     """
 
     model: AlgebraicModel
@@ -48,8 +45,6 @@ class AlgebraicProjection(SolvedAnywhere):
     tests: tuple[np.ndarray, ...] | None
     offline: Offline
     tolerance: float
-    checks: CarChecks | None = None
-    doubt: str = ""
 
     @property
     def effective_rank(self) -> int:
@@ -78,10 +73,6 @@ class AlgebraicProjection(SolvedAnywhere):
         loop = model.loop("projected_path", "reduction.projection.algebraic_loops")
         buffer = np.empty(4 * n + len(model.inputs) + n * n + 2 * n * (n + 1))
         return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]
-
-    def for_car(self, model: AlgebraicModel) -> "AlgebraicProjection":
-        """The equations of another mechanism in the same subspaces."""
-        return checked(replace(self, model=model), self.checks, time.process_time())
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""

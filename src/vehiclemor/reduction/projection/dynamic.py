@@ -7,19 +7,15 @@ compared.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Self
 
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.car_checks import CarChecks, checked
-from vehiclemor.reduction.cars import cars_of
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
-from vehiclemor.reduction.projection.car_subspaces import Subspaces, local_bases
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
 from vehiclemor.reduction.projection.windows import by_window
@@ -41,32 +37,9 @@ class DynamicProjection(ReducedSystem):
         Basis of each window, orthonormal in its inner product: of the states for `state`, else of
         the coordinates; `spaces` are the same for the compiled loops.  Each window starts where the
         one before has ended.
-    subspaces
-        What they follow from, for other cars.
-    checks, doubt
-        Runs that check a car, if it was learnt from several; why no run is trusted.
     """
 
     bases: tuple[Basis, ...] = ()
-    subspaces: Subspaces | None = None
-    checks: CarChecks | None = None
-    doubt: str = ""
-
-    def for_car(self, model: DynamicModel) -> Self:
-        """The equations of another car in its subspaces."""
-        if self.subspaces is None:
-            raise InputError(f"the subspaces belong to one car of {model.name}")
-        began = time.process_time()
-        spaces, bases = self.subspaces.of(model)
-        found = replace(
-            self,
-            model=model,
-            system=model.system,
-            spaces=spaces,
-            bases=bases,
-            effective_rank=max(basis.rank for basis in bases),
-        )
-        return checked(found, self.checks, began)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
@@ -131,8 +104,7 @@ def fit_windows(
 ) -> DynamicProjection:
     """POD subspaces of equidistant snapshots (both ends included) of all runs.
 
-    Windows lie between edges (windows + 1,) in s.  Runs of one car stand side by side, and so do
-    those of several unless their subspaces are interpolated.
+    Windows lie between edges (windows + 1,) in s.
 
     Raises
     ------
@@ -151,28 +123,52 @@ def fit_windows(
     histories = [run.at(unique) for run in training]
     states = np.array([history.states[places] for history in histories])
     weight = _weight(model, settings, states.reshape(-1, states.shape[-1]), edges)
-    cars, groups = cars_of(run.model for run in training), [list(range(len(training)))]
-    if settings.bases == "interpolated":
-        numbers = cars.numbers(run.model for run in training)
-        groups = [np.flatnonzero(np.equal(numbers, k)).tolist() for k in range(len(cars.values))]
-    root = np.linalg.cholesky(weight)
     windows = [slice(k * count, (k + 1) * count) for k in range(len(edges) - 1)]
-    local = tuple(
-        local_bases([_basis(states[group, window], root, settings) for group in groups])
-        for window in windows
+    snapshots = [states[:, window].reshape(-1, states.shape[-1]) for window in windows]
+    bases = [_basis(part[:, : len(weight)], weight, settings) for part in snapshots]
+    means = np.array([part.mean(axis=0) for part in snapshots])
+    spaces = _spaces(model, edges, means, bases, (weight, settings.formulation))
+    return projected_equations(
+        model, spaces, bases, offline_cost(began, model, histories), settings
     )
-    subspaces = Subspaces(cars, edges, local, settings.formulation, settings.inner_product, weight)
-    spaces, bases = subspaces.of(model)
-    offline = offline_cost(began, model, histories)
-    found = projected_equations(model, spaces, bases, offline, settings)
-    return replace(found, subspaces=subspaces)
 
 
-def _basis(states: np.ndarray, root: np.ndarray, settings: DynamicPodSettings) -> Basis:
-    """POD basis of states (runs, samples, 2 n) times a root of the weight, and their own mean."""
-    snapshots = states.reshape(-1, states.shape[-1])
-    scaled = pod_basis((snapshots[:, : len(root)] @ root).T, settings.rank, settings.rank_tolerance)
-    return Basis(snapshots.mean(axis=0), scaled.vectors, scaled.singular_values)
+def _basis(snapshots: np.ndarray, weight: np.ndarray, settings: DynamicPodSettings) -> Basis:
+    """POD basis of snapshots (samples, m), orthonormal by the weight (m, m), and their mean."""
+    root = np.linalg.cholesky(weight)
+    scaled = pod_basis((snapshots @ root).T, settings.rank, settings.rank_tolerance)
+    vectors = np.linalg.solve(root.T, scaled.vectors)
+    return Basis(snapshots.mean(axis=0), vectors, scaled.singular_values)
+
+
+def _spaces(
+    model: DynamicModel,
+    edges: np.ndarray,
+    means: np.ndarray,
+    bases: Sequence[Basis],
+    how: tuple[np.ndarray, str],
+) -> ProjectionWindows:
+    """Subspaces around the means (windows, 2 n), by a weight and a formulation, for the loops."""
+    (weight, formulation), n, windows = how, len(model.coordinates), len(bases)
+    rows = max(basis.rank for basis in bases) * (2 if formulation == "paired" else 1)
+    trial, test = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
+    ranks = np.empty(windows, dtype=np.int64)
+    # The speeds that go with rates of the coordinates, where angles are small.
+    turn = (
+        linearisation.speeds_per_rates(model, model.start())
+        if formulation == "paired"
+        else np.eye(n)
+    )
+    back = np.linalg.inv(turn)
+    for k, basis in enumerate(bases):
+        r, width = basis.rank, len(weight)
+        up, down = basis.vectors.T, basis.vectors.T @ weight
+        trial[k, :r, :width], test[k, :r, :width] = up, down
+        if formulation == "paired":
+            trial[k, r : 2 * r, n:], test[k, r : 2 * r, n:] = up @ turn.T, down @ back
+        ranks[k] = r if formulation == "state" else 2 * r
+    form = "coordinates" if formulation == "coordinates" else "state"
+    return ProjectionWindows(form, edges, means, trial, test, ranks)
 
 
 def projected_equations(

@@ -84,11 +84,6 @@ class DynamicPodSettings(ProjectedSettings):
         description="of the snapshots: euclidean, energy (mass matrix), range (each state by its "
         "range)",
     )
-    bases: Literal["concatenated", "interpolated"] = Field(
-        "concatenated",
-        description="trained on several cars: concatenated: one basis of all their snapshots; "
-        "interpolated: each car's own, interpolated on the Grassmann manifold",
-    )
     tolerance: Tolerance = 1e-6
 
 

@@ -77,14 +77,6 @@ class FeatureTable:
         c[even[0], n + 2], c[even[1], n + 2] = shape.speed, 1.0
         c[own, n + 2] = shape.linearised.motion_a[1] @ modes.right[:, k:] * states[k:, 0]
 
-    def turning(self, shape: VehicleShape, modes: SlowModes) -> np.ndarray:
-        """Coefficients (k + 1, 2) of psi' and V by lateral states and steering, without lag."""
-        linear, k = shape.linearised, modes.lateral
-        moved = np.column_stack([modes.right[:, :k], modes.follow])
-        found = (linear.motion_a[[0, 2]] @ moved).T
-        found[k] += linear.motion_b[[0, 2], 0]
-        return found * np.append(self.ranges.states[:k], self.ranges.inputs[0])[:, None]
-
     @property
     def odd_nonlinear(self) -> list[int]:
         """Odd features that are not linear."""
@@ -137,12 +129,6 @@ def arguments_of(
     values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
     values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
     return values
-
-
-def widest(ranges: Sequence[Ranges]) -> Ranges:
-    """Ranges that hold all of these."""
-    parts = (np.max(part, axis=0) for part in zip(*ranges, strict=True))
-    return Ranges(*parts)
 
 
 def feature_parameters(

@@ -5,11 +5,10 @@ that hop of the wheels, spins and stabilised constraints leave no trace in z.  T
 of eigenvalue zero.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from vehiclemor.errors import InputError
 from vehiclemor.reduction.vehicle.lifting import Transient
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
@@ -120,43 +119,6 @@ def slow_modes(
         right[:, still].real / scale,
         Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
     )
-
-
-def as_of(shape: VehicleShape, like: SlowModes) -> SlowModes:
-    """Slow modes of another car in coordinates that are near those of a first one.
-
-    Modes of one frequency turn when parameters change, their span does not: so the coordinates are
-    those of the span, z = w^T d with w^T v = 1 for the first car's v, of the lateral modes and of
-    the symmetric ones.
-
-    Raises
-    ------
-    InputError
-        If the car has not as many slow modes.
-    """
-    found = slow_modes(shape, np.inf, len(_uppers(like)), like.lateral)
-    same = found.left.shape == like.left.shape and found.lateral == like.lateral
-    if not same or len(found.symmetric.rates) != len(like.symmetric.rates):
-        raise InputError(f"this {shape.model.name} has other slow modes than the first car")
-    k = like.lateral
-    turn = np.zeros_like(found.rates)
-    for part in (slice(k), slice(k, None)):
-        turn[part, part] = np.linalg.inv(found.left[part] @ like.right[:, part])
-    back = np.linalg.inv(turn)
-    return replace(
-        found,
-        rates=turn @ found.rates @ back,
-        left=turn @ found.left,
-        right=found.right @ back,
-        drive=turn @ found.drive,
-        feedthrough=turn @ found.feedthrough,
-    )
-
-
-def _uppers(modes: SlowModes) -> np.ndarray:
-    """Eigenvalues of the symmetric modes, one of each conjugate pair."""
-    values = np.linalg.eigvals(modes.rates[modes.lateral :, modes.lateral :])
-    return values[values.imag >= 0.0]
 
 
 def real_modes(

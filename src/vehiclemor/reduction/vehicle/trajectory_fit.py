@@ -11,7 +11,6 @@ Levenberg and Marquardt.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -97,105 +96,42 @@ def targets(
 def improved(
     reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int, power: float = 2.0
 ) -> ReducedVehicle:
-    """The reduced vehicle after so many sweeps, see `improved_together`."""
-    change = improved_together([reduced], [goals], np.ones((1, 1)), free, sweeps, power)
-    return changed(reduced, free, change[0])
-
-
-def improved_together(
-    vehicles: Sequence[ReducedVehicle],
-    goals: Sequence[Sequence[Target]],
-    rows: np.ndarray,
-    free: Free,
-    sweeps: int,
-    power: float = 2.0,
-    change: np.ndarray | None = None,
-) -> np.ndarray:
-    """Change (m, free coefficients) of several cars by so many damped Gauss-Newton steps.
+    """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
 
     Parameters
     ----------
-    goals
-        Of each vehicle.
-    rows
-        Rows (vehicles, m): the coefficients of each change by its row times the result.
     power
         Of the runs' errors in the sum that is made small.  With 1 the worst runs count no more than
         the others (iteratively reweighted least squares): of use from a first guess on, where the
         errors of some are too large to say much.
-    change
-        That is begun with; zero by default.
     """
-    if change is None:
-        change = np.zeros((rows.shape[1], sum(len(terms) for terms, _ in free)))
-    moved = _all_changed(vehicles, rows, free, change)
-    every, error = _all_compared(moved, goals, power)
-    damping = DAMPING
+    paths, error = _compared(reduced, goals, power)
+    change, moved, damping = np.zeros(sum(len(terms) for terms, _ in free)), reduced, DAMPING
     for _ in range(sweeps):
         if not np.isfinite(error):
             break
-        parts = [
-            normal_equations(vehicle, own, paths, free, power)
-            for vehicle, own, paths in zip(moved, goals, every, strict=True)
-        ]
-        gradient = rows.T @ np.array([slope for _, slope in parts])
-        scaled, scale = unit_diagonal(_all_together(rows, np.array([part for part, _ in parts])))
+        normal, gradient = normal_equations(moved, goals, paths, free, power)
+        scaled, scale = unit_diagonal(normal)
         while damping < MOST_DAMPING:
-            step = (
-                np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient.ravel() / scale)
-                / scale
-            )
-            further = change - step.reshape(change.shape)
-            candidates = _all_changed(vehicles, rows, free, further)
-            new, new_error = _all_compared(candidates, goals, power)
+            step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
+            candidate = changed(reduced, free, change - step)
+            new, new_error = _compared(candidate, goals, power)
             if new_error < error:
-                change, moved, every, error = further, candidates, new, new_error
+                change, moved, paths, error = change - step, candidate, new, new_error
                 damping *= 0.1
                 break
             damping *= 10.0
-    return change
+    return moved
 
 
-def _all_changed(
-    vehicles: Sequence[ReducedVehicle], rows: np.ndarray, free: Free, change: np.ndarray
-) -> list[ReducedVehicle]:
-    """Cars with their coefficients changed, see `improved_together`."""
-    return [changed(v, free, row @ change) for v, row in zip(vehicles, rows, strict=True)]
-
-
-def _all_together(rows: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """Sum over cars of the Kronecker products of their rows' squares and normal matrices."""
-    (cars, m), n = rows.shape, parts.shape[1]
-    squares = (rows[:, :, None] * rows[:, None, :]).reshape(cars, m * m)
-    found = (squares.T @ parts.reshape(cars, n * n)).reshape(m, m, n, n)
-    return found.transpose(0, 2, 1, 3).reshape(m * n, m * n)
-
-
-def _all_compared(
-    vehicles: Sequence[ReducedVehicle], goals: Sequence[Sequence[Target]], power: float
-) -> tuple[list[list[np.ndarray]], float]:
-    """Reduced runs of all cars, and the sum of their errors; infinite if one has failed."""
-    found, total = [], 0.0
-    for vehicle, own in zip(vehicles, goals, strict=True):
-        paths, error = _compared(vehicle, own, power)
-        found.append(paths)
-        total += error
-    return found, total
-
-
-def spread(goals: Sequence[Any], share: float, first: float = 0.0) -> list[Any]:
-    """A share of goals or runs, spread without a period: multiples of the golden ratio."""
-    return [goal for i, goal in enumerate(goals) if (first + i * GOLDEN) % 1.0 < share]
+def spread(goals: Sequence[Target], share: float) -> list[Target]:
+    """A share of the goals, spread without a period: multiples of the golden ratio."""
+    return [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
 
 
 def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
     """Whether all reduced training runs come to their end."""
     return bool(np.isfinite(_compared(reduced, goals)[1]))
-
-
-def finished(reduced: ReducedVehicle, goals: Sequence[Target]) -> list[Target]:
-    """Those that the reduced vehicle comes to the end of."""
-    return [g for g in goals if reduced.path(g.run.maneuver, g.run.start) is not None]
 
 
 def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
@@ -226,16 +162,6 @@ def _compared(
         paths.append(path)
         total += float(np.sum(_errors(goal, path, scale) ** 2) ** (0.5 * power))
     return paths, total
-
-
-def planar_errors(reduced: ReducedVehicle, goals: Sequence[Target]) -> np.ndarray:
-    """Errors of heading and place of each run (goals,); infinite if it has failed."""
-    scale, found = _scale(goals), []
-    scale[:-PLANAR] = 0.0
-    for goal in goals:
-        path = reduced.path(goal.run.maneuver, goal.run.start)
-        found.append(np.inf if path is None else np.linalg.norm(_errors(goal, path, scale)))
-    return np.array(found)
 
 
 def _scale(goals: Sequence[Target]) -> np.ndarray:

@@ -1,7 +1,4 @@
-"""Fits of the two-track model to runs of one car, see `methods/two_track.py`.
-
-Which terms there are is chosen once; with the same terms another car's coefficients are ridge fits.
-"""
+"""Fits of the two-track model to runs, see `methods/two_track.py`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,13 +8,11 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.multibody.components.tire_coefficients import FIALA
-from vehiclemor.reduction.cars import difference
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.feature_system import feature_columns
 from vehiclemor.reduction.vehicle.features import PLANAR
-from vehiclemor.reduction.vehicle.landing import PATHS
 from vehiclemor.reduction.vehicle.mirror import mirror
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
@@ -33,12 +28,6 @@ ACCELERATIONS = (0, 1, 3)
 # Symmetric states for which the lifting has terms of its own.
 SEEN = ("theta", "z_dot")
 RIDGE = 1e-12
-
-
-# What terms are for -> those that are chosen: of the equations and the lifting, and by their lines
-# of slips and loads.
-FEATURES = ("odd", "even", "lifted")
-Chosen = dict[str, list[str]]
 
 
 class Sizes(NamedTuple):
@@ -74,14 +63,9 @@ class Samples(NamedTuple):
     shape: ShapeSamples
     outputs: np.ndarray
 
-    def at(self, rows: np.ndarray) -> "Samples":
-        """Some of them (samples,)."""
-        shape = ShapeSamples(*(part[rows] for part in self.shape))
-        return Samples(self.z[rows], self.inputs[rows], self.rates[rows], shape, self.outputs[rows])
-
 
 def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
-    """Training runs of a car that begin in straight running, at any speed.
+    """Training runs that begin in straight running, at any speed.
 
     Raises
     ------
@@ -92,32 +76,20 @@ def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
     dropped = slow_modes(shape, np.inf).symmetric
     found = []
     for run in training:
-        if not difference(model, run.model):
-            deviation = shape.of(model.start(run.start)[None])[0] - shape.reference
-            if not len(dropped.amplitudes(deviation)):
-                found.append(run)
+        deviation = shape.of(model.start(run.start)[None])[0] - shape.reference
+        if not len(dropped.amplitudes(deviation)):
+            found.append(run)
     if not found:
-        raise InputError(f"no training run is of this {model.name} and begins in straight running")
+        raise InputError(f"no training run of {model.name} begins in straight running")
     return found
 
 
 def fitted_to(
-    model: DynamicModel,
-    runs: Sequence[Trajectory],
-    sizes: Sizes,
-    chosen: Chosen,
-    stride: int = 1,
+    model: DynamicModel, runs: Sequence[Trajectory], sizes: Sizes
 ) -> tuple[ReducedVehicle, Samples]:
-    """Slips, loads, accelerations and the other states, fitted to every `stride`th sample of runs.
-
-    Parameters
-    ----------
-    chosen
-        Terms by what they are for; what is missing is chosen and added.
-    """
+    """Slips, loads, accelerations and the other states, fitted to runs."""
     shape = VehicleShape(model)
     modes = slow_modes(shape, np.inf)
-    runs = [thinned(run, stride) for run in runs]
     of_shape = shape_samples(shape, runs)
     encoding = np.zeros((tf.STATES, len(shape.names)))
     for i, name in enumerate(COORDINATES):
@@ -130,11 +102,11 @@ def fitted_to(
         of_shape,
         np.concatenate([run.outputs for run in runs]),
     )
-    text = tire_text(shape, samples, sizes, chosen)
-    return fitted_on_rates(shape, modes, encoding, text, samples, sizes, chosen), samples
+    text = tire_text(shape, samples, sizes)
+    return fitted_on_rates(shape, modes, encoding, text, samples, sizes), samples
 
 
-def tire_text(shape: VehicleShape, samples: Samples, sizes: Sizes, chosen: Chosen) -> tf.Text:
+def tire_text(shape: VehicleShape, samples: Samples, sizes: Sizes) -> tf.Text:
     """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
     z, u = samples.z, samples.inputs
     model, inputs = shape.model, u.shape[1]
@@ -160,13 +132,9 @@ def tire_text(shape: VehicleShape, samples: Samples, sizes: Sizes, chosen: Chose
             mean, half = values @ [0.5, 0.5], values @ [0.5, -0.5]
             for end, target, parity in (("", mean, mean_parity), ("_half", half, 1 - mean_parity)):
                 terms, table, first = parities[parity]
-                line = f"{name}{end}{axle}"
-                if line not in chosen:
-                    found = forward_selection(table, target[:, None], first, sizes.wheel_terms)
-                    chosen[line] = [terms[i] for i in found]
-                numbers = [terms.index(term) for term in chosen[line]]
-                weights = ridge_fit(table[:, numbers], target, RIDGE)
-                text.sum(line, chosen[line], weights.tolist())
+                chosen = forward_selection(table, target[:, None], first, sizes.wheel_terms)
+                weights = ridge_fit(table[:, chosen], target, RIDGE)
+                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights.tolist())
         parameters = {name: float(model.parameters[name]) for name in FIALA}
         tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), sizes.saturation))
     return text
@@ -179,7 +147,6 @@ def fitted_on_rates(
     text: tf.Text,
     samples: Samples,
     sizes: Sizes,
-    chosen: Chosen,
 ) -> ReducedVehicle:
     """Equations fitted to the accelerations of the training runs."""
     z, u, rates, of_shape, _ = samples
@@ -188,25 +155,23 @@ def fitted_on_rates(
     def columns_of(terms: Sequence[str]) -> np.ndarray:
         return feature_columns(text.features(inputs, terms), z, u, parameters)
 
-    def of(
-        kind: str, given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
+    def chosen(
+        given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
     ) -> list[str]:
-        if kind not in chosen:
-            terms = [*given, *(term for term in others if term not in given)]
-            scaled = values / np.sqrt(np.mean(values**2, axis=0))
-            numbers = forward_selection(columns_of(terms), scaled, len(given), more)
-            chosen[kind] = [terms[i] for i in numbers]
-        return chosen[kind]
+        terms = [*given, *(term for term in others if term not in given)]
+        scaled = values / np.sqrt(np.mean(values**2, axis=0))
+        numbers = forward_selection(columns_of(terms), scaled, len(given), more)
+        return [terms[i] for i in numbers]
 
     plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
-    odd = of("odd", plain, tf.odd_candidates(), rates[:, ACCELERATIONS], sizes.terms)
+    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], sizes.terms)
     forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
     symmetric = np.column_stack([rates[:, tf.SPEED], forward])
     candidates = tf.even_candidates(inputs)
-    even = of("even", [f"z{tf.SPEED}"], candidates, symmetric, sizes.even_terms)
+    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, sizes.even_terms)
     terms = [*odd, "1.0", *even]
     seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
-    lifted = of("lifted", terms, candidates, seen, sizes.lifted_terms)
+    lifted = chosen(terms, candidates, seen, sizes.lifted_terms)
     columns = columns_of(terms)
     k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
     lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
@@ -252,17 +217,10 @@ def free_coefficients(reduced: ReducedVehicle) -> Free:
     return [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
 
 
-def thinned(run: Trajectory, stride: int) -> Trajectory:
-    """Every so many samples of a run."""
-    return replace(run, **{name: getattr(run, name)[::stride] for name in PATHS})
-
-
-def lifted_anew(
-    reduced: ReducedVehicle, training: Training, samples: Samples, stride: int = 1
-) -> ReducedVehicle:
+def lifted_anew(reduced: ReducedVehicle, training: Training, samples: Samples) -> ReducedVehicle:
     """The lifting fitted to where the reduced runs are, whose speed has become their own."""
     paths = [reduced.path(run.maneuver, run.start) for run in training]
-    kept = [path[::stride] for path in paths if path is not None]
+    kept = [path for path in paths if path is not None]
     if len(kept) < len(paths):
         return reduced
     assert reduced.lifted_features is not None

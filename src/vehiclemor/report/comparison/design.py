@@ -1,11 +1,8 @@
-"""The paper's claims about design, judged by studies that were measured beforehand.
-
-Two design studies, and many cars of which one reduced model was made.
-"""
+"""The paper's claims about design, judged by two design studies that were measured beforehand."""
 
 from vehiclemor.report.comparison.rows import Row, claim_row
 from vehiclemor.report.criteria.finding import IN_WORDS, OWN, Finding
-from vehiclemor.report.design_studies import FULL, design_space, design_studies
+from vehiclemor.report.design_studies import design_studies
 from vehiclemor.report.published import Claim
 
 FINDS, SAVES = "all_intended_for_full_vehicle_models", "all_essential_for_design"
@@ -30,23 +27,6 @@ def design_rows(claim: Claim) -> list[Row]:
             finding = (_found if claim.id == FINDS else _saved)(values, study, name, full)
             row = claim_row(claim, f"{label}: {name.removesuffix(', differences')}", finding)
             rows.append(row._replace(reason=f"{row.reason}; stored by paper/design_studies.py"))
-    return rows + (_rows_of_cars(claim) if claim.id == FINDS else [])
-
-
-def _rows_of_cars(claim: Claim) -> list[Row]:
-    """A row for each reduced model of many cars, by the input on which it misses more."""
-    rows = []
-    for model, kept in design_space().items():
-        text = f"share of the cars with an error beyond a bound, in %, {kept['cars']} cars"
-        for name in dict.fromkeys(row["method"] for row in kept["rows"]):
-            part = [row for row in kept["rows"] if row["method"] == name]
-            worst = max(part, key=lambda row: (row["missed, %"], row["silent, %"]))
-            seen = f"on the {worst['run']}; {worst['silent, %']:.3g} % are missed in silence, "
-            seen += f"{worst['warned, %']:.3g} % warned of; stored by paper/design_space.py"
-            missed = worst["missed, %"]
-            finding = Finding(missed, 0.0, missed == 0.0, text, seen, OWN)
-            if name != FULL:
-                rows.append(claim_row(claim, f"cars, {model.replace('_', ' ')}: {name}", finding))
     return rows
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.registry import component
-from vehiclemor.report.errors import by_cars, warned_runs
+from vehiclemor.report.errors import warned_runs
 from vehiclemor.report.labels import label_of, trained_runs
 from vehiclemor.report.predictive.rows import protocol_rows
 from vehiclemor.report.predictive.text import predictive_text
@@ -82,7 +82,7 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     errors = ["rms_error", "max_error", "floor_rms_error"]
     told = {"warned": warned_runs(dataset), "trained": trained_runs(dataset)}
     kept = [*errors, "cell_key", "status", "seconds", "offline_seconds", count, *told]
-    small = by_cars(dataset.assign(told), kept).load()
+    small = dataset.assign(told)[kept].load()
     rows: list[Row] = []
     for start in dataset["start"].values:
         for method in small["method"].values:

@@ -36,9 +36,6 @@ def study_description(name: str) -> dict[str, object]:
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
         "training": study.training_words,
-        "cars trained on": study.cars
-        if isinstance(study.cars, str)
-        else f"{len(study.cars)} listed",
         "parameters": ", ".join(f"{key}={value}" for key, value in study.parameters.items()),
         "grid points": study.points,
         "keeps": study.keep,
@@ -49,7 +46,6 @@ def study_description(name: str) -> dict[str, object]:
                 "label": label,
                 "method": entry.method,
                 "preset": entry.preset,
-                "cars": entry.cars,
                 "settings": ", ".join(f"{k}={v}" for k, v in entry.settings.items()),
             }
             for label, entry in study.labelled.items()

@@ -7,7 +7,6 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.report.errors import by_cars
 from vehiclemor.report.figures.grid_errors import (
     MARKERS,
     draw_edges,
@@ -30,7 +29,6 @@ def sample_axis(dataset: xr.Dataset) -> str:
 def figure_samples(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure:
     """RMS errors of all samples: over what was sampled, or beside each other for each method."""
     sample = sample_axis(dataset)
-    dataset = by_cars(dataset, ["rms_error", "status"])
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
     rest = [str(d) for d in errors.dims if d not in (sample, "method", "output")]
     errors = errors.max(rest)

@@ -12,22 +12,12 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import choice, component
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol_file import Box, Draw, ProtocolFile
-from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
+from vehiclemor.study.scenario import Scenario, check, own_speed
 
 # Decimals of drawn factors and speeds: what a table prints is what was run.
 DECIMALS = 3
-# Significant digits of drawn parameters.
-DIGITS = 5
 # Draws tried for each run before a box counts as too small.
 TRIES = 100
-
-
-def boxes_of(definition: ProtocolFile, draw: Draw | None) -> list[Box]:
-    """Boxes of a draw, of the protocol's cars where they name none."""
-    own = {"cars": definition.cars}
-    return [
-        b if b.cars is not None else b.model_copy(update=own) for b in (draw.boxes if draw else ())
-    ]
 
 
 def drawn(
@@ -71,24 +61,15 @@ def _one(model: Model, box: Box, generator: np.random.Generator) -> Scenario:
     speed = own_speed(model) if box.speed is None else within(box.speed)
     starts = box.start or [model.starts[0]]
     start = starts[int(generator.integers(len(starts)))]
-    car = {
-        name: significant(generator.uniform(low, high))
-        for name, (low, high) in (box.cars or {}).items()
-    }
     maneuver: Maneuver = component("maneuver", box.maneuver)
-    return Scenario(maneuver.perturbed(frequency, amplitude), start, speed, overrides(car))
-
-
-def significant(value: float) -> float:
-    """A parameter as a table prints it."""
-    return float(f"{value:.{DIGITS}g}")
+    return Scenario(maneuver.perturbed(frequency, amplitude), start, speed)
 
 
 def check_boxes(model: Model, definition: ProtocolFile) -> None:
     """Raise `InputError` if a corner of a box is no scenario of the model."""
     for purpose in ("drawn", "drawn_outside"):
         draw: Draw | None = getattr(definition, purpose)
-        for number, box in enumerate(boxes_of(definition, draw), start=1):
+        for number, box in enumerate(draw.boxes if draw else (), start=1):
             try:
                 _check_corners(model, box)
             except InputError as error:
@@ -104,6 +85,3 @@ def _check_corners(model: Model, box: Box) -> None:
             for amplitude in box.amplitude:
                 corner = maneuver.perturbed(frequency, amplitude)
                 check(model, Scenario(corner, (box.start or model.starts)[0], speed))
-    for ends in zip(*(box.cars or {}).values(), strict=True):
-        car_of_ends = overrides(dict(zip(box.cars or {}, ends, strict=True)))
-        check(model, Scenario(maneuver, model.starts[0], parameters=car_of_ends))

@@ -22,15 +22,7 @@ from vehiclemor.study.evaluate import refusal
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.method_settings import Settings, complete_settings, default_settings
-from vehiclemor.study.plans.grid_runs import (
-    Cars,
-    Run,
-    check_car,
-    check_run,
-    run_at,
-    scenarios,
-    trained_cars,
-)
+from vehiclemor.study.plans.grid_runs import Run, check_run, run_at, scenarios
 from vehiclemor.study.plans.sampling import sampled
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER, TEXTS, StudyFile, values
 from vehiclemor.study.scenario import Values
@@ -53,8 +45,6 @@ class Grid:
         Name -> values of every grid dimension, the labels of `method` last.
     samples
         Name of what is sampled -> values on the dimension `sample`.
-    trained
-        Name -> cars that are trained on.
     """
 
     name: str
@@ -62,7 +52,6 @@ class Grid:
     model: Model
     dimensions: dict[str, list[Any]]
     samples: dict[str, list[float]]
-    trained: dict[str, Cars]
 
     @property
     def sizes(self) -> Place:
@@ -106,9 +95,6 @@ class Grid:
 
     def check(self) -> None:
         """Raise `VehiclemorError` if a run can't be made, or no settings of a method fit."""
-        for name, cars in self.trained.items():
-            for car in cars or ():
-                check_car(self.model, car, f"car_sets.{name}: " if name else "cars: ")
         names = {name for found in self._settings.values() for name in found}
         runs = [
             range(1 if name in names or name == "method" else size)
@@ -125,7 +111,7 @@ class Grid:
 
     def _run(self, place: Place) -> Run:
         fixed = {"maneuver": self.definition.maneuver or self.model.definition.maneuver}
-        return run_at(self.definition, fixed | self.point(place), self.trained)
+        return run_at(self.definition, fixed | self.point(place))
 
     @cached_property
     def _settings(self) -> dict[str, set[str]]:
@@ -210,7 +196,7 @@ def expand(name: str, study: StudyFile) -> Grid:
         model = build(study.model, overrides=study.parameters)
         samples = sampled(study.sampling) if study.sampling else {}
         dimensions = _dimensions(model, study, samples)
-        grid = Grid(name, study, model, dimensions, samples, trained_cars(study))
+        grid = Grid(name, study, model, dimensions, samples)
         grid.check()
         assert grid.keys.size
         return grid

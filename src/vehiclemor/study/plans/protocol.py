@@ -1,14 +1,14 @@
 """Protocols: training, validation and test scenarios of a model, and who competes on them."""
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import choice, component
-from vehiclemor.resources import data_folder, data_names
+from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
@@ -17,14 +17,11 @@ from vehiclemor.study.plans.boxes import check_boxes
 from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
 from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
-from vehiclemor.study.training_cars import by_cars, of_cars
 from vehiclemor.toml_files import read_toml
 
 SETS = ("training", "validation", "test", "outside")
 # Drawn when all that they test is settled.
 DRAWN = ("drawn", "drawn_outside")
-# Folder of the package's protocols over cars.
-OF_CARS = "car_protocols"
 FULL_ORDER, CONTENDER = "full order", "contender"
 
 
@@ -87,8 +84,7 @@ class Protocol:
 
 def protocol_path(protocol: str) -> Path:
     """Path of a protocol: a name from the package's data, or a TOML file."""
-    folder = OF_CARS if protocol in data_names(OF_CARS) else "protocols"
-    return named_file("protocol", folder, protocol)
+    return named_file("protocol", "protocols", protocol)
 
 
 def load_protocol(protocol: str) -> Protocol:
@@ -119,7 +115,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
     check_boxes(model, definition)
-    contestants = tuple(_contestant(model, e, definition, sets) for e in definition.contestants)
+    contestants = tuple(_contestant(model, e, sets) for e in definition.contestants)
     labels = [label for contestant in contestants for label in contestant.row_labels]
     for label in labels:
         if labels.count(label) > 1:
@@ -138,8 +134,7 @@ def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenar
             # What is stored lists them where there are none.
             if "points" in group.model_fields_set and not group.points:
                 raise InputError("points is empty")
-            runs = _of_group(model, group)
-            found += by_cars(model, runs, definition.cars) if group.cars else runs
+            found += _of_group(model, group)
         except InputError as error:
             raise type(error)(f"{key}, group {number}: {error}") from None
     return tuple(found)
@@ -176,7 +171,6 @@ def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
 def _contestant(
     model: Model,
     entry: ContestantEntry,
-    definition: ProtocolFile,
     sets: dict[str, tuple[Scenario, ...]],
 ) -> Contestant:
     method: Method = component("method", entry.method)
@@ -196,8 +190,4 @@ def _contestant(
     training = tuple(
         s for s in sets["training"] if not entry.train_on or s.maneuver.name in entry.train_on
     )
-    if entry.cars == "own":
-        training = tuple(replace(scenario, parameters=None) for scenario in training)
-    elif entry.cars == "box" and definition.cars and method.learns_from != "inputs":
-        training = of_cars(model, training, definition.cars)
     return Contestant(entry.label, entry.method, entry.role, tuple(candidates), training)

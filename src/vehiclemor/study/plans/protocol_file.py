@@ -33,9 +33,6 @@ class Group(FileSchema):
     frequency: list[float] = Field(default_factory=list, description="factors, 1 by default")
     amplitude: list[float] = Field(default_factory=list, description="factors, 1 by default")
     speed: list[float] = Field(default_factory=list, description="m/s, the model's own by default")
-    cars: bool = Field(
-        False, description="whether each is run by another car of the box, and not by the model's"
-    )
 
     @property
     def scenarios(self) -> int:
@@ -54,9 +51,6 @@ class Group(FileSchema):
 
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
-Cars = dict[str, Range]
-
-
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
@@ -72,13 +66,10 @@ class Box(FileSchema):
     start: list[str] = Field(
         default_factory=list, description="initial conditions, equally likely; the model's first"
     )
-    cars: Cars | None = Field(
-        None, description="parameter -> from and to in SI units; the protocol's box by default"
-    )
 
     @model_validator(mode="after")
     def _ordered(self) -> "Box":
-        ranges = (self.frequency, self.amplitude, self.speed, *(self.cars or {}).values())
+        ranges = (self.frequency, self.amplitude, self.speed)
         for low, high in filter(None, ranges):
             if not (math.isfinite(low) and low <= high < math.inf):
                 raise ValueError("a range is [from, to] with finite numbers in order")
@@ -110,11 +101,6 @@ class ContestantEntry(FileSchema):
     train_on: list[str] = Field(
         default_factory=list, description="maneuvers that it is trained on; all by default"
     )
-    cars: Literal["box", "nominal", "own"] = Field(
-        "box",
-        description="cars that it is trained on: box (the model's and some of the protocol's), "
-        "nominal (the model's), own (refitted to each tested car)",
-    )
 
 
 class SpeedTarget(FileSchema):
@@ -143,11 +129,6 @@ class ProtocolFile(FileSchema):
     bounds: dict[str, Bound] = Field(min_length=1, description="output -> largest allowed error")
     reported: list[str] = Field(
         default_factory=list, description="outputs whose RMS errors are printed beside the bounded"
-    )
-    cars: Cars = Field(
-        default_factory=dict,
-        description="box of cars that are trained on and tested: parameter -> from and to in SI "
-        "units; the model's own car alone by default",
     )
     training: list[Group] = Field(min_length=1, description="what methods learn from")
     validation: list[Group] = Field(min_length=1, description="what candidates are chosen by")

@@ -10,7 +10,7 @@ import json
 from collections.abc import Sequence
 
 from vehiclemor.codegen.cache import source_digest
-from vehiclemor.study.plans.boxes import boxes_of, drawn
+from vehiclemor.study.plans.boxes import drawn
 from vehiclemor.study.plans.choice import Row
 from vehiclemor.study.plans.protocol import DRAWN, Protocol
 from vehiclemor.study.provenance import code_digest
@@ -28,8 +28,6 @@ def rules(protocol: Protocol) -> str:
     """Hash of the bounds, the boxes and the rule of sensitive runs, for the model's parameters."""
     definition = protocol.definition
     content = definition.model_dump(include={"sensitive", "drawn", "drawn_outside"})
-    if definition.cars:
-        content["cars"] = definition.cars
     content["bounds"] = {o: [b.measure, b.bound] for o, b in definition.bounds.items()}
     text = json.dumps([content, parameters_of(protocol.model)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -68,8 +66,6 @@ def sealed_sets(protocol: Protocol, digest: str) -> dict[str, tuple[Scenario, ..
     for name in DRAWN:
         draw = getattr(protocol.definition, name)
         if draw is not None:
-            boxes = boxes_of(protocol.definition, draw)
-            of_cars = draw.model_copy(update={"boxes": boxes})
-            found[name] = drawn(protocol.model, of_cars, digest, name, known)
+            found[name] = drawn(protocol.model, draw, digest, name, known)
             known += found[name]
     return found

@@ -18,7 +18,7 @@ from vehiclemor.toml_files import FileSchema, Line, has_table, read_toml
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
-TEXTS = ("maneuver", "start", "training", "cars")
+TEXTS = ("maneuver", "start", "training")
 PARAMETER = "parameters."
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
@@ -78,7 +78,6 @@ class MethodEntry(FileSchema):
         default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
     )
     training: Training = Field("", description="as of the study, whose it is by default")
-    cars: str = Field("", description="as of the study, whose it is by default")
 
 
 class StudyFile(FileSchema):
@@ -114,22 +113,13 @@ class StudyFile(FileSchema):
         default_factory=list,
         description="of training = set: pairs [frequency factor, amplitude factor]",
     )
-    cars: str | list[Car] = Field(
-        "own",
-        description="cars that are trained on: own (the tested one, a fit each), nominal (the "
-        "study's), one of car_sets, or a list of tables parameter -> value",
-    )
-    car_sets: dict[str, list[Car] | Sampling] = Field(
-        default_factory=dict,
-        description="name -> cars: tables parameter -> value, or a sampling of parameters",
-    )
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
     grid: dict[str, Axis] = Field(
         default_factory=dict,
         description="dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
-        "maneuver, start, training, cars, or any setting",
+        "maneuver, start, training, or any setting",
     )
     sampling: Sampling | None = Field(
         None, description="points of a dimension `sample` beside those of the grid"
@@ -202,7 +192,7 @@ class StudyFile(FileSchema):
         for name in own & set(self.sampling.ranges if self.sampling else ()):
             raise ValueError(f"{name} is set twice: in the sampling and in the study")
         for entry in self.methods:
-            given = {*entry.settings, *(n for n in ("training", "cars") if getattr(entry, n))}
+            given = {*entry.settings, *(["training"] if entry.training else [])}
             for name in self.grid.keys() & given:
                 method = entry.label or entry.method
                 raise ValueError(

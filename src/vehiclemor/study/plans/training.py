@@ -12,7 +12,7 @@ from vehiclemor.resources import data_names
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol
-from vehiclemor.study.scenario import Overrides, Scenario, check
+from vehiclemor.study.scenario import Scenario, check
 
 # One of `NAMED`, the name of a maneuver, or what is run.
 Entry = str | Scenario | Maneuver
@@ -29,7 +29,6 @@ def training_set(
     given: Given | None,
     test: Scenario | None = None,
     factors: Pairs = (),
-    cars: Sequence[Overrides] | None = None,
 ) -> tuple[Scenario, ...]:
     """Training scenarios of a method for a model, see `simulate` and `reduce`.
 
@@ -38,11 +37,9 @@ def training_set(
     given
         None is the training of the model's protocol if the method competes there, else `nominal`.
     test
-        What is tested: maneuvers are run from its start, at its speed, by its car.
+        What is tested: maneuvers are run from its start, at its speed, by its model.
     factors
         Of `set`: pairs (frequency, amplitude).
-    cars
-        Parameters of the cars that are trained on, each with every run; as they are where None.
 
     Raises
     ------
@@ -60,10 +57,7 @@ def training_set(
         if wrong := [entry for entry in entries if isinstance(entry, str) and entry in OF_TESTED]:
             raise InputError(f"training {wrong[0]!r} needs a run that is tested: see simulate")
         test = Scenario(component("maneuver", model.definition.maneuver), model.starts[0])
-    found = [s for entry in entries for s in _scenarios(model, method, entry, test, factors)]
-    if cars is not None:
-        found = [replace(scenario, parameters=car) for car in cars for scenario in found]
-    return tuple(found)
+    return tuple(s for entry in entries for s in _scenarios(model, method, entry, test, factors))
 
 
 def _scenarios(
