@@ -98,9 +98,7 @@ def selected(dataset: xr.Dataset, query: str) -> xr.DataArray:
 def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     """A study, or a table of the report; what the folder lacks is run first."""
     import pandas as pd
-    import xarray as xr
 
-    from vehiclemor.report.design_studies import design_studies
     from vehiclemor.report.predictive.rows import predictive_comparison
     from vehiclemor.report.published import load_published
     from vehiclemor.report.tables import cost_table, operation_table
@@ -120,11 +118,6 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         return pd.DataFrame.from_dict(values, "index").rename_axis("name").to_xarray()
     if kind in SCRIPTS:
         return SCRIPTS[kind].measured(folder)
-    if kind == "design":
-        names, values = zip(*design_studies()["values"].items(), strict=True)
-        plain, units = zip(*(name.rsplit(", ", 1) for name in names), strict=True)
-        coordinates = {"name": list(plain), "output_unit": ("name", list(units))}
-        return xr.Dataset({"value": ("name", list(values))}, coordinates)
     if kind == "published":
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
@@ -147,8 +140,6 @@ def stored_files(source: str, folder: Path) -> list[Path]:
     kind, _, model = source.partition(" ")
     if kind in ("operations", "published"):
         return []
-    if kind == "design":
-        return [ROOT / "data" / "design.json"]
     if kind in FILES:
         return [folder / FILES[kind]]
     studies = [source]
@@ -168,7 +159,6 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
     commands |= {
         "operations": "python paper/regenerate.py",
         "predictive": "vehiclemor compare predictive",
-        "design": "python paper/design_studies.py",
     }
     commands |= {kind: f"python paper/{kind}.py" for kind in SCRIPTS}
     written = max((path.stat().st_mtime for path in files), default=None)

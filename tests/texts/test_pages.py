@@ -147,7 +147,6 @@ def test_a_plug_in_is_made_step_by_step(here, capsys, monkeypatch):
 
 
 PAGES_WITH_CODE = (
-    "design",
     "export",
     "keep-a-model",
     "my-loop",

@@ -5,7 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from vehiclemor.registry import component, names
-from vehiclemor.report.comparison.design import FINDS, SAVES, design_rows
+from vehiclemor.report.comparison.design import CLAIMS, design_rows
 from vehiclemor.report.comparison.rows import (
     COLUMNS,
     Row,
@@ -49,7 +49,7 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
             claims.append(slower_row(claim, costs["double_wishbone"], few=3, many=6))
         elif name == AGREE_AND_SAVE:
             claims += agreement_rows(claim, errors, times)
-        elif name in (FINDS, SAVES):
+        elif name in CLAIMS:
             claims += design_rows(claim)
         elif claim.model is None or claim.model in costs:
             claims += claim_rows(claim, results)

@@ -9,7 +9,6 @@ from pydantic import Field
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import (
-    design,
     equation_order,
     error_map,
     high_fidelity_schematic,
@@ -44,8 +43,6 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "spread": spread.figure_spread,
     "spectrum": spectrum.figure_spectrum,
     "unseen inputs": unseen.figure_unseen,
-    "design front": design.figure_front,
-    "design curves": design.figure_curves,
     "equation order": equation_order.figure_equation_order,
     "pareto": pareto.figure_pareto,
     "result": result_plot.figure_result,
