@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import in_use
-import sensitivities
 from fragments import (
     ROOT,
     manifest,
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 
 FACTS = ROOT / "paper" / "facts.json"
 # Kinds of sources that one file of the results folder holds; and those of a script each.
-SCRIPTS = {"in_use": in_use, "sensitivities": sensitivities}
+SCRIPTS = {"in_use": in_use}
 FILES = {"benchmark": "benchmark.json"} | {kind: script.FILE for kind, script in SCRIPTS.items()}
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")

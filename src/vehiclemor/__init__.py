@@ -25,16 +25,12 @@ if TYPE_CHECKING:
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
     from vehiclemor.online.saved import rom as rom
-    from vehiclemor.online.sensitivities import sensitivities as sensitivities
-    from vehiclemor.online.sobol import sobol_indices as sobol_indices
     from vehiclemor.report.comparison.kinds import compare as compare
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.signal_arrays import many_signals as many_signals
     from vehiclemor.signals import Signal as Signal
-    from vehiclemor.study.objectives import objective as objective
-    from vehiclemor.study.objectives import objectives as objectives
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -55,10 +51,7 @@ _DEFINED_IN = {
     "write_report": "vehiclemor.report.page",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
-    **dict.fromkeys(("objective", "objectives"), "vehiclemor.study.objectives"),
-    "sensitivities": "vehiclemor.online.sensitivities",
     "simulate_many": "vehiclemor.online.batches",
-    "sobol_indices": "vehiclemor.online.sobol",
 }
 __all__ = [
     "Signal",
@@ -75,16 +68,12 @@ __all__ = [
     "methods",
     "model",
     "models",
-    "objective",
-    "objectives",
     "plot",
     "reduce",
     "rom",
     "run_study",
-    "sensitivities",
     "simulate",
     "simulate_many",
-    "sobol_indices",
     "status",
     "studies",
     "write_report",

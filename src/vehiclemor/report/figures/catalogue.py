@@ -17,7 +17,6 @@ from vehiclemor.report.figures import (
     paths,
     perturbations,
     result_plot,
-    sobol,
     spectrum,
     spread,
     suspension_schematic,
@@ -46,7 +45,6 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "equation order": equation_order.figure_equation_order,
     "pareto": pareto.figure_pareto,
     "result": result_plot.figure_result,
-    "sobol": sobol.figure_sobol,
 }
 
 
@@ -113,8 +111,6 @@ OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
 def find(name: str, results: Path) -> list[Entry]:
     """The figure of a name such as `6`, or `histories-<model>`, or all figures of a study.
 
-    `sobol-<model>` has each model of which `data/sobol` declares a box of parameters.
-
     Studies of a model that declares none are written to the results folder.
 
     Raises
@@ -131,14 +127,8 @@ def find(name: str, results: Path) -> list[Entry]:
             for e in _of_a_study(study, *found)
         ]
     kind, _, model = name.partition("-")
-    boxes = data_names("sobol")
-    if kind == "sobol" and model in boxes:
-        options: dict[str, object] = {"model": model, "results": str(results)}
-        caption = f"{model}: first and total Sobol indices of objectives over a box of parameters"
-        return [Entry(name=name, draw="sobol", caption=caption, options=options)]
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
-        known += [f"sobol-{box}" for box in boxes]
         raise unknown("figure", name, [*FIGURES, *known, *data_names("studies"), "FILE.toml"])
     return [_of_a_model(kind, model, results)]
 
