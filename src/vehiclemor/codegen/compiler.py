@@ -39,10 +39,7 @@ OPTIONS = {
 }
 INTRINSICS = {
     name: getattr(loop_intrinsics, name)
-    for name in (
-        *("vector", "matrix", "call_kernel", "call_lanes", "call_tangent"),
-        "mixed_rows",
-    )
+    for name in ("vector", "matrix", "call_kernel", "call_lanes", "mixed_rows")
 }
 
 

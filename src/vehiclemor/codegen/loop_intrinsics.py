@@ -99,26 +99,6 @@ def call_lanes(
     return types.void(*arguments), _call_of_rows
 
 
-@intrinsic
-def call_tangent(
-    typing_context: Any,
-    kernels: Any,
-    place: Any,
-    x: Any,
-    u: Any,
-    constants: Any,
-    of_x: Any,
-    of_constants: Any,
-    result: Any,
-    first: Any,
-) -> Any:
-    """See `loop_types.call_tangent`; the matrices must have as many rows and columns."""
-    del typing_context
-    arrays = x, u, constants, of_x, of_constants, result
-    _require_plain(*arrays)
-    return types.void(kernels, place, *arrays, first), _call_of_rows
-
-
 def _call_of_rows(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """Call a kernel: matrices from a row on, the last argument, with the length of their rows."""
     last = len(args) - 1

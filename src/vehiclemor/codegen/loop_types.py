@@ -50,24 +50,6 @@ def call_lanes(
     raise NotImplementedError(COMPILED_ONLY)
 
 
-def call_tangent(
-    kernels: IntVector,
-    place: int,
-    x: Vector,
-    u: Vector,
-    constants: Vector,
-    of_x: Matrix,
-    of_constants: Matrix,
-    result: Matrix,
-    first: int,
-) -> None:
-    """Call a kernel's tangent along its state and constants, from row `first` of the matrices on.
-
-    Rows are directions and derivatives along them, as many as the tangent takes at once.
-    """
-    raise NotImplementedError(COMPILED_ONLY)
-
-
 def mixed_rows(rows: Matrix, weights: tuple[float, ...], result: Vector) -> None:
     """The first rows, each times its weight, added up; they are whole multiples of `LANES` long."""
     raise NotImplementedError(COMPILED_ONLY)

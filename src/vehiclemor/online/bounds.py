@@ -160,7 +160,6 @@ def _check_vehicle(part: ReducedVehicle) -> None:
 def _check_system(part: System) -> None:
     dim, n = len(part.reference), len(part.constants)
     _shaped("system", (part.reference, dim), (part.error_scale, dim), (part.constants, n))
-    _require(not part.directions.size, "directions")
     for name in ("active", "rotating", "partners"):
         _apart(name, getattr(part, name).tolist(), dim)
     _require(len(part.rotating) % 2 == 1 or not part.rotating.size, "rotating")

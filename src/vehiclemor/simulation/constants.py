@@ -90,26 +90,6 @@ def constants_along(
     return along.columns((given,), directions)
 
 
-def starts_along(
-    definition: ModelDefinition, flat: np.ndarray, equations: Derivation, numbers: Sequence[int]
-) -> dict[str, np.ndarray]:
-    """Derivatives (numbers, states) of each start by components of the parameters.
-
-    By differences of order 4: a start is a function of Python, and may be solved for.
-    """
-
-    def begun(moved: np.ndarray) -> dict[str, np.ndarray]:
-        values = values_of(definition, moved) | solved_parameters(definition, moved, equations)
-        return definition.starts(values)
-
-    def flattened(moved: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.asarray(x, float) for x in begun(moved).values()])
-
-    names = tuple(begun(flat))
-    found = differences(flattened, flat, numbers).reshape(len(numbers), len(names), -1)
-    return dict(zip(names, found.swapaxes(0, 1), strict=True))
-
-
 def differences(
     function: Callable[[np.ndarray], np.ndarray], flat: np.ndarray, numbers: Sequence[int]
 ) -> np.ndarray:

@@ -9,15 +9,13 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.tangent import Tangent, tangent, tangent_source
+from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.errors import InputError
 from vehiclemor.registry import choice
 
 # Places of the arguments of a kernel.
 STATE, INPUTS, CONSTANTS = range(3)
 PLACES = {"state": STATE, "inputs": INPUTS}
-# Directions that loops take at once: more take as long, and longer to compile.
-AT_ONCE = (4, 2, 1)
 # State, inputs and constants, as kernels want them.
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 # What derivatives are taken by: `state`, `inputs`, or names of parameters.
@@ -39,18 +37,6 @@ def along(
 def _tangent(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> Tangent:
     source = kernels.sources[name]
     return tangent(source, source.arguments[place], size, len(arrays[place]))
-
-
-def lanes_of(directions: int) -> int:
-    """How many of so many directions a compiled loop takes at once."""
-    return next((lanes for lanes in AT_ONCE if lanes <= directions), 0)
-
-
-def address_of_tangent(kernels: Kernels, name: str, lanes: int) -> int:
-    """Address of a kernel's tangent along state and constants, for so many directions at once."""
-    source = kernels.sources[name]
-    found = tangent_source(source, (source.arguments[STATE], source.arguments[CONSTANTS]))
-    return Kernels({found.name: found}).address(found.name, lanes)
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:

@@ -3,14 +3,12 @@
 import math
 
 from vehiclemor.codegen.loop_types import (
-    Cube,
     Int,
     IntVector,
     Matrix,
     Vector,
     call_kernel,
     call_lanes,
-    call_tangent,
     matrix,
     mixed_rows,
 )
@@ -48,36 +46,6 @@ def lane_path(
     for first in range(0, len(path), LANES):
         # The last may have been computed before.
         call_lanes(kernel, 0, path, inputs, constants, result, min(first, last))
-    return 0
-
-
-def tangent_path(
-    path: Matrix,
-    inputs: Matrix,
-    kernel: IntVector,
-    constants: Vector,
-    directions: Matrix,
-    result: Cube,
-    lanes: Int,
-) -> Int:
-    """Derivatives (samples, directions, size) of a kernel's results along directions.
-
-    Parameters
-    ----------
-    path
-        States and, after them, their derivatives along each direction.
-    directions
-        Derivatives of the constants.
-    """
-    count = len(directions)
-    n = path.shape[1] // (1 + count)
-    for sample in range(len(path)):
-        moved, u = matrix(path[sample], n, count, n), inputs[sample]
-        for first in range(0, count, lanes):
-            row = min(first, count - lanes)
-            call_tangent(
-                kernel, 0, path[sample], u, constants, moved, directions, result[sample], row
-            )
     return 0
 
 

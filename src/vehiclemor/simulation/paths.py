@@ -41,21 +41,9 @@ def along(
     """
     states = checked_path(paths[0], sizes[0], "states", finite=finite)
     inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
-    return results(kernels, name, constants, (states, inputs), sizes[2])
-
-
-def results(
-    kernels: Kernels,
-    name: str,
-    constants: np.ndarray,
-    paths: tuple[np.ndarray, np.ndarray],
-    size: int,
-) -> np.ndarray:
-    """The same of paths that are known to be what the kernel reads."""
-    states, inputs = paths
-    result = np.empty((len(states), size))
+    result = np.empty((len(states), sizes[2]))
     if name in kernels:
-        kernels.sources[name].check(states.shape[1], inputs.shape[1], len(constants), size)
+        kernels.sources[name].check(sizes[0], sizes[1], len(constants), sizes[2])
     if len(states) < LANES:
         address = np.array([address_of(kernels, name)], dtype=np.int64)
         path_loops()["kernel_path"](states, inputs, address, constants, result)
@@ -86,5 +74,5 @@ def address_of(kernels: Kernels, name: str, lanes: int = 1) -> int:
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    entries = "kernel_path", "lane_path", "tangent_path", "delivered", "jacobian_at"
+    entries = "kernel_path", "lane_path", "delivered", "jacobian_at"
     return loops(PATH_LOOPS, entries)

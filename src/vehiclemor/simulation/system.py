@@ -26,7 +26,6 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
-from vehiclemor.simulation.kernel_derivatives import address_of_tangent, lanes_of
 from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
@@ -58,8 +57,6 @@ CALLED = {
     "vehicle_frame": ("derivative",),
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
-    "state_sensitivities": ("derivative",),
-    catalogue.SENSITIVITIES: ("derivative",),
 }
 
 
@@ -85,9 +82,6 @@ class System(ShortRepr):
         Numbers of the heading and of the pairs of states that turn with it; may be empty.
     partners
         Number of the state that each becomes in the mirror image; empty where there is none.
-    directions
-        Derivatives (parameters, constants) of the constants along which the states have tangents,
-        see `formulations/sensitivities.py`; scales are as long as both together.
     """
 
     kernels: Kernels
@@ -98,7 +92,6 @@ class System(ShortRepr):
     active: np.ndarray
     rotating: np.ndarray
     partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    directions: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         """Refuse kernels that reach beyond what loops give them: they don't look."""
@@ -119,11 +112,8 @@ class System(ShortRepr):
         """
         places = ("derivative", "outputs", "second_order", "speeds")
         found = [address_of(self.kernels, name) if name in names else 0 for name in places]
-        lanes = lanes_of(len(self.directions))
-        tangent = address_of_tangent(self.kernels, "derivative", lanes) if lanes else 0
-        kernels = np.array([*found, step, tangent], dtype=np.int64)
-        own = self.constants, self.error_scale, self.turning, self.directions
-        return Equations(kernels, *own, lanes)
+        kernels = np.array([*found, step], dtype=np.int64)
+        return Equations(kernels, self.constants, self.error_scale, self.turning)
 
     @cached_property
     def turning(self) -> np.ndarray:
@@ -217,9 +207,6 @@ class System(ShortRepr):
                 stored = catalogue.Stored(
                     self.frame.packed([chosen.stepped.tables(block) for block in blocks])
                 )
-            elif len(self.directions) and chosen.operators is not None:
-                blocks = 1 + len(self.directions)
-                stored = catalogue.repeated_functions(self.turning_jacobian, blocks)
             elif chosen.operators is not None:
                 own = chosen.formulation == "vehicle_frame"
                 jacobian = self.turning_jacobian if own else self.frozen_jacobian
@@ -351,8 +338,7 @@ class System(ShortRepr):
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
-        if windows.formulation != catalogue.SENSITIVITIES:
-            catalogue.check_formulation(name, full)
+        catalogue.check_formulation(name, full)
         whole_steps = full and self.whole_steps(name)
         active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)

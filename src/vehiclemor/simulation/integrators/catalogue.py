@@ -29,8 +29,6 @@ RESTART = 0.05
 # A kernel of whole steps for more states than these would be too long.
 MOST_STATES = 64
 NOTHING = np.zeros((1, 1, 1))
-# Formulation of a full system with tangents, for the exponential Adams method.
-SENSITIVITIES = "sensitivities"
 
 
 @dataclass(frozen=True)
@@ -153,30 +151,6 @@ def modal_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
     shared = [np.pad(part, ((0, 0), (0, n - part.shape[1]))) for part in parts]
     tables = exponential_modes.modal_tables(found, STEP_GRID, PHI)
     return Stored(tables, np.ascontiguousarray(np.vstack(shared)))
-
-
-def repeated_functions(jacobian: np.ndarray, blocks: int) -> Stored:
-    """The same of so many equal diagonal blocks, see `adams_blocks`."""
-    tables, parts = modal_functions(jacobian, np.empty(0))
-    n = len(jacobian)
-    r = len(parts) - n - 3
-    pairs = (tables.shape[2] - r) // 2
-    places = exponential_modes.repeated(r, pairs, blocks)
-    first, last = blocks * n, blocks * (n + r)
-    shared = np.zeros((last + 4, first))
-    wide = np.empty((*tables.shape[:2], blocks * tables.shape[2]))
-    for block, own in enumerate(places):
-        states = slice(block * n, (block + 1) * n)
-        shared[states, own] = parts[:n, :r]
-        shared[first + own, states] = parts[n : n + r]
-        shared[last, own] = parts[n + r, :r]
-        wide[:, :, own] = tables[:, :, :r]
-    # What pairs do to one another, forth and back.
-    shared[last + 1 : last + 3, : blocks * pairs] = np.tile(parts[n + r + 1 :, :pairs], blocks)
-    forth, back = tables[:, :, r : r + pairs], tables[:, :, r + pairs :]
-    wide[:, :, blocks * r :] = np.dstack([np.tile(forth, blocks), np.tile(back, blocks)])
-    shared[last + 3, :3] = blocks, r - 2 * pairs, pairs
-    return Stored(wide, shared)
 
 
 INTEGRATORS = {
@@ -318,8 +292,6 @@ def time_loop(chosen: Integrator, formulation: str, whole_steps: bool = False) -
         Whether a kernel takes them.
     """
     own = chosen.stepped.modules if whole_steps and chosen.stepped else chosen.modules
-    if formulation == SENSITIVITIES:
-        own = (*own, "adams_blocks")
     modules = (
         *_problem_modules(formulation),
         *(f"simulation.integrators.{name}" for name in own),
@@ -337,10 +309,7 @@ def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, whole_steps:
     return scratch_end(n, inputs) + own
 
 
-FORMULATIONS = (
-    *("inputs", "full", "vehicle_frame", "state", "coordinates"),
-    *("sensitivities", "state_sensitivities"),
-)
+FORMULATIONS = ("inputs", "full", "vehicle_frame", "state", "coordinates")
 # All source that a run may be compiled from.
 LOOP_SOURCES = (
     *(f"simulation.formulations.{name}" for name in FORMULATIONS),
@@ -349,7 +318,6 @@ LOOP_SOURCES = (
         for own in INTEGRATORS.values()
         for name in dict.fromkeys((*own.modules, *(own.stepped.modules if own.stepped else ())))
     ),
-    "simulation.integrators.adams_blocks",
     "simulation.integrators.structures",
     "simulation.integrators.loop",
     "simulation.path_loops",

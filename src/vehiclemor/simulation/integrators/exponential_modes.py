@@ -140,13 +140,6 @@ def _add_real_modes(basis: np.ndarray, block: np.ndarray, singles: list, pairs: 
     singles += [(basis @ column, rate) for column in others.T]
 
 
-def repeated(r: int, pairs: int, blocks: int) -> np.ndarray:
-    """Places (blocks, r) of the modes of equal blocks: single ones of all, firsts, seconds."""
-    singles = r - 2 * pairs
-    parts = [(singles, 0), (pairs, blocks * singles), (pairs, blocks * (singles + pairs))]
-    return np.hstack([start + np.arange(blocks * w).reshape(blocks, w) for w, start in parts])
-
-
 def phi_functions(z: np.ndarray, highest: int) -> np.ndarray:
     """phi_0 to phi_highest (highest + 1, ...) of complex numbers."""
     found = np.empty((highest + 1, *z.shape), dtype=complex)

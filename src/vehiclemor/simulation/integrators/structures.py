@@ -6,7 +6,7 @@ from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, V
 from vehiclemor.sample_loops import Pieces
 
 # Places of a system's kernels in its list of addresses; see `System`.
-DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, STEP_KERNEL, TANGENT = range(6)
+DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, STEP_KERNEL = range(5)
 # Why a run has ended: all well, too many evaluations, not finite, singular matrix, tiny step.
 FINISHED, TOO_MANY_CALLS, NOT_FINITE, SINGULAR, STEP_TOO_SMALL = range(5)
 # Places of the counts of a run.
@@ -26,19 +26,12 @@ class Equations(NamedTuple):
         Magnitude of each state below which errors count absolutely.
     turning
         Numbers of the heading and of pairs of velocities that turn with it; may be empty.
-    directions
-        Derivatives (parameters, constants) of the constants by parameters along which the state
-        has tangents, which follow it; no rows where it has none.
-    lanes
-        Directions that the tangent of the rates takes at once.
     """
 
     kernels: IntVector
     constants: Vector
     error_scale: Vector
     turning: IntVector
-    directions: Matrix
-    lanes: Int
 
 
 class Spans(NamedTuple):
