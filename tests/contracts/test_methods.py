@@ -344,7 +344,7 @@ LONG_TO_COMPILE = {
     **dict.fromkeys(
         (
             *("balanced_pod", "fixed_basis", "global_pod"),
-            *("independent_coordinates", "pod", "quasi_steady_wheels"),
+            *("pod", "quasi_steady_wheels"),
         ),
         ("state", "inputs"),
     ),

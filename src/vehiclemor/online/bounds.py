@@ -19,7 +19,7 @@ from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
-from vehiclemor.reduction.reduced_system import FullStates, ReducedSystem
+from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.validation import checked_fit
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
@@ -172,14 +172,9 @@ def _check_reduced_system(part: ReducedSystem) -> None:
     system, spaces, dim = part.system, part.spaces, len(part.system.reference)
     states = len(part.model.definition.states)
     _require(system.inputs == len(part.model.inputs), "inputs")
-    lifting = getattr(part.lift, "__self__", None)
-    if isinstance(lifting, FullStates):
-        _require(lifting.system is system and lifting.size == states >= dim, "full_state")
-    else:
-        _require(dim == states, "system")
-    results = {"full_state": states, "outputs": len(part.model.outputs)}
-    for name in results.keys() & system.kernels.sources.keys():
-        system.kernels.sources[name].check(dim, system.inputs, len(system.constants), results[name])
+    _require(dim == states, "system")
+    if source := system.kernels.sources.get("outputs"):
+        source.check(dim, system.inputs, len(system.constants), len(part.model.outputs))
     _check_windows(spaces, dim)
 
 

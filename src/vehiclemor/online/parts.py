@@ -32,7 +32,7 @@ from vehiclemor.simulation.model import Model
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
 PARTS = (
     *("AlgebraicProjection", "Basis", "Cells", "DynamicProjection", "ExactVehicle", "Features"),
-    *("FullOrderModel", "FullStates", "GuardedModel", "HeadingFrame", "InputRange", "Offline"),
+    *("FullOrderModel", "GuardedModel", "HeadingFrame", "InputRange", "Offline"),
     *("PathMapModel", "PolynomialResidualModel", "ProjectionWindows", "ReducedSystem"),
     *("ReducedVehicle", "ReplayModel", "System", "TrainingReach", "Trajectory", "Transient"),
     *("Trust", "VehicleShape", "_nothing_told", "_own_path", "_same_state"),

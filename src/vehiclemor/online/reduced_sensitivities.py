@@ -33,7 +33,6 @@ from vehiclemor.simulation.tangent_runs import (
     Tangents,
     apart,
     tangent_run,
-    tangents_along,
     with_tangents,
 )
 from vehiclemor.simulation.trajectory import Start
@@ -51,15 +50,15 @@ def reduced_sensitivities(
     Raises
     ------
     InputError
-        Moreover if the reduced model has no state, is trained on runs, or gives its full states by
-        other than one kernel.
+        Moreover if the reduced model has no state, is trained on runs, or has other states than the
+        model.
     """
     model, own = reduced.model, reduced.state_space
     along = components(model, names)
-    if not isinstance(own, ReducedSystem) or not _lifts(own):
+    if not isinstance(own, ReducedSystem) or own.slopes is not None:
         raise InputError(
             f"{reduced.method}: its runs have no derivatives by parameters; those of "
-            f"frozen_inertia, independent_coordinates and softened_slip have"
+            f"softened_slip have"
         )
     with_tangents(own.spaces)
     maneuver = checked_maneuver(maneuver, model.definition)
@@ -71,21 +70,10 @@ def reduced_sensitivities(
     chosen = TOLERANCE if tolerance is None else tolerance
     run = tangent_run(own.system, own.spaces, maneuver, state, tangents, chosen)
     states, moved = apart(run.path, len(along))
-    if own.slopes is not None:
-        paths = run.path, recorded_inputs(maneuver)[1]
-        size, kernels = len(model.definition.states), own.system.kernels
-        given = own.system.constants, constants
-        moved = tangents_along(kernels, "full_state", given, paths, size)
-        states = own.full_states(np.ascontiguousarray(states), paths[1])
     found = recorded(own.model, maneuver, run, states)
     trusted = found.judged(reduced.simulate(maneuver, begun).trust)
     outputs = outputs_along(model, trusted, moved, directions_of(model, along))
     return Sensitivities(trusted, along, moved, outputs)
-
-
-def _lifts(own: ReducedSystem) -> bool:
-    """Whether the full states are the system's own, or those of one kernel."""
-    return own.slopes is None or "full_state" in own.system.kernels
 
 
 def _of_cars(

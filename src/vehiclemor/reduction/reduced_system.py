@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,6 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
@@ -28,7 +27,7 @@ from vehiclemor.simulation.kernel_derivatives import (
     partial,
 )
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along
 from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.stepping import Stepper
@@ -220,58 +219,3 @@ def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.n
         partial(kernels, "full_state", arrays, size, place) for place in (STATE, INPUTS)
     )
     return by_state, by_inputs
-
-
-def transformed_system(
-    model: DynamicModel,
-    system: System,
-    encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    offline: Offline,
-    settings: OnlineSettings,
-    names: Sequence[str],
-    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told,
-) -> ReducedSystem:
-    """Equations in other states than the model's.
-
-    Parameters
-    ----------
-    system
-        The equations; its kernel `full_state` gives the full state of a transformed one.
-    encode
-        (full state (2 n,), inputs) -> transformed state (dim,).
-    names, judge
-        See `ReducedSystem`.
-    """
-    dim = len(system.reference)
-    full = FullStates(system, 2 * len(model.coordinates))
-    return ReducedSystem(
-        model,
-        system,
-        whole_space(dim),
-        dim,
-        offline,
-        settings.solver,
-        settings.tolerance,
-        encode,
-        full.lift,
-        judge=judge,
-        names=tuple(names),
-        slopes=full.slopes,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class FullStates(ShortRepr):
-    """Full states, so many, by the kernel `full_state` of a transformed system."""
-
-    system: System
-    size: int
-
-    def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
-        """Full states (samples, size) of a run."""
-        return self.system.along("full_state", run.path, inputs, self.size)
-
-    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Their derivatives by state and inputs."""
-        arrays = state, inputs, self.system.constants
-        return full_state_slopes(self.system.kernels, arrays, self.size)

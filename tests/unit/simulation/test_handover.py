@@ -15,8 +15,6 @@ from vehiclemor.simulation.build import build
 CASES = (
     ("independent_suspension_vehicle", "step_steer", "full_order"),
     ("high_fidelity_vehicle", "rack_step_steer", "full_order"),
-    ("high_fidelity_vehicle", "rack_step_steer", "frozen_inertia"),
-    ("high_fidelity_vehicle", "rack_step_steer", "independent_coordinates"),
 )
 TOLERANCE = 1e-8
 

@@ -36,9 +36,7 @@ class GuardedSettings(OnlineSettings):
     fast_settings: str = Field(
         "", description="its other settings, as in TOML: terms = 12, ridge = 1e-9"
     )
-    safe: Literal["full_order", "independent_coordinates", "frozen_inertia"] = Field(
-        "full_order", description="method of the safe model"
-    )
+    safe: Literal["full_order"] = Field("full_order", description="method of the safe model")
     safe_solver: Solver = "etdrk4"
     safe_tolerance: Tolerance = 2e-3
     resume: Literal["start", "departure"] = Field(
