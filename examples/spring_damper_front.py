@@ -157,13 +157,11 @@ def multiplier(designer: Designer, design: np.ndarray) -> float:
 
 
 def cars() -> dict[str, Designer]:
-    """The car in full order, with both kinds of derivatives, and one of which no run is learnt."""
+    """The car in full order, with both kinds of derivatives."""
     full = vm.reduce(MODEL, "full_order", solver="ros34pw2", tolerance=1e-4)
-    soft = vm.reduce(MODEL, "softened_slip", tolerance=1e-6)
     return {
         "full order, differences": Designer(full),
         "full order, exact derivatives": Designer(full, exact=True),
-        "softened slip, differences": Designer(soft),
     }
 
 

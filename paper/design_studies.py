@@ -44,7 +44,7 @@ def car(method: str, **settings: Any) -> Callable[[], vm.ReducedOrderModel]:
     """How the car of a contestant is made, cars all over the box learnt from where it learns."""
 
     def made() -> Any:
-        if method in ("full_order", "softened_slip"):
+        if method == "full_order":
             return vm.reduce(SPRINGS["MODEL"], method, **settings)
         today = vm.model(SPRINGS["MODEL"]).parameters.values()
         ends = SPRINGS["LOWEST"] - BEYOND, SPRINGS["HIGHEST"] + BEYOND
@@ -72,7 +72,6 @@ CARS = {
     "full order": (car("full_order", **STRONGEST), False),
     "full order, exact derivatives": (car("full_order", **STRONGEST), True),
     "full order, coarse": (car("full_order", **STRONGEST | {"tolerance": 1e-3}), False),
-    "softened slip": (car("softened_slip", tolerance=1e-6), False),
     "slow manifold": (car("slow_manifold"), False),
     "POD, r = 3": (car("pod", rank=3, bases="interpolated"), False),
     "POD, r = 6": (car("pod", rank=6, bases="interpolated"), False),

@@ -41,14 +41,6 @@ def test_springs_and_dampers_of_the_front_are_optimal(springs, stiff):
     assert (slope[low] > 0.0).all()
 
 
-def test_a_reduced_car_finds_the_same_springs_and_dampers(springs, stiff):
-    point, fine = stiff
-    soft = springs["Designer"](vm.reduce(springs["MODEL"], "softened_slip", tolerance=1e-6))
-    (found,) = springs["front"](soft, [0.101])
-    assert np.abs(found.design - point.design).max() < 0.01
-    np.testing.assert_allclose(fine.values(found.design), fine.values(point.design), rtol=0.005)
-
-
 @pytest.fixture(scope="module")
 def joints():
     return runpy.run_path(str(ROOT / "examples" / "suspension_hard_points.py"))

@@ -14,10 +14,9 @@ import numpy as np
 
 from vehiclemor.codegen.foreign_texts import MOST_CHARACTERS, MOST_SIZE, check_line
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.reduction.methods import guarded, path_map, polynomial_residual
+from vehiclemor.reduction.methods import guarded, path_map
 from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
-from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.validation import checked_fit
@@ -67,14 +66,6 @@ def check(part: Any, model: Model) -> None:
                 _require(basis.rank <= n, "bases")
         case PathMapModel():
             _check_map(part)
-        case PolynomialResidualModel():
-            n, inputs, r = len(part.model.coordinates), len(part.model.inputs), part.basis.rank
-            known = 0 < part.degree <= polynomial_residual.HIGHEST_DEGREE and 0 < r <= n
-            terms = math.comb(r + part.degree, r) if known else 0
-            _require(0 < terms <= polynomial_residual.MOST_MONOMIALS, "degree")
-            _shaped("basis", (part.basis.mean, n), (part.basis.vectors, n, r), (part.scales, r))
-            _shaped("response", (part.mean_inputs, inputs), (part.response, inputs, r))
-            _shaped("coefficients", (part.coefficients, terms, r))
 
 
 @cache

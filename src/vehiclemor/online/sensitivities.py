@@ -57,11 +57,10 @@ def sensitivities(
     Raises
     ------
     InputError
-        If a name is unknown, or the reduced model does not know the parameters.
+        If a name is unknown, or the model is a reduced one.
     ConvergenceError
         If the run fails.
     """
-    from vehiclemor.online.reduced_sensitivities import reduced_sensitivities
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.sensitivities import sensitivities as sensitivities_of
     from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
@@ -77,9 +76,8 @@ def sensitivities(
         raise InputError("parameters has the same name twice")
     how = parameters, start, None if tolerance is None else number("tolerance", tolerance)
     if isinstance(ready, ReducedOrderModel) and ready.method != "full_order":
-        found = reduced_sensitivities(ready, chosen, *how)
-    else:
-        found = sensitivities_of(full, chosen, *how)
+        raise InputError(f"{ready.method}: its runs have no derivatives by parameters")
+    found = sensitivities_of(full, chosen, *how)
     n = len(full.coordinates)
     further: dict[str, tuple[Any, ...]] = {}
     for name, values in (

@@ -76,8 +76,6 @@ class ReducedSystem(ShortRepr):
     lift
         (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
         default the run's own.  It keeps nothing of the run.
-    project
-        Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     judge
         (run of the system, inputs) -> what the model tells of it; nothing by default.
     names
@@ -96,7 +94,6 @@ class ReducedSystem(ShortRepr):
     tolerance: float
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
-    project: Callable[[np.ndarray], np.ndarray] | None = None
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
     names: tuple[str, ...] = ()
     slopes: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
@@ -208,9 +205,9 @@ class ReducedSystem(ShortRepr):
         run.give_back()
         return found
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """Projection of full states (samples, 2 n), if there is a subspace."""
-        return None if self.project is None else self.project(states)
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:  # noqa: ARG002
+        """There is no subspace."""
+        return None
 
 
 def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.ndarray, np.ndarray]:

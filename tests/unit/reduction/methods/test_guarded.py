@@ -113,7 +113,7 @@ def test_wrong_settings_are_named(given, words):
 
 @pytest.mark.parametrize("text", ["rank = 2, snapshots = 9", "rank = 2\n\nsnapshots = 9,\n"])
 def test_settings_of_the_fast_model_stand_in_one_line_or_several(text):
-    given = {"fast": "global_pod", "solver": "dopri5", "fast_settings": text}
+    given = {"fast": "fixed_basis", "solver": "dopri5", "fast_settings": text}
     METHOD.check(model(), validated(METHOD, "ode", given))
     with pytest.raises(InputError, match="snapshots"):
         METHOD.check(
