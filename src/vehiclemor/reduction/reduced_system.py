@@ -170,14 +170,12 @@ class ReducedSystem(ShortRepr):
         start: Start,
         times: np.ndarray | None = None,
         direct_until: float = np.inf,
-        begin: float = 0.0,
     ) -> Run:
-        """Path of the reduced states, from a full state at a time; see `System.run`."""
+        """Path of the reduced states, from a full state; see `System.run`."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
         # Output times begin with zero.
-        first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
-        state = self._encoded(start, first[0])
-        how = Solver(self.solver, self.tolerance, times, begin=begin)
+        state = self._encoded(start, recorded_inputs(maneuver)[1][0])
+        how = Solver(self.solver, self.tolerance, times)
         return self.system.run(maneuver, state, self.spaces, how, direct_until)
 
     def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
@@ -195,11 +193,11 @@ class ReducedSystem(ShortRepr):
     def _starts(self) -> dict[tuple[str | bytes, bytes], np.ndarray]:
         return {}
 
-    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
-        """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Integrate, then lift to full states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
-        run = self.run(maneuver, start, begin=begin)
-        inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
+        run = self.run(maneuver, start)
+        inputs = recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
         found = self.model.recorded(maneuver, run, inputs, states, self.judge(run, inputs))
         run.give_back()
