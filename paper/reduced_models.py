@@ -23,6 +23,7 @@ from vehiclemor.files import make_folder
 from vehiclemor.online.model_file import content
 from vehiclemor.online.rom import ReducedOrderModel, reduce
 from vehiclemor.online.saved import load, shipped_folder
+from vehiclemor.registry import component
 from vehiclemor.resources import checkout_data, data_folder, data_names
 from vehiclemor.study.method_settings import Settings, complete_settings
 from vehiclemor.study.plans.ledger import Ledger
@@ -54,7 +55,10 @@ def chosen(name: str) -> Choice:
         raise VehiclemorError(f"protocol {name!r} has no draw: vehiclemor run predictive")
     label, row = next((label, row) for label, row in drawn[-1].rows.items() if row.winner)
     training = next(c.training for c in protocol.contestants if c.label == label)
-    settings = complete_settings(protocol.model, row.method, row.settings)
+    # What was a setting when it was drawn, and is none any more, has that value for good.
+    known = component("method", row.method).names_of(protocol.model.kind)
+    given = {name: value for name, value in row.settings.items() if name in known}
+    settings = complete_settings(protocol.model, row.method, given)
     return Choice(protocol, row.method, settings, training)
 
 

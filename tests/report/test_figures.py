@@ -65,7 +65,7 @@ def protocol_results(name):
         variables[variable] = ("row", np.ones(n, dtype=int))
     for variable in ("offline_seconds", "validation_score"):
         variables[variable] = ("row", np.ones(n))
-    for variable in ("rms_error", "max_error", "largest_output", "error_estimate"):
+    for variable in ("rms_error", "max_error", "largest_output"):
         errors = 10.0 ** rng.uniform(-6.0, 1.0, shape)
         variables[variable] = (("row", "scenario", "output"), errors)
     for variable, factor in (("seconds", 1.0), ("seconds_lower", 0.9), ("seconds_upper", 1.2)):

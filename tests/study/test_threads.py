@@ -22,7 +22,7 @@ def test_threads_are_as_before_outside():
 SET = {"training": "set", "training_set": [(1.0, 1.0), (1.2, 0.8), (0.8, 1.2)]}
 FITS = [
     ("independent_suspension_vehicle", "slow_manifold", {}),
-    ("high_fidelity_vehicle", "balanced_pod", SET),
+    ("high_fidelity_vehicle", "two_track", SET),
 ]
 
 

@@ -27,7 +27,7 @@ def test_built_ins_are_registered() -> None:
             "unknown model 'double_wishbon'; did you mean double_wishbone?",
         ),
         ("method", "full-order", "unknown method 'full-order'; did you mean full_order?"),
-        ("method", "PID", "unknown method 'PID'; known: balanced_pod, "),
+        ("method", "PID", "unknown method 'PID'; known: fixed_basis, "),
         ("maneuver", "sine", "unknown maneuver 'sine'; "),
         ("model", "", "unknown model ''; known: "),
     ],

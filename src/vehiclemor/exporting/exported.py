@@ -46,9 +46,6 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
             lift = kernel_sources(text)["full_state"], constants
             return reduced_system(what.equations, name, lift)
         case ReducedSystem() if what.spaces.formulation == "full":
-            kernels, constants = what.system.kernels, what.system.constants
-            if "full_state" in kernels:
-                return reduced_system(what, name, (kernels.sources["full_state"], constants))
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)
     raise InputError(f"{name} can't be exported: its equations are no straight-line program")

@@ -14,12 +14,11 @@ import numpy as np
 
 from vehiclemor.codegen.foreign_texts import MOST_CHARACTERS, MOST_SIZE, check_line
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.reduction.methods import guarded, path_map, polynomial_residual
+from vehiclemor.reduction.methods import guarded, path_map
 from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
-from vehiclemor.reduction.methods.polynomial_residual import PolynomialResidualModel
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
-from vehiclemor.reduction.reduced_system import FullStates, ReducedSystem
+from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.validation import checked_fit
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
@@ -67,14 +66,6 @@ def check(part: Any, model: Model) -> None:
                 _require(basis.rank <= n, "bases")
         case PathMapModel():
             _check_map(part)
-        case PolynomialResidualModel():
-            n, inputs, r = len(part.model.coordinates), len(part.model.inputs), part.basis.rank
-            known = 0 < part.degree <= polynomial_residual.HIGHEST_DEGREE and 0 < r <= n
-            terms = math.comb(r + part.degree, r) if known else 0
-            _require(0 < terms <= polynomial_residual.MOST_MONOMIALS, "degree")
-            _shaped("basis", (part.basis.mean, n), (part.basis.vectors, n, r), (part.scales, r))
-            _shaped("response", (part.mean_inputs, inputs), (part.response, inputs, r))
-            _shaped("coefficients", (part.coefficients, terms, r))
 
 
 @cache
@@ -171,14 +162,9 @@ def _check_reduced_system(part: ReducedSystem) -> None:
     system, spaces, dim = part.system, part.spaces, len(part.system.reference)
     states = len(part.model.definition.states)
     _require(system.inputs == len(part.model.inputs), "inputs")
-    lifting = getattr(part.lift, "__self__", None)
-    if isinstance(lifting, FullStates):
-        _require(lifting.system is system and lifting.size == states >= dim, "full_state")
-    else:
-        _require(dim == states, "system")
-    results = {"full_state": states, "outputs": len(part.model.outputs)}
-    for name in results.keys() & system.kernels.sources.keys():
-        system.kernels.sources[name].check(dim, system.inputs, len(system.constants), results[name])
+    _require(dim == states, "system")
+    if source := system.kernels.sources.get("outputs"):
+        source.check(dim, system.inputs, len(system.constants), len(part.model.outputs))
     _check_windows(spaces, dim)
 
 

@@ -31,15 +31,14 @@ from vehiclemor.simulation.model import Model
 # Where the classes and functions are that are parts of reduced models; `bounds` checks their sizes.
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
 PARTS = (
-    *("AlgebraicProjection", "Basis", "Cells", "DynamicProjection", "ExactVehicle", "Features"),
-    *("FullOrderModel", "FullStates", "GuardedModel", "HeadingFrame", "InputRange", "Offline"),
-    *("PathMapModel", "PolynomialResidualModel", "ProjectionWindows", "ReducedSystem"),
+    *("AlgebraicProjection", "Basis", "Cells", "DynamicProjection", "Features"),
+    *("FullOrderModel", "GuardedModel", "InputRange", "Offline"),
+    *("PathMapModel", "ProjectionWindows", "ReducedSystem"),
     *("ReducedVehicle", "ReplayModel", "System", "TrainingReach", "Trajectory", "Transient"),
     *("Trust", "VehicleShape", "_nothing_told", "_own_path", "_same_state"),
-    *("every_state", "judge"),
 )
 # Methods that are.
-METHODS = ("encode", "lift", "project", "judge", "slopes")
+METHODS = ("encode", "lift", "judge", "slopes")
 # Parts that a model may have, each counted wherever it is meant: those of this package have 20,000.
 MOST_PARTS = 500_000
 # What of a model may be a part of a reduced one.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,6 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
@@ -28,7 +27,7 @@ from vehiclemor.simulation.kernel_derivatives import (
     partial,
 )
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along
 from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.stepping import Stepper
@@ -77,8 +76,6 @@ class ReducedSystem(ShortRepr):
     lift
         (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
         default the run's own.  It keeps nothing of the run.
-    project
-        Full states (samples, 2 n) -> their best approximation, if there is a subspace.
     judge
         (run of the system, inputs) -> what the model tells of it; nothing by default.
     names
@@ -97,7 +94,6 @@ class ReducedSystem(ShortRepr):
     tolerance: float
     encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
     lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
-    project: Callable[[np.ndarray], np.ndarray] | None = None
     judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
     names: tuple[str, ...] = ()
     slopes: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
@@ -174,14 +170,12 @@ class ReducedSystem(ShortRepr):
         start: Start,
         times: np.ndarray | None = None,
         direct_until: float = np.inf,
-        begin: float = 0.0,
     ) -> Run:
-        """Path of the reduced states, from a full state at a time; see `System.run`."""
+        """Path of the reduced states, from a full state; see `System.run`."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
         # Output times begin with zero.
-        first = maneuver.at(np.array([begin])) if begin else recorded_inputs(maneuver)[1]
-        state = self._encoded(start, first[0])
-        how = Solver(self.solver, self.tolerance, times, begin=begin)
+        state = self._encoded(start, recorded_inputs(maneuver)[1][0])
+        how = Solver(self.solver, self.tolerance, times)
         return self.system.run(maneuver, state, self.spaces, how, direct_until)
 
     def _encoded(self, start: Start, inputs: np.ndarray) -> np.ndarray:
@@ -199,19 +193,19 @@ class ReducedSystem(ShortRepr):
     def _starts(self) -> dict[tuple[str | bytes, bytes], np.ndarray]:
         return {}
 
-    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
-        """Integrate, then lift to full states at the maneuver's output times from `begin` on."""
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Integrate, then lift to full states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
-        run = self.run(maneuver, start, begin=begin)
-        inputs = maneuver.at(run.times) if begin else recorded_inputs(maneuver)[1]
+        run = self.run(maneuver, start)
+        inputs = recorded_inputs(maneuver)[1]
         states = self.lift(run, inputs, self.model.start(start))
         found = self.model.recorded(maneuver, run, inputs, states, self.judge(run, inputs))
         run.give_back()
         return found
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """Projection of full states (samples, 2 n), if there is a subspace."""
-        return None if self.project is None else self.project(states)
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:  # noqa: ARG002
+        """There is no subspace."""
+        return None
 
 
 def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -220,58 +214,3 @@ def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.n
         partial(kernels, "full_state", arrays, size, place) for place in (STATE, INPUTS)
     )
     return by_state, by_inputs
-
-
-def transformed_system(
-    model: DynamicModel,
-    system: System,
-    encode: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    offline: Offline,
-    settings: OnlineSettings,
-    names: Sequence[str],
-    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told,
-) -> ReducedSystem:
-    """Equations in other states than the model's.
-
-    Parameters
-    ----------
-    system
-        The equations; its kernel `full_state` gives the full state of a transformed one.
-    encode
-        (full state (2 n,), inputs) -> transformed state (dim,).
-    names, judge
-        See `ReducedSystem`.
-    """
-    dim = len(system.reference)
-    full = FullStates(system, 2 * len(model.coordinates))
-    return ReducedSystem(
-        model,
-        system,
-        whole_space(dim),
-        dim,
-        offline,
-        settings.solver,
-        settings.tolerance,
-        encode,
-        full.lift,
-        judge=judge,
-        names=tuple(names),
-        slopes=full.slopes,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class FullStates(ShortRepr):
-    """Full states, so many, by the kernel `full_state` of a transformed system."""
-
-    system: System
-    size: int
-
-    def lift(self, run: Run, inputs: np.ndarray, _: np.ndarray) -> np.ndarray:
-        """Full states (samples, size) of a run."""
-        return self.system.along("full_state", run.path, inputs, self.size)
-
-    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Their derivatives by state and inputs."""
-        arrays = state, inputs, self.system.constants
-        return full_state_slopes(self.system.kernels, arrays, self.size)

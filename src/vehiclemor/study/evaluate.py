@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from vehiclemor.progress import first_use
 from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
-from vehiclemor.reduction.vehicle.acceptance import no_vehicle
-from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate, estimated_errors
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -47,7 +45,6 @@ from vehiclemor.study.scenario import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from vehiclemor.simulation.dynamic import DynamicModel
 
 # How a fitted model is integrated: experiments that differ in these alone are fitted once.
 ONLINE = ("solver", "tolerance")
@@ -305,7 +302,7 @@ def _tested(
         if experiment.keep == "errors":
             trajectory = _sound(car, reduced, scenario, start)
             trajectory = warned(model, experiment, scenario, trajectory)
-            return Outcome(trajectory, reference, estimate=_estimate(car, trajectory))
+            return Outcome(trajectory, reference)
         # The first run loads machine code and warms caches, another is timed where it is compared.
         if not fitted.warm and reference is not None:
             checked_run(car, scenario.maneuver, start, reduced)
@@ -347,13 +344,6 @@ def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Traject
         return run
     told = f"not to be trusted {judged.message}"
     return replace(run, remark="; ".join(part for part in (run.remark, told) if part))
-
-
-def _estimate(model: Model, run: Trajectory) -> ErrorEstimate | None:
-    """Errors by the residual, of a vehicle's run that may be wrong by its model's own account."""
-    if run.trust is None or not run.finished or no_vehicle(model):
-        return None
-    return estimated_errors(cast("DynamicModel", model), run)
 
 
 def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:

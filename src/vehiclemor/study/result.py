@@ -11,7 +11,6 @@ import numpy as np
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import ReducedModel
-from vehiclemor.reduction.vehicle.error_estimate import ErrorEstimate
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset, with_units
@@ -39,14 +38,11 @@ class Outcome:
         None where nothing is compared.
     floor
         RMS errors (outputs,) of the best approximation in the same subspaces, if there is one.
-    estimate
-        Errors estimated without the full-order run, where there are any.
     """
 
     trajectory: Trajectory
     reference: Trajectory | None
     floor: np.ndarray | None = None
-    estimate: ErrorEstimate | None = None
 
 
 def metrics_dataset(
@@ -156,10 +152,6 @@ def errors_dataset(
     errors = zip(*[_errors(o) if o else missing for o in finished], strict=True)
     names = ("rms_error", "max_error", "largest_output", "smallest_output")
     found: dict[str, object] = dict(zip(names, map(np.array, errors), strict=True))
-    nothing = ErrorEstimate(*missing[:2])
-    estimates = [o.estimate if o and o.estimate else nothing for o in finished]
-    found["estimated_rms_error"] = np.array([estimate.rms for estimate in estimates])
-    found["estimated_max_error"] = np.array([estimate.largest for estimate in estimates])
     found["seconds"] = np.array([o.trajectory.seconds if o else np.nan for o in finished])
     for name in ("status", "message"):
         found[name] = np.array([getattr(end, name) for end in ends], dtype=object)

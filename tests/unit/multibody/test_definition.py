@@ -131,7 +131,6 @@ def test_declarations_are_read_without_sympy():
     text = (
         "import sys; from vehiclemor.registry import component, names;"
         "[component('model', name) for name in names('model')];"
-        "from vehiclemor.multibody.high_fidelity import frozen_quantities;"
         "print([m for m in ('sympy', 'scipy', 'numba', 'xarray') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)

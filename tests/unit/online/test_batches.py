@@ -206,7 +206,7 @@ def test_wrong_input_is_one_line(changes, line, full):
 
 def test_what_can_not_be_kept_is_refused(full, monkeypatch):
     signals = vm.many_signals(TIMES, steering(2))
-    fitted = vm.reduce(full.model, "operator_inference", training="nominal")
+    fitted = vm.reduce(full.model, "pod", training="nominal")
     with pytest.raises(InputError, match="is trained on runs of one model"):
         vm.simulate_many(fitted, signals, parameters={"sprung_mass": 1400.0})
     monkeypatch.setattr(batches, "LARGEST", 1000)

@@ -84,7 +84,8 @@ print(json.dumps([[run.outputs.tobytes().hex() for run in runs], sorted(sys.modu
 
 
 def test_another_process_gets_the_same_to_the_bit_and_derives_nothing(car, tmp_path):
-    made = [car, *(vm.reduce(CAR, name, training="nominal") for name in ("softened_slip", "pod"))]
+    methods = "modal_truncation", "pod"
+    made = [car, *(vm.reduce(CAR, name, training="nominal") for name in methods)]
     here = [rom.simulate().outputs.tobytes().hex() for rom in made]
     paths = [str(rom.save(tmp_path / f"{rom.method}.nc")) for rom in made]
     command = [sys.executable, "-c", LOADED, *paths]
@@ -454,10 +455,15 @@ def with_body(body: str, head: str = "def derivative(_x, _u, _constants, _work, 
 
 
 @pytest.fixture(scope="module")
-def softened(tmp_path_factory) -> bytes:
+def own_system(tmp_path_factory) -> bytes:
     """A file whose kernels are a text."""
-    made = vm.reduce(CAR, "softened_slip", training="nominal")
-    path = made.save(tmp_path_factory.mktemp("softened") / "model.nc")
+    made = vm.reduce(CAR, "pod", training="nominal", formulation="state")
+    system = dataclasses.replace(
+        made.reduced.system, constants=made.reduced.system.constants.copy()
+    )
+    reduced = dataclasses.replace(made.reduced, system=system)
+    made = dataclasses.replace(made, reduced=reduced)
+    path = made.save(tmp_path_factory.mktemp("system") / "model.nc")
     text = "\n".join(source.text for source in made.reduced.system.kernels.sources.values())
     return with_kernels(path, text).read_bytes()
 
@@ -466,8 +472,8 @@ def with_kernels(path: Path, text: str) -> Path:
     return rewritten(path, replaced("reduced.fields.system.fields.kernels", {"kernels": text}))
 
 
-def test_kernels_that_are_a_text_are_loaded(softened, tmp_path):
-    (path := tmp_path / "model.nc").write_bytes(softened)
+def test_kernels_that_are_a_text_are_loaded(own_system, tmp_path):
+    (path := tmp_path / "model.nc").write_bytes(own_system)
     assert vm.load(path).simulate().status == "ok"
 
 
@@ -486,10 +492,10 @@ def test_kernels_that_are_a_text_are_loaded(softened, tmp_path):
     ],
 )
 def test_kernels_that_are_more_than_arithmetic_of_their_arrays_are_refused(
-    text, softened, tmp_path, monkeypatch
+    text, own_system, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    (path := tmp_path / "model.nc").write_bytes(softened)
+    (path := tmp_path / "model.nc").write_bytes(own_system)
     refused_untouched(with_kernels(path, text))
     assert not Path("harm").exists()
 
@@ -510,8 +516,8 @@ def test_kernels_that_are_more_than_arithmetic_of_their_arrays_are_refused(
         ("directions", np.zeros((1, 102))),
     ],
 )
-def test_arrays_of_a_system_that_dont_fit_it_are_refused(field, value, softened, tmp_path):
-    (path := tmp_path / "model.nc").write_bytes(softened)
+def test_arrays_of_a_system_that_dont_fit_it_are_refused(field, value, own_system, tmp_path):
+    (path := tmp_path / "model.nc").write_bytes(own_system)
     place = f"reduced.system.{field}"
 
     def change(dataset: xr.Dataset, found: dict[str, Any]) -> None:

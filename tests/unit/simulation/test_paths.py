@@ -67,7 +67,7 @@ def test_a_start_that_is_none_is_one_line(each_model, start) -> None:
 
 @pytest.mark.parametrize(
     ("method", "settings"),
-    [("pod", {"rank": 3}), ("path_map", {}), ("polynomial_residual", {}), ("full_order", {})],
+    [("pod", {"rank": 3}), ("path_map", {}), ("full_order", {})],
 )
 def test_reduced_mechanisms_check_their_inputs(
     model: AlgebraicModel, nominal: Maneuver, method: str, settings: dict
@@ -85,8 +85,6 @@ def test_reduced_mechanisms_check_their_inputs(
     ("method", "settings"),
     [
         ("pod", {"rank": 3}),
-        ("polynomial_residual", {}),
-        ("polynomial_residual", {"solver": "newton"}),
     ],
 )
 def test_reduced_mechanisms_that_diverge_tell_their_counts(

@@ -53,10 +53,6 @@ OUTPUTS = (
     Quantity("position_drift", "m", "violation of the 12 constraints, Euclidean norm"),
     Quantity("velocity_drift", "m/s", "rate of violation of the 12 constraints, Euclidean norm"),
 )
-# Places of independent coordinates among the 26: chassis, lower arms, rear arms, spins.
-PLACES = (*range(6), 10, 17, 20, 21, 22, 23, 24, 25)
-INDEPENDENT_COORDINATES = tuple(COORDINATES[k] for k in PLACES)
-INDEPENDENT_SPEEDS = tuple(SPEEDS[k] for k in PLACES)
 CONSTRAINTS = tuple(
     Quantity(f"{joint}_{axis}_{w}", "m", f"closure of the {w} {text} in {axis}")
     for w in FRONT

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -63,17 +63,10 @@ class FullOrderModel(ShortRepr):
         """Number of coordinates."""
         return len(self.model.coordinates)
 
-    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
-        """Full-order trajectory at the output times; it may have diverged.
-
-        Parameters
-        ----------
-        begin
-            Time in s at which a dynamic model begins with the start, in mid-maneuver if not 0.
-        """
-        later: dict[str, Any] = {"begin": begin} if begin else {}
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Full-order trajectory at the output times; it may have diverged."""
         try:
-            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance, **later)
+            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance)
         except ConvergenceError as error:
             if error.trajectory is None:
                 raise

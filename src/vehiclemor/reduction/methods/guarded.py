@@ -1,13 +1,13 @@
-"""A fast model with a safe one behind it.
+"""A fast model with the full order behind it.
 
-The fast model runs.  If it tells that it leaves what it knows, the safe one does the whole run, or
-goes on from the full state at the last output time that the fast one answers for.
+The fast model runs.  If it tells that it leaves what it knows, the full order does the whole run:
+the fast one has mostly gone wrong before it notices.
 """
 
 import tomllib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -25,7 +25,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
-NAME = "guarded"
+NAME, SAFE = "guarded", "full_order"
 ONLINE = ("solver", "tolerance")
 
 
@@ -36,17 +36,8 @@ class GuardedSettings(OnlineSettings):
     fast_settings: str = Field(
         "", description="its other settings, as in TOML: terms = 12, ridge = 1e-9"
     )
-    safe: Literal["full_order", "independent_coordinates", "frozen_inertia"] = Field(
-        "full_order", description="method of the safe model"
-    )
     safe_solver: Solver = "etdrk4"
     safe_tolerance: Tolerance = 2e-3
-    resume: Literal["start", "departure"] = Field(
-        "start",
-        description="what the safe model does: the whole run, or what comes after the fast one has "
-        "left, which is hardly quicker and inherits what was wrong before it was noticed",
-    )
-    back: float = Field(0.0, ge=0.0, description="time in s before the departure, for resume")
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 2e-3
 
@@ -59,16 +50,10 @@ class GuardedModel(ShortRepr):
     ----------
     solver, tolerance
         Of the fast model, if it has them.
-    safe_name
-        Method of the safe model.
-    back
-        How many seconds before the fast model leaves the safe one takes over.
     """
 
     fast: ReducedModel
-    safe: Any
-    safe_name: str
-    back: float
+    safe: ReducedModel
     offline: Offline
     solver: str
     tolerance: float
@@ -96,47 +81,22 @@ class GuardedModel(ShortRepr):
         return self.ahead.state_space  # type: ignore[attr-defined]
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """The fast run; from where it can't be trusted on, the safe one."""
+        """The fast run; where it can't be trusted, the safe one."""
         run = self.ahead.simulate(maneuver, start)
         if run.status == "ok" and run.trust:
             return run
         # A model that does not judge itself is trusted nowhere.
         silent = run.message or "the fast model does not judge itself"
         trust = run.trust or Trust(np.inf, 0.0, silent)
-        # A run that has failed without a warning is trusted nowhere.
-        known = trust.until if np.isfinite(trust.until) else -np.inf
-        kept = int(np.searchsorted(run.time, known - self.back)) - 1
-        if kept <= 0:
-            kept, begin, state = 0, 0.0, start
-        else:
-            begin, state = float(run.time[kept]), run.states[kept]
-        later = self.safe.simulate(maneuver, state, begin)
-        told = handed_over(begin, self.safe_name, trust.reason or run.message)
-        remark = "; ".join(part for part in (told, later.remark) if part)
-        return replace(joined(run, later, kept), remark=remark, trust=trust)
-
-
-def handed_over(begin: float, name: str, why: str) -> str:
-    """That a method does a run from a time in s on."""
-    return f"from t = {begin:.4g} s on by {name}: {why}"
-
-
-def joined(run: Trajectory, later: Trajectory, kept: int) -> Trajectory:
-    """The first samples of a run, and then the later one; with the later one's status."""
-
-    def rows(name: str) -> np.ndarray:
-        return np.concatenate([getattr(run, name)[:kept], getattr(later, name)])
-
-    return replace(
-        later,
-        time=rows("time"),
-        inputs=rows("inputs"),
-        coordinates=rows("coordinates"),
-        speeds=rows("speeds"),
-        outputs=rows("outputs"),
-        counts={name: count + later.counts[name] for name, count in run.counts.items()},
-        seconds=run.seconds + later.seconds,
-    )
+        safe = self.safe.simulate(maneuver, start)
+        told = f"from t = 0 s on by {SAFE}: {trust.reason or run.message}"
+        return replace(
+            safe,
+            counts={name: count + safe.counts[name] for name, count in run.counts.items()},
+            seconds=run.seconds + safe.seconds,
+            remark="; ".join(part for part in (told, safe.remark) if part),
+            trust=trust,
+        )
 
 
 def fit(
@@ -151,16 +111,8 @@ def fit(
         return fitted(component("method", name), model, training, given)
 
     fast = (others or anew)(settings.fast, _of_fast(model, settings))
-    safe = (others or anew)(settings.safe, _of_safe(model, settings))
-    return GuardedModel(
-        fast,
-        safe,
-        settings.safe,
-        np.inf if settings.resume == "start" else settings.back,
-        _both(fast, safe),
-        settings.solver,
-        settings.tolerance,
-    )
+    safe = (others or anew)(SAFE, _of_safe(model, settings))
+    return GuardedModel(fast, safe, _both(fast, safe), settings.solver, settings.tolerance)
 
 
 def _both(*models: ReducedModel) -> Offline:
@@ -170,16 +122,13 @@ def _both(*models: ReducedModel) -> Offline:
 
 def check(model: DynamicModel, settings: GuardedSettings) -> None:
     """Raise `InputError` if a method or its settings don't fit the model."""
-    if settings.back and settings.resume == "start":
-        raise InputError(f"{NAME}: back is for resume = 'departure'; the whole run is done anew")
-    for setting, of in (("fast", _of_fast), ("safe", _of_safe)):
-        name = getattr(settings, setting)
-        method: Method = component("method", name)
-        accepted, reason = method.accepts(model)
-        if not accepted or name == NAME:
-            told = reason or "it would guard itself"
-            raise InputError(f"{NAME}: {setting} can't be {name!r}: {told}")
-        checked_settings(method, model, of(model, settings))
+    method: Method = component("method", settings.fast)
+    accepted, reason = method.accepts(model)
+    if not accepted or settings.fast == NAME:
+        told = reason or "it would guard itself"
+        raise InputError(f"{NAME}: fast can't be {settings.fast!r}: {told}")
+    checked_settings(method, model, _of_fast(model, settings))
+    checked_settings(component("method", SAFE), model, _of_safe(model, settings))
 
 
 def _of_fast(model: DynamicModel, settings: GuardedSettings) -> Any:
@@ -204,12 +153,12 @@ def _of_fast(model: DynamicModel, settings: GuardedSettings) -> Any:
 def _of_safe(model: DynamicModel, settings: GuardedSettings) -> Any:
     """Settings of the safe model."""
     online = {"solver": settings.safe_solver, "tolerance": settings.safe_tolerance}
-    return validated(component("method", settings.safe), model.kind, online)
+    return validated(component("method", SAFE), model.kind, online)
 
 
 METHOD = Method(
     name=NAME,
-    summary="a fast model where it can be trusted, a safe one from there on",
+    summary="a fast model where it can be trusted, the full order where not",
     settings=dict.fromkeys(("ode", "dae"), GuardedSettings),
     refusal=no_steered_vehicle,
     check=check,

@@ -19,7 +19,6 @@ runs hardly need is eliminated.
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -65,11 +64,6 @@ class SlowManifoldSettings(OnlineSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    nonlinearity: Literal["sliding", "rich"] = Field(
-        "sliding",
-        description="of the lateral terms: sliding: cubic, and in slip angles quintic and |slip| "
-        "slip; rich: and cubic terms that change with the speed",
-    )
     ridge: float = Field(1e-10, ge=0.0, description="weight of the coefficients' size in the fit")
     symmetric: int = Field(
         2, ge=0, description="symmetric modes (or pairs) that are integrated with them"
@@ -82,9 +76,6 @@ class SlowManifoldSettings(OnlineSettings):
         ge=0,
         description="nonlinear terms that the equations keep, those that whole runs need most; "
         "0: all; only with sweeps",
-    )
-    lifting: int = Field(
-        8, ge=0, description="nonlinear terms of the full states, those that explain most; 0: all"
     )
     hull: float = Field(
         1.1,
@@ -110,9 +101,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     modes = slow_modes(shape, settings.fastest, settings.symmetric)
     samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
     ranges = ranges_of(shape, modes, samples.deviations, samples.inputs)
-    table = feature_table(
-        shape, modes, ranges, settings.nonlinearity, settings.hull, settings.trusted
-    )
+    table = feature_table(shape, modes, ranges, settings.hull, settings.trusted)
     reduced = _fitted_on_rates(shape, modes, table, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, training, runs)
@@ -153,9 +142,7 @@ def _fitted_on_rates(
     c[even_nonlinear, n + 2] = ridge_fit(even_columns, ahead - z[:, k:] @ forward, ridge)
     c[odd, n + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
     c[odd, n + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
-    lifting, lifted = fitted_lifting(
-        shape, table, columns, samples.deviations, ridge, settings.lifting
-    )
+    lifting, lifted = fitted_lifting(shape, table, columns, samples.deviations, ridge)
     return ReducedVehicle(
         shape.model,
         shape,

@@ -71,16 +71,11 @@ def project(coordinates: np.ndarray, basis: Basis) -> np.ndarray:
     return basis.mean + (centred @ basis.vectors) @ basis.vectors.T
 
 
-def check_snapshots(snapshots: int, rank: int = 0) -> None:
-    """Raise `InputError` if there are too many snapshots, or fewer than the rank."""
+def check_pod(rank: int, snapshots: int, states: int, whose: str) -> None:
+    """Raise `InputError` if a rank is above the number of states or of snapshots, or these many."""
+    if rank > states:
+        raise InputError(f"rank {rank} is above the {states} {whose}")
     if snapshots > MOST_SNAPSHOTS:
         raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
     if rank > snapshots:
         raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
-
-
-def check_pod(rank: int, snapshots: int, states: int, whose: str) -> None:
-    """Raise `InputError` if a rank is above the number of states or of snapshots."""
-    if rank > states:
-        raise InputError(f"rank {rank} is above the {states} {whose}")
-    check_snapshots(snapshots, rank)

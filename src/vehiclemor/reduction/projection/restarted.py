@@ -38,16 +38,15 @@ class RestartedProjection(DynamicProjection):
         """Steps from any state that is given, as at the beginning of a window."""
         return Stepper(self.system, self.spaces, self.solver, self.tolerance, self.moved)
 
-    def simulate(self, maneuver: Maneuver, start: Start, begin: float = 0.0) -> Trajectory:
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Run the full model, then each window from its state: counts and seconds are of both.
 
         A sample at the edge of two windows is the end of the first one.
         """
         model, times = self.model, maneuver.times
-        times = times[times >= begin]
-        edges = np.array([begin, *self.spaces.edges[1:-1], times[-1]])
-        edges = np.unique(edges[(edges >= begin) & (edges <= times[-1])])
-        full = model.simulate(maneuver, start, edges, self.solver, self.tolerance, begin=begin)
+        edges = np.array([0.0, *self.spaces.edges[1:-1], times[-1]])
+        edges = np.unique(edges[edges <= times[-1]])
+        full = model.simulate(maneuver, start, edges, self.solver, self.tolerance)
         counts = np.array([full.counts[name] for name in DYNAMIC_COUNTS])
         states = np.full((len(times), full.states.shape[1]), np.nan)
         first, seconds, failure, spaces = 0, full.seconds, "", self.spaces

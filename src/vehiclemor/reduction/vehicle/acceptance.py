@@ -1,6 +1,5 @@
 """Why a model can't be reduced as a vehicle; empty where it can."""
 
-from vehiclemor.multibody.high_fidelity.definition import DEFINITION
 from vehiclemor.simulation.model import Model
 
 # Outputs in which the slow manifold has its nonlinear terms.
@@ -28,9 +27,3 @@ def lacking(model: Model, outputs: tuple[str, ...]) -> str:
     """Which of these outputs a model does not have."""
     missing = [name for name in outputs if name not in model.outputs]
     return f"{model.name} has no output {', '.join(missing)}" if missing else ""
-
-
-def no_closed_forms(model: Model) -> str:
-    """Why a model is not the one whose constraints have been solved by hand."""
-    known = DEFINITION.name
-    return "" if model.name == known else f"closed forms are known for {known} alone"

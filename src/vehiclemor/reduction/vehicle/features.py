@@ -62,10 +62,7 @@ def monomials(names: Sequence[str], degree: int) -> tuple[str, ...]:
     return tuple(" * ".join(part) for part in combinations_with_replacement(names, degree))
 
 
-def polynomial_features(states: int, inputs: int, degree: int = 1) -> Features:
-    """1, z, u, and products of reduced coordinates up to a degree."""
-    z = [f"z{i}" for i in range(states)]
-    terms = ["1.0", *z, *(f"u{i}" for i in range(inputs))]
-    for power in range(2, degree + 1):
-        terms += monomials(z, power)
-    return Features(states, inputs, (), tuple(terms))
+def linear_features(states: int, inputs: int) -> Features:
+    """1, z and u."""
+    terms = ("1.0", *(f"z{i}" for i in range(states)), *(f"u{i}" for i in range(inputs)))
+    return Features(states, inputs, (), terms)

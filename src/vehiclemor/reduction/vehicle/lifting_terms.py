@@ -12,6 +12,9 @@ from vehiclemor.reduction.vehicle.regression import forward_selection, largest, 
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_features import FeatureTable
 
+# How many: those that explain most of all states and outputs, each in parts of its range.
+NONLINEAR = 8
+
 
 def fitted_lifting(
     shape: VehicleShape,
@@ -19,7 +22,6 @@ def fitted_lifting(
     columns: np.ndarray,
     deviations: np.ndarray,
     ridge: float,
-    nonlinear: int,
 ) -> tuple[np.ndarray, Features]:
     """Coefficients (terms, n) of the shape's deviations from straight running, and their features.
 
@@ -27,16 +29,13 @@ def fitted_lifting(
     ----------
     columns, deviations
         Features of the table (samples, terms), and deviations (samples, n) that they fit.
-    nonlinear
-        Number of nonlinear terms: those that explain most of all states and outputs, each in parts
-        of its range; 0 for all.
     """
     features, count = table.features, len(table.features.terms)
     given = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
     order = [*given, *np.setdiff1d(np.arange(count), given).tolist()]
     outputs = deviations @ shape.linearised.output_a.T
     values = np.hstack([part / largest(part) for part in (deviations, outputs)])
-    chosen = forward_selection(columns[:, order], values, len(given), nonlinear or count)
+    chosen = forward_selection(columns[:, order], values, len(given), NONLINEAR)
     kept = sorted(order[i] for i in chosen)
     terms = tuple(features.terms[i] for i in kept)
     lifted = replace(features, terms=terms, groups=())

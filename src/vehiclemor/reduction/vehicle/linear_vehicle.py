@@ -15,7 +15,7 @@ import numpy as np
 
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings
-from vehiclemor.reduction.vehicle.features import polynomial_features
+from vehiclemor.reduction.vehicle.features import linear_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import (
@@ -79,7 +79,7 @@ def linear_vehicle(
     """A reduced vehicle of linear lateral dynamics at the speed of the start."""
     linear, modes = shape.linearised, slow_modes(shape, np.inf)
     k, inputs = len(lateral.a), linear.b.shape[1]
-    features = polynomial_features(k + 1, inputs)
+    features = linear_features(k + 1, inputs)
     odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
     # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
     features = replace(

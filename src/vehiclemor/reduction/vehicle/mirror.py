@@ -1,11 +1,7 @@
-"""The mirror image of a vehicle and of its training runs: a vehicle is its own mirror image."""
-
-from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
+"""The mirror image of a vehicle: it is its own mirror image."""
 
 import numpy as np
 
-from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.regression import largest
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.mirror_image import partners
@@ -14,23 +10,6 @@ from vehiclemor.simulation.mirror_image import partners
 STILL = 1e-6
 # How often steering is followed through the equations; relative singular values that are rounding.
 POWERS, RANK = 4, 1e-10
-
-
-@dataclass(frozen=True, eq=False)
-class MirrorBasis:
-    """POD basis of data and their mirror image.
-
-    Attributes
-    ----------
-    encoding, lifting
-        Coordinates per deviation (r, n), with largest magnitude 1 in training, and back (n, r).
-    odd
-        Which coordinates change sign in the mirror (r,).
-    """
-
-    encoding: np.ndarray
-    lifting: np.ndarray
-    odd: np.ndarray
 
 
 def mirror(shape: VehicleShape) -> np.ndarray:
@@ -54,46 +33,3 @@ def mirror(shape: VehicleShape) -> np.ndarray:
         else:
             matrix[i, j] = -1.0 if moved[i] @ moved[j] > 0.0 else 1.0
     return matrix
-
-
-def mirror_basis(deviations: np.ndarray, image: np.ndarray, rank: int) -> MirrorBasis:
-    """POD of deviations (samples, n) and their mirror image, scaled by each state's range."""
-    mirrored = deviations @ image.T
-    scale = np.maximum(np.abs(deviations).max(axis=0), np.abs(mirrored).max(axis=0))
-    scale[scale == 0.0] = 1.0
-    values, vectors, odd = [], [], []
-    for sign in (-1.0, 1.0):
-        # The POD of both together is that of the odd part and of the even part.
-        part = 0.5 * (deviations + sign * mirrored) / scale
-        _, sizes, modes = np.linalg.svd(part, full_matrices=False)
-        values += list(sizes)
-        vectors += list(modes)
-        odd += [sign < 0.0] * len(sizes)
-    chosen = np.argsort(values)[::-1][:rank]
-    modes = np.array(vectors)[chosen]
-    sizes = largest(deviations / scale @ modes.T)
-    return MirrorBasis(
-        modes / scale / sizes[:, None], (modes * scale).T * sizes, np.array(odd)[chosen]
-    )
-
-
-def term_parity(odd: np.ndarray, inputs: int, degree: int) -> np.ndarray:
-    """Which terms of `polynomial_features` change sign in the mirror; all inputs do."""
-    parity = [False, *(bool(o) for o in odd), *[True] * inputs]
-    for power in range(2, degree + 1):
-        products = combinations_with_replacement(odd, power)
-        parity += [sum(product) % 2 == 1 for product in products]
-    return np.array(parity)
-
-
-def with_mirrored(training: Training) -> list[TrainingRun]:
-    """Training runs, and the same with steering to the other side.
-
-    The vehicle is its own mirror image.  Without these runs modes mix what is symmetric with what
-    is lateral, and a car that is dropped leaves its lane.
-    """
-    others = []
-    for run in training:
-        factors = run.maneuver.frequency_factor, -run.maneuver.amplitude_factor
-        others.append(replace(run, maneuver=run.maneuver.perturbed(*factors)))
-    return [*training, *others]

@@ -154,12 +154,6 @@ def turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray)
     return turned
 
 
-def spin_angles(model: DynamicModel) -> np.ndarray:
-    """Numbers of the coordinates that are spin angles: cyclic, and not of the place."""
-    free = np.setdiff1d(np.arange(len(model.coordinates)), model.active)
-    return np.setdiff1d(free, model.planar)
-
-
 class ShapeSamples(NamedTuple):
     """Samples of all runs, one after the other.
 

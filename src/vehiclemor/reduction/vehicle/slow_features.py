@@ -145,7 +145,6 @@ def feature_table(
     shape: VehicleShape,
     modes: SlowModes,
     ranges: Ranges,
-    nonlinearity: str,
     hull: float,
     trusted: float,
 ) -> FeatureTable:
@@ -178,8 +177,7 @@ def feature_table(
     slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
     odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
     odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
-    if nonlinearity == "rich":
-        odd += [f"m * {term}" for term in monomials(v, 3)]
+    odd += [f"m * {term}" for term in monomials(v, 3)]
     odd += [f"{e} * {variable}" for e in own[k:] for variable in v]
     even = [
         "1.0",

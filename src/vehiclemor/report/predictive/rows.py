@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,10 @@ from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.calibration import covered
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.ledger import Drawn, Ledger, pooled
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.plans.protocol_file import Bound, ProtocolFile
+from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part
 from vehiclemor.study.run import run_studies
 
@@ -134,7 +132,6 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
         "outside_silent": int(outside.silent.sum()),
         "outside_flagged": int(outside.flagged.sum()),
         **_errors(part, protocol),
-        "covered": _covered(part, bounds),
         "validation_score": float(part["validation_score"]),
         "candidates": str(part["validation"].item()),
         "evaluations": _mean(part[dataset.attrs["evaluations"]].values, ok),
@@ -182,22 +179,6 @@ def _errors(part: xr.Dataset, protocol: ProtocolFile) -> Row:
             value = float(np.quantile(finite, share)) if finite.size else math.nan
             found[f"{word}_{name}"] = value
     return found
-
-
-def _covered(part: xr.Dataset, bounds: Mapping[str, Bound]) -> str:
-    """JSON: bounded output -> share of the runs whose error is below its estimate, and how sharp.
-
-    The second number is the median of estimate over error; an output without estimates is left out.
-    """
-    found: dict[str, tuple[float, float]] = {}
-    for output, bound in bounds.items():
-        estimate = part["error_estimate"].sel(output=output).values
-        error = part[f"{bound.measure}_error"].sel(output=output).values
-        known = np.isfinite(estimate) & np.isfinite(error) & (error > 0.0)
-        if known.any():
-            estimate, error = estimate[known], error[known]
-            found[output] = float(covered(estimate, error)), float(np.median(estimate / error))
-    return json.dumps(found)
 
 
 def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:

@@ -24,8 +24,6 @@ LEGEND = {
     "offline, s",
     "bound": "with a * it is our own; n/c: not comparable, since the rounds scatter by more than "
     f"{100 * LARGEST_SPREAD:g} % (interquartile range over median)",
-    "cov.": "share of the runs, %, whose error is below the model's own estimate, calibrated on "
-    "validation to cover 95 %; est.: median of estimate over error",
     "*": "chosen by validation",
 }
 
@@ -80,21 +78,18 @@ def _target_table(rows: list[Row], notes: Footnotes) -> str:
 
 def _error_table(winner: Row, notes: Footnotes) -> str:
     """Errors of what was chosen, each beside its bound and the bound's reason."""
-    bounds, covered = json.loads(winner["bounds"]), json.loads(winner["covered"])
+    bounds = json.loads(winner["bounds"])
     lines = []
     for column in (c for c in winner if c.startswith("worst_")):
         kind, _, output = column.removeprefix("worst_").partition("_")
         if math.isnan(winner[column]):
             continue
         bound, reason = bounds.get(output, (math.nan, ""))
-        share, sharp = covered.get(output, (math.nan, math.nan))
         values = (winner[column], winner[column.replace("worst_", "most_", 1)])
         name = f"  {label_of(output).short}{' max' if kind == 'max' else ''} {notes.marks(reason)}"
-        lines.append(
-            Line([name, *map(short, (bound, *values)), fixed(100.0 * share, 0), short(sharp)])
-        )
+        lines.append(Line([name, *map(short, (bound, *values))]))
     heading = f"  errors of {winner['method']}"
-    return table_text([heading, "bound", "worst", "99 %", "cov.", "est."], lines)
+    return table_text([heading, "bound", "worst", "99 %"], lines)
 
 
 def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.calibration import calibrate
 from vehiclemor.study.plans.protocol import Contestant
 from vehiclemor.study.plans.protocol_file import Bound
 
@@ -39,15 +38,11 @@ class Validation:
     evaluations
         Evaluations of the equations, mean of the validation scenarios, by the method's own count:
         it decides among candidates of one method alone.
-    factors
-        Bounded output -> factor that makes an honest estimate of the error that the model tells,
-        see `calibration`; infinite if it tells none, or validation is too small.
     """
 
     stable: float
     score: float
     evaluations: float
-    factors: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -77,14 +72,7 @@ def validation_of(dataset: xr.Dataset, bounds: Mapping[str, Bound], count: str) 
         float(np.isin(dataset["status"].values, FINISHED).mean()),
         float(scores(dataset, bounds).max()),
         float(dataset[count].mean()),
-        {output: _factor(dataset, output, bound.measure) for output, bound in bounds.items()},
     )
-
-
-def _factor(dataset: xr.Dataset, output: str, measure: str) -> float:
-    part = dataset.sel(output=[output])
-    errors = part[f"{measure}_error"].values
-    return float(calibrate(part[f"estimated_{measure}_error"].values, errors)[0])
 
 
 def scores(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> np.ndarray:

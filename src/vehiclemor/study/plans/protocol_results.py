@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.study.plans.calibration import estimated
 from vehiclemor.study.plans.choice import Row, Validation, outcomes
 from vehiclemor.study.plans.ledger import Drawn, Shown
 from vehiclemor.study.plans.protocol import FULL_ORDER, Protocol
@@ -76,7 +75,6 @@ def protocol_dataset(
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
     dataset = dataset.assign(variables(per_row, "row"))
-    dataset["error_estimate"] = _estimates(protocol, rows, dataset)
     judged = dataset["scenario_set"].values == judged_set(found)
     places = np.flatnonzero(judged)[: timed.sizes["scenario"]]
     for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
@@ -97,19 +95,6 @@ def protocol_dataset(
             drawn_on=datetime.now(UTC).isoformat(timespec="seconds"),
         )
     )
-
-
-def _estimates(protocol: Protocol, rows: Sequence[Row], dataset: xr.Dataset) -> tuple:
-    """Errors as the models estimate them, in the measure of each bound, made honest."""
-    sizes = [dataset.sizes[name] for name in ("row", "scenario", "output")]
-    found = np.full(sizes, np.nan)
-    outputs = dataset["output"].values.tolist()
-    factors = [row.validation[row.candidate].factors for row in rows]
-    for output, bound in protocol.definition.bounds.items():
-        raw = dataset[f"estimated_{bound.measure}_error"].sel(output=output).values
-        of_output = np.array([known.get(output, np.inf) for known in factors])
-        found[:, :, outputs.index(output)] = estimated(raw.T, of_output).T
-    return variables({"error_estimate": found}, "row", "scenario")["error_estimate"]
 
 
 def judged_set(sets: Container[str]) -> str:
@@ -181,10 +166,4 @@ def _validation(row: Row) -> str:
 
 def _finite(result: Validation) -> dict[str, Any]:
     """JSON has no infinity: a number that is infinite is null."""
-
-    def finite(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {name: finite(part) for name, part in value.items()}
-        return value if np.isfinite(value) else None
-
-    return finite(asdict(result))
+    return {name: value if np.isfinite(value) else None for name, value in asdict(result).items()}

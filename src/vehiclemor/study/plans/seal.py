@@ -19,7 +19,7 @@ from vehiclemor.study.scenario import Scenario, parameters_of
 # Sets that models have learned from or were chosen by.
 LEARNED = ("training", "validation")
 # Source that decides what is drawn, run and timed, and how it is judged.
-PLANS = ("boxes", "calibration", "choice", "protocol", "protocol_file", "protocol_results")
+PLANS = ("boxes", "choice", "protocol", "protocol_file", "protocol_results")
 RUNS = ("plans/protocol_run", "plans/seal", "plans/sensitive", "experiment", "timing", "workers")
 JUDGING = (*(f"plans/{name}" for name in PLANS), *RUNS)
 

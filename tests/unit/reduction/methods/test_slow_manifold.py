@@ -10,7 +10,7 @@ from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
-from vehiclemor.reduction.vehicle.features import polynomial_features
+from vehiclemor.reduction.vehicle.features import linear_features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
@@ -132,7 +132,7 @@ def _held(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
 
 def test_a_linear_system_is_solved_exactly_in_the_limit() -> None:
     # z' = -3 z + 2 u, psi' = z: the steady state of a held input is known.
-    features = polynomial_features(1, 1)
+    features = linear_features(1, 1)
     c = np.zeros((3, 4))
     c[1, 0], c[2, 0], c[1, 1], c[0, 2] = -3.0, 2.0, 1.0, 10.0
     system = feature_system(features, np.zeros(0), c, np.ones(4), np.zeros(1))

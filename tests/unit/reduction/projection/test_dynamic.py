@@ -14,7 +14,7 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.steering_maneuvers import lane_change
+from vehiclemor.steering_maneuvers import lane_change, step_steer
 
 N = 14
 STATE, COORDINATES = "state", "coordinates"
@@ -193,3 +193,11 @@ def test_divergence_is_recorded_with_its_time(model):
 def test_settings_that_do_not_fit_are_refused(model, chosen, text):
     with pytest.raises(InputError, match=text):
         fitted(model, **chosen)
+
+
+def test_windows_refuse_runs_of_different_durations(model):
+    settings = validated(pod.METHOD, "ode", {})
+    runs = [TrainingRun(model, maneuver, "dropped") for maneuver in (lane_change, step_steer)]
+    with pytest.raises(InputError, match="training runs of one duration, not 5, 25 s") as caught:
+        pod.fit(model, runs, settings)
+    assert "\n" not in str(caught.value)

@@ -1,1 +1,0 @@
-"""The high-fidelity vehicle in other coordinates than its own: constants and kernels."""
