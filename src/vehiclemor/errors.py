@@ -4,6 +4,7 @@ import difflib
 import dis
 import errno
 from collections.abc import Iterable
+from contextlib import suppress
 from traceback import walk_tb
 from typing import Any
 
@@ -92,14 +93,17 @@ def printable(text: str) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """Kind and text of an error in one line."""
-    return printable(f"{type(error).__name__}: {error}").removesuffix(":")
+    """Kind and text of an error in one line; a plug-in's may have no text."""
+    text = ""
+    with suppress(Exception):
+        text = str(error)
+    return printable(f"{type(error).__name__}: {text}").rstrip(": ")
 
 
 def interrupted(error: BaseException) -> bool:
     """Whether the user stops the program: by Ctrl-C, which no `raise` of a plug-in stands for."""
     if type(error) is not KeyboardInterrupt:
-        return isinstance(error, KeyboardInterrupt)
+        return False
     place = error.__traceback__
     while place and place.tb_next:
         place = place.tb_next

@@ -40,8 +40,9 @@ def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
     name, (_, until) = min(ranges.items(), key=lambda item: item[1][1], default=("", (0.0, np.inf)))
     if until == np.inf:
         return Trust(indicator)
-    reason = f"{name} is beyond its known range, in the run up to {indicator:.3g} times"
-    return Trust(indicator, until, reason)
+    # Of what was zero in training no multiple tells anything.
+    times = f", in the run up to {indicator:.3g} times" if indicator < 1e6 else ""
+    return Trust(indicator, until, f"{name} is beyond its known range{times}")
 
 
 def largest_inputs(maneuvers: Sequence[Maneuver]) -> np.ndarray:
