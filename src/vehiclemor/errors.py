@@ -103,7 +103,8 @@ def one_line(error: BaseException) -> str:
 def interrupted(error: BaseException) -> bool:
     """Whether the user stops the program: by Ctrl-C, which no `raise` of a plug-in stands for."""
     if type(error) is not KeyboardInterrupt:
-        return False
+        ours = type(error).__module__.startswith("vehiclemor.")
+        return ours and isinstance(error, KeyboardInterrupt)
     place = error.__traceback__
     while place and place.tb_next:
         place = place.tb_next
