@@ -84,6 +84,9 @@ def ends(error):
     return ended
 def zeroed(model, *_):
     model.constants[:] = 0
+class Stop(KeyboardInterrupt): ...
+class Speechless(Exception):
+    def __str__(self): raise ValueError("no text")
 def interrupted(*_):
     signal.raise_signal(signal.SIGINT)
     time.sleep(1)
@@ -127,6 +130,8 @@ def faulty(plug_in):
         ("Reduced.offline = None", "offline is None, no Offline"),
         ("METHOD = replace(METHOD, fit=ends(SystemExit(0)))", "fit: SystemExit: 0 (/"),
         ("METHOD = replace(METHOD, fit=ends(KeyboardInterrupt()))", "fit: KeyboardInterrupt (/"),
+        ("METHOD = replace(METHOD, fit=ends(Stop()))", "fit: Stop (/"),
+        ("METHOD = replace(METHOD, fit=ends(Speechless()))", "fit: Speechless (/"),
         ("METHOD = replace(METHOD, fit=ends(BaseException('mine')))", "BaseException: mine (/"),
         ("METHOD = replace(METHOD, fit=ends(OSError(2, 'x')))", "fit: FileNotFoundError: [Errno 2"),
         ("METHOD = replace(METHOD, check=ends(SystemExit(0)))", "check: SystemExit: 0 (/"),
