@@ -56,8 +56,8 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     extent, (low, high) = extent_of(maneuver), np.array(ranges).T
     outside = np.flatnonzero((extent.low < low) | (extent.high > high))
     if len(outside):
-        anything = np.full((2, len(low)), np.inf)
-        since = extent_of(maneuver, np.vstack([low, high, anything])).since
+        however_quick = np.full((2, len(low)), np.inf)
+        since = extent_of(maneuver, np.vstack([low, high, however_quick])).since
         j = outside[since[outside].argmin()]
         name, unit = definition.inputs[j].name, definition.inputs[j].unit
         value = maneuver.at(since[j : j + 1])[0, j]
