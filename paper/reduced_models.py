@@ -1,11 +1,11 @@
 """Makes the reduced models that ship with the package: of each protocol the one that it has chosen.
 
-Usage: python paper/reduced_models.py [--check] [MODEL ...]
+Usage: python paper/reduced_models.py [--check] [--results FOLDER] [MODEL ...]
 
-What was chosen stands in the ledger of the protocol's draws.  It is fitted on the protocol's
+Protocols are run first where their results are missing.  What is chosen is fitted on the protocol's
 training runs and written to data/reduced/MODEL.nc, unless a file made by the same source of the
-same choice is there.  With --check nothing is written, every model is fitted anew and compared
-with its file; the exit status is 1 if one differs.
+same choice is there.  With --check nothing is run or written: what each file says that it was made
+of is fitted anew and compared with it; the exit status is 1 if one differs.
 """
 
 import argparse
@@ -18,16 +18,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vehiclemor import VehiclemorError
+from vehiclemor.api import RESULTS
 from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder
 from vehiclemor.online.model_file import content
 from vehiclemor.online.rom import ReducedOrderModel, reduce
 from vehiclemor.online.saved import load, shipped_folder
-from vehiclemor.registry import component
-from vehiclemor.resources import checkout_data, data_folder, data_names
-from vehiclemor.study.method_settings import Settings, complete_settings
-from vehiclemor.study.plans.ledger import Ledger
+from vehiclemor.resources import checkout_data, data_names
+from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
+from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.scenario import Scenario, parameters_of, start_of
 
@@ -47,19 +47,22 @@ class Choice(NamedTuple):
     training: tuple[Scenario, ...]
 
 
-def chosen(name: str) -> Choice:
-    """The winner of the last draw in the ledger of a model's protocol."""
+def chosen(name: str, results: Path) -> Choice:
+    """What validation has chosen in a model's protocol."""
     protocol = load_protocol(name)
-    drawn = [draw for draw in Ledger(name, data_folder(), own=True).entries() if draw.rows]
-    if not drawn:
-        raise VehiclemorError(f"protocol {name!r} has no draw: vehiclemor run predictive")
-    label, row = next((label, row) for label, row in drawn[-1].rows.items() if row.winner)
-    training = next(c.training for c in protocol.contestants if c.label == label)
-    # What was a setting when it was drawn, and is none any more, has that value for good.
-    known = component("method", row.method).names_of(protocol.model.kind)
-    given = {name: value for name, value in row.settings.items() if name in known}
-    settings = complete_settings(protocol.model, row.method, given)
-    return Choice(protocol, row.method, settings, training)
+    dataset = run_protocol(protocol, results)
+    row = dataset.isel(row=int(dataset["winner"].values.argmax()))
+    training = next(c.training for c in protocol.contestants if c.label == row["row"].item())
+    method, settings = str(row["method"].item()), json.loads(str(row["settings"].item()))
+    return Choice(protocol, method, settings, training)
+
+
+def shipped(name: str) -> Choice:
+    """What the file of a model says that it was made of."""
+    rom, protocol = load(path_of(name)), load_protocol(name)
+    settings, method = dict(rom.settings), rom.method
+    training = next(c.training for c in protocol.contestants if c.method == method)
+    return Choice(protocol, method, settings, training)
 
 
 def fitted(choice: Choice) -> ReducedOrderModel:
@@ -108,13 +111,15 @@ def main() -> int:
     """Write or check the files; exit status."""
     parser = argparse.ArgumentParser(description="Make the reduced models that ship.")
     parser.add_argument("--check", action="store_true", help="compare with a fit, write nothing")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="results folder")
     parser.add_argument("models", nargs="*", default=data_names("protocols"), metavar="MODEL")
     given = parser.parse_args()
     if not given.check and checkout_data() is None:
         raise VehiclemorError("the package does not run from a checkout: pip install -e . there")
     status = 0
     for name in given.models:
-        choice, path = chosen(name), path_of(name)
+        choice = shipped(name) if given.check else chosen(name, given.results)
+        path = path_of(name)
         reasons = stale(name, choice)
         if not reasons and not given.check:
             print(f"{name}: {path} is up to date")

@@ -243,6 +243,7 @@ def run_study(
     out: str | Path = RESULTS,
     progress: Callable[[str, int, int], None] | None = None,
     scheduler: str = "",
+    seed: int | None = None,
 ) -> xr.Dataset:
     """Run a study, resuming where an earlier run stopped.
 
@@ -259,6 +260,8 @@ def run_study(
     scheduler
         Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
         with so many processes.
+    seed
+        Draws fresh test runs of protocols, for an audit; by default the file's seed.
 
     Returns
     -------
@@ -278,7 +281,7 @@ def run_study(
         raise InputError(f"scheduler is {quoted(scheduler)}, not an address")
     with listening(progress):
         study, out = str(file_path("study", study)), file_path("out", out)
-        results = run_studies(study, out, jobs, scheduler)
+        results = run_studies(study, out, jobs, scheduler, seed)
     return next(iter(results.values())) if len(results) == 1 else flattened(results)
 
 

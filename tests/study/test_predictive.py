@@ -175,7 +175,7 @@ def test_a_protocol_that_was_renamed_is_the_same(done, tmp_path, monkeypatch):
         monkeypatch.setattr(f"vehiclemor.study.{name}", None)
     again = run_studies(str(place / "mine.toml"), place)["predictive-renamed"]
     xr.testing.assert_equal(again, dataset)
-    for name in ("digest", "drawn_on", "content"):
+    for name in ("test_set", "content"):
         assert again.attrs[name] == dataset.attrs[name]
     assert (place / "studies" / "predictive-renamed.nc").exists()
 

@@ -17,6 +17,7 @@ def compare(
     json_output: Annotated[bool, Parameter(name="--json", negative="")] = False,
     out: Path = api.RESULTS,
     jobs: int = 1,
+    seed: int | None = None,
 ) -> int:
     """Set published numbers beside reproduced ones, or the methods of a study side by side.
 
@@ -35,12 +36,14 @@ def compare(
         Results folder; studies and timings that are missing are run first.
     jobs
         Number of processes for missing studies.
+    seed
+        Draws fresh test runs for an audit: of predictive, or of a protocol.
     """
     from vehiclemor.report.comparison.kinds import compare as compared
     from vehiclemor.report.comparison.kinds import comparison_text
 
     with shown_progress():
-        rows = compared(what, out, jobs)
+        rows = compared(what, out, jobs, seed)
     if json_output:
         print_json(rows)
     else:

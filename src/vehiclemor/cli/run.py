@@ -11,7 +11,14 @@ from vehiclemor.cli.status import print_reasons
 from vehiclemor.report.printing import wrapped
 
 
-def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESULTS) -> int:
+def run(
+    study: str,
+    *,
+    jobs: int = 1,
+    scheduler: str = "",
+    out: Path = api.RESULTS,
+    seed: int | None = None,
+) -> int:
     """Run a study; what an earlier run has finished is not computed again.
 
     A cell that stands at several points of the grid is computed once.
@@ -27,6 +34,8 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
         with so many processes.
     out
         Results folder.
+    seed
+        Draws fresh test runs of protocols, for an audit; their results stand apart.
     """
     from vehiclemor.report.errors import counted_ends
     from vehiclemor.study.progress import listening
@@ -41,7 +50,7 @@ def run(study: str, *, jobs: int = 1, scheduler: str = "", out: Path = api.RESUL
             shown(name, done, total)
 
         with listening(counted):
-            results = run_studies(study, out, jobs, scheduler)
+            results = run_studies(study, out, jobs, scheduler, seed)
     errors = 0
     for name, dataset in results.items():
         places = f"{dataset['status'].size} grid points, {cells[name]} cells"

@@ -44,7 +44,6 @@ COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
 VERDICT = "item verdict variant start published bound reproduced unit measure reason"
 TARGET = "item bound measured unit verdict reason threshold_source"
 CONTESTANT = "method role winner misses silent flagged score seconds ratio_equal offline_seconds"
-DRAW = "date digest runs method misses silent flagged"
 NOTE = (
     "misses: runs outside of a bound; silent: of these with the status ok; flagged: runs of which "
     "the model says that it has left what it knows; score: largest error over its bound; "
@@ -111,7 +110,7 @@ def write_report(
         sections += attempt_apart("comparison with the paper", left_out, made)
     for name, dataset in found.items():
         section = _protocol if "row" in dataset.dims else _study
-        made = attempt_apart(name, left_out, partial(section, name, dataset, folder, left_out))
+        made = attempt_apart(name, left_out, partial(section, name, dataset, left_out))
         sections += [part._replace(attributes=dataset.attrs) for part in made]
         if not made and not studies:
             left_out[name] += "; if other source has stored it, vehiclemor run makes it again"
@@ -162,12 +161,11 @@ def _paper(folder: Path, jobs: int) -> Section:
     return Section("published", "Published beside reproduced", intro, tables)
 
 
-def _protocol(name: str, dataset: xr.Dataset, folder: Path, left_out: dict[str, str]) -> Section:
-    """Targets of what was chosen, all contestants, and the draws under the same rules."""
-    rows = protocol_rows(dataset, folder)
-    targets, methods, draws = (
-        pd.DataFrame([row for row in rows if row["kind"] == kind and row.get("same_rules", True)])
-        for kind in ("target", "method", "draw")
+def _protocol(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Section:
+    """Targets of what was chosen, and all contestants."""
+    rows = protocol_rows(dataset)
+    targets, methods = (
+        pd.DataFrame([row for row in rows if row["kind"] == kind]) for kind in ("target", "method")
     )
     methods = methods.sort_values(["silent", "misses", "score"])
     errors = [key for key in methods if str(key).startswith("worst_")]
@@ -176,17 +174,17 @@ def _protocol(name: str, dataset: xr.Dataset, folder: Path, left_out: dict[str, 
             {"verdict": VERDICTS}
         ),
         f"Contestants on the judged runs. {NOTE}": methods[[*CONTESTANT.split(), *errors]],
-        "Draws of the ledger under the same rules": draws.reindex(columns=DRAW.split()),
     }
     made = partial(
         _svg, "Worst error over bound, over time", partial(figure_pareto, {name: dataset})
     )
     pictures = attempt_apart(f"errors over times of {name}", left_out, made)
-    intro = f"{methods['runs'].iloc[0]} judged runs of {dataset.attrs['model']}."
+    runs, test_set = methods["runs"].iloc[0], dataset.attrs["test_set"]
+    intro = f"{runs} judged runs of {dataset.attrs['model']}, test set {test_set}."
     return Section(name, str(dataset.attrs["title"]), intro, tables, pictures)
 
 
-def _study(name: str, dataset: xr.Dataset, _: Path, left_out: dict[str, str]) -> Section:
+def _study(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Section:
     """Errors of every run of a study on a grid, and every picture that it has the data for."""
     held = {"histories": bool(dataset.sizes.get("time")), "errors": True}
     held["paths"] = held["histories"] and set(PATH) <= set(dataset["output"].values)

@@ -34,7 +34,7 @@ LARGE, AT_ONCE = 10_000, 5_000
 
 
 def run_studies(
-    study: str, folder: Path, jobs: int = 1, scheduler: str = ""
+    study: str, folder: Path, jobs: int = 1, scheduler: str = "", seed: int | None = None
 ) -> dict[str, xr.Dataset]:
     """Run a study, or all studies of a collection, and combine the results.
 
@@ -48,6 +48,8 @@ def run_studies(
         Number of processes.
     scheduler
         Address of a dask scheduler whose workers compute, or `local` for one that is started here.
+    seed
+        Of the drawn test runs of protocols, for an audit; by default that of their files.
 
     Returns
     -------
@@ -56,10 +58,14 @@ def run_studies(
         `predictive-<protocol>`.
     """
     count("jobs", jobs, most=MOST_JOBS)
+    if seed is not None:
+        count("seed", seed, least=0)
     if jobs > 1 and scheduler not in ("", LOCAL):
         raise InputError("jobs: a scheduler at an address has its own workers")
     files = studies_and_files(study)
-    protocols = [load_protocol(name) for _, d in files.values() for name in d.protocols]
+    protocols = [load_protocol(name, seed) for _, d in files.values() for name in d.protocols]
+    if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
+        raise InputError(f"seed: {study} draws no test runs")
     grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
     with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}

@@ -629,8 +629,8 @@ SHIPPED = data_names("protocols")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_a_shipped_model_is_what_its_protocol_chooses(name):
-    choice = reduced_models.chosen(name)
+def test_a_shipped_model_is_what_a_fit_gives(name):
+    choice = reduced_models.shipped(name)
     other = reduced_models.stale(name, choice)
     mend = f"data/reduced is out of date, see the other side: run {reduced_models.COMMAND}"
     # Of other source a fit may be the same; one that takes no time is always made.
@@ -642,7 +642,7 @@ def test_a_shipped_model_is_what_its_protocol_chooses(name):
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_model_keeps_its_bounds_on_runs_of_the_validation(name):
-    rom, choice = vm.rom(name), reduced_models.chosen(name)
+    rom, choice = vm.rom(name), reduced_models.shipped(name)
     bounds = choice.protocol.definition.bounds
     for scenario in choice.protocol.sets["validation"][:2]:
         start = start_of(rom.model, scenario)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import count, file_path
+from vehiclemor.errors import InputError
 from vehiclemor.registry import names, unknown
 from vehiclemor.resources import data_names
 
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> pd.DataFrame:
+def compare(
+    what: str = "paper", out: str | Path = "results", jobs: int = 1, seed: int | None = None
+) -> pd.DataFrame:
     """A comparison as a table; studies and timings that are missing are run first.
 
     Parameters
@@ -27,6 +30,8 @@ def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> 
         Results folder.
     jobs
         Number of processes.
+    seed
+        Draws fresh test runs for an audit: of `predictive`, or of a protocol.
 
     Returns
     -------
@@ -43,6 +48,8 @@ def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> 
         If there is no such comparison.
     """
     folder, jobs = file_path("out", out), count("jobs", jobs)
+    if seed is not None and (what == "paper" or what in names("model")):
+        raise InputError(f"seed: comparison {what!r} draws no test runs of its own")
     if what == "paper":
         from vehiclemor.report.comparison.paper import paper_comparison
 
@@ -50,7 +57,7 @@ def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> 
     if what == "predictive":
         from vehiclemor.report.predictive.rows import predictive_comparison
 
-        return predictive_comparison(folder, jobs)
+        return predictive_comparison(folder, jobs, seed=seed)
     if what in names("model"):
         from vehiclemor.report.comparison.model import model_comparison
 
@@ -58,7 +65,7 @@ def compare(what: str = "paper", out: str | Path = "results", jobs: int = 1) -> 
     if isinstance(what, str) and (what in data_names("studies") or what.endswith(".toml")):
         from vehiclemor.report.comparison.study import study_comparison
 
-        return study_comparison(what, folder, jobs)
+        return study_comparison(what, folder, jobs, seed)
     known = ["paper", "predictive", *names("model"), *data_names("studies"), "FILE.toml"]
     raise unknown("comparison", what, known)
 

@@ -45,7 +45,9 @@ LEGEND = {
 }
 
 
-def study_comparison(study: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
+def study_comparison(
+    study: str, folder: Path, jobs: int = 1, seed: int | None = None
+) -> pd.DataFrame:
     """A study, all members of a collection, or a protocol; what is missing is run first.
 
     Returns
@@ -55,8 +57,8 @@ def study_comparison(study: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
         over a study's grid, see `grid_rows`.  The others are those of `predictive_comparison`.
     """
     rows: list[Row] = []
-    for dataset in run_studies(study, folder, jobs).values():
-        rows += protocol_rows(dataset, folder) if "row" in dataset.dims else grid_rows(dataset)
+    for dataset in run_studies(study, folder, jobs, seed=seed).values():
+        rows += protocol_rows(dataset) if "row" in dataset.dims else grid_rows(dataset)
     return pd.DataFrame(rows)
 
 

@@ -14,7 +14,6 @@ from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
-from vehiclemor.study.plans.ledger import Drawn, Ledger, pooled
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part
@@ -26,8 +25,15 @@ OUTSIDE = ("outside", "drawn_outside")
 CLOCKS = {"seconds": "whole call", "loop_seconds": "compiled loop"}
 
 
-def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd.DataFrame:
+def predictive_comparison(
+    folder: Path, jobs: int = 1, study: str = STUDY, seed: int | None = None
+) -> pd.DataFrame:
     """The comparison as a table; what is missing is run first.
+
+    Parameters
+    ----------
+    seed
+        Of the drawn test runs, for an audit; by default that of the protocols.
 
     Returns
     -------
@@ -35,30 +41,22 @@ def predictive_comparison(folder: Path, jobs: int = 1, study: str = STUDY) -> pd
         `kind` tells what a row is, `study` of which protocol.  `method`: one contestant on what is
         judged, with the columns of `method_rows`.  `target`: what the contender that validation
         has chosen must reach, with `id`, `bound`, `measured`, `unit`, `verdict` (`met`, `missed` or
-        `not_comparable`), `reason` and `threshold_source`.  `draw`: a draw of the ledger.  `paper`:
-        POD at the paper's rank and control period, see `paper_terms`.  Errors
-        `worst_<measure>_<output>` are in SI units.
+        `not_comparable`), `reason` and `threshold_source`.  `paper`: POD at the paper's rank and
+        control period, see `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
     """
-    results = run_studies(study, folder, jobs).values()
-    rows = [row for dataset in results for row in protocol_rows(dataset, folder)]
-    if study == STUDY:
+    results = run_studies(study, folder, jobs, seed=seed).values()
+    rows = [row for dataset in results for row in protocol_rows(dataset)]
+    if study == STUDY and seed is None:
         rows += paper_terms_rows([dataset.attrs["model"] for dataset in results], folder)
     return pd.DataFrame(rows)
 
 
-def protocol_rows(dataset: xr.Dataset, folder: Path) -> list[Row]:
-    """Rows of one protocol: contestants, targets and draws, as of `predictive_comparison`."""
-    protocol, draws = protocol_of(dataset), draws_of(dataset, folder)
-    methods = method_rows(dataset, protocol, draws)
+def protocol_rows(dataset: xr.Dataset) -> list[Row]:
+    """Rows of one protocol: contestants and targets, as of `predictive_comparison`."""
+    protocol = protocol_of(dataset)
+    methods = method_rows(dataset, protocol)
     rows = methods + target_rows(dataset, protocol, methods)
-    rows += [_draw_row(entry, dataset) for entry in draws]
     return [{**row, "study": str(dataset.attrs["study"])} for row in rows]
-
-
-def draws_of(dataset: xr.Dataset, folder: Path) -> list[Drawn]:
-    """Draws of a protocol that stand in its ledger."""
-    name = str(dataset.attrs["study"]).removeprefix(f"{STUDY}-")
-    return Ledger(name, folder, bool(dataset.attrs["own"])).entries()
 
 
 def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
@@ -66,15 +64,13 @@ def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
     return ProtocolFile.model_validate_json(dataset.attrs["configuration"])
 
 
-def method_rows(
-    dataset: xr.Dataset, protocol: ProtocolFile, draws: list[Drawn] | None = None
-) -> list[Row]:
+def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     """One row for each contestant, full-order integrators as measures.
 
-    `runs` are judged; of these `misses` miss a bound, `silent` ones with the status ok; `flagged`
-    are those of which the model says that it has left what it knows.  `rate_bound`: largest rate of
-    misses that is not excluded at 95 %, of this draw, and `pooled_bound` of all of the ledger; of
-    the chosen row of what each draw had chosen.
+    `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
+    there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; `flagged` are those
+    of which the model says that it has left what it knows.  `rate_bound`: largest rate of misses
+    that is not excluded at 95 %.
     `score` is the largest error of a bounded output as a multiple of its bound (infinite if a run
     has failed), `seconds` the mean of whole calls, `loop_seconds` of their compiled loops, with the
     `spread` of the rounds (interquartile range over median).  `ratio_equal` and `ratio_equal_loop`
@@ -91,10 +87,6 @@ def method_rows(
     ]
     for row in rows:
         row.update(_against(row, full, ladders))
-        label = None if row["winner"] else row["method"]
-        misses, silent, runs = pooled(draws or (), dataset.attrs.get("rules", ""), label)
-        row |= {"pooled_misses": misses, "pooled_silent": silent, "pooled_runs": runs}
-        row["pooled_bound"] = upper_bound(misses, runs) if runs else math.nan
     return rows
 
 
@@ -117,7 +109,9 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
         "settings": str(part["settings"].item()),
         "bounds": json.dumps({o: (b.bound, b.reason) for o, b in bounds.items()}),
         "winner": bool(part["winner"]),
+        "test_set": str(dataset.attrs["test_set"]),
         "runs": runs,
+        "apart": int((dataset["apart"].values != "").sum()),
         "misses": misses,
         "silent": int(found.silent.sum()),
         "flagged": int(found.flagged.sum()),
@@ -197,22 +191,4 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
         "within": best["method"] if best else "",
         "ratio_within": ratio(best, row),
         "break_even": row["offline_seconds"] / saved if saved > 0.0 else math.inf,
-    }
-
-
-def _draw_row(entry: Drawn, dataset: xr.Dataset) -> Row:
-    """A draw of the ledger: of the contender that was chosen then."""
-    label, row = next(((n, r) for n, r in entry.rows.items() if r.winner), ("", None))
-    counts = ("misses", "silent", "flagged")
-    return {
-        "kind": "draw",
-        "model": entry.model,
-        "method": label,
-        "date": entry.date,
-        "digest": entry.digest,
-        "shown": entry.digest == dataset.attrs["digest"],
-        "same_rules": entry.rules == dataset.attrs["rules"],
-        "runs": entry.runs,
-        "apart": entry.apart,
-        **{name: getattr(row, name) if row else math.nan for name in counts},
     }

@@ -47,17 +47,24 @@ def predictive_text(rows: pd.DataFrame) -> str:
 
 
 def _protocol_text(rows: list[Row]) -> str:
-    methods, draws, notes = _of_kind(rows, "method"), _of_kind(rows, "draw"), Footnotes()
+    methods, notes = _of_kind(rows, "method"), Footnotes()
     winner = chosen(methods)
     name, model = (str(methods[0][key]) for key in ("study", "model"))
     known = name.removeprefix("predictive-")
     of_model = "" if known == model else f" ({model})"
-    lines = [wrapped(f"{known}{of_model}: {methods[0]['runs']:.0f} runs")]
+    lines = [wrapped(f"{known}{of_model}: {_test_set(methods[0])}")]
     lines += [_target_table(_of_kind(rows, "target"), notes)]
     lines += [_error_table(winner, notes) if winner else ""]
     lines += [_method_table(methods, winner, notes)]
-    lines += [_draw_text(draws, winner), notes.text()]
+    lines += [notes.text()]
     return "\n".join(text for text in lines if text)
+
+
+def _test_set(row: Row) -> str:
+    text = f"{row['runs']:.0f} runs (test set {row['test_set']})"
+    if row["apart"]:
+        text += f", {row['apart']:.0f} more not judged, on which the full order is sensitive"
+    return text
 
 
 def _of_kind(rows: list[Row], kind: str) -> list[Row]:
@@ -121,23 +128,3 @@ def _costs(row: Row, notes: Footnotes) -> list[str]:
     cells += [fixed(1e6 * row.get(clock, math.nan), 0) for clock in ("seconds", "loop_seconds")]
     cells += [fixed(row["ratio_equal"], 1), fixed(row["ratio_equal_loop"], 1)]
     return [*cells, short(row["offline_seconds"]) if row["offline_seconds"] else "-"]
-
-
-def _draw_text(draws: list[Row], winner: Row | None) -> str:
-    """The draw that is shown, and what all under the same rules say together."""
-    shown = [row for row in draws if row["shown"] and row["runs"]]
-    if not shown or winner is None:
-        return ""
-    last = shown[-1]
-    same = [row for row in draws if row["same_rules"]]
-    silent = sum(not row["runs"] for row in same)
-    runs, apart = (f"{last[name]:.0f}" for name in ("runs", "apart"))
-    missed, unsaid, of = (f"{winner[f'pooled_{n}']:.0f}" for n in ("misses", "silent", "runs"))
-    text = (
-        f"{runs} runs drawn on {str(last['date'])[:10]} (seal {str(last['digest'])[:10]}), {apart} "
-        f"more apart, on which the full order is sensitive. {len(same)} draws under these rules "
-        f"stand in the ledger, {silent} of them not finished; in all together what was chosen then "
-        f"has {missed} misses, {unsaid} of them silent, of {of} runs: a rate below "
-        f"{short(100.0 * winner['pooled_bound'])} %."
-    )
-    return wrapped(text, 2, 2)

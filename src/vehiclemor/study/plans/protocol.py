@@ -8,19 +8,17 @@ from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import choice, component
-from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.method_settings import Settings, complete_settings
-from vehiclemor.study.plans.boxes import check_boxes
-from vehiclemor.study.plans.protocol_file import ContestantEntry, Group, ProtocolFile
+from vehiclemor.study.plans.protocol_file import Box, ContestantEntry, Draw, Group, ProtocolFile
 from vehiclemor.study.plans.study_file import named_file
 from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml
 
 SETS = ("training", "validation", "test", "outside")
-# Drawn when all that they test is settled.
+# Drawn from boxes.
 DRAWN = ("drawn", "drawn_outside")
 FULL_ORDER, CONTENDER = "full order", "contender"
 
@@ -63,6 +61,8 @@ class Protocol:
     ----------
     sets
         Name of `SETS` -> scenarios.
+    seed
+        Of the drawn runs: the file's, or another one for an audit.
     """
 
     path: Path
@@ -70,16 +70,18 @@ class Protocol:
     model: Model
     sets: dict[str, tuple[Scenario, ...]]
     contestants: tuple[Contestant, ...]
+    seed: int
 
     @property
     def study(self) -> str:
-        """Name of its results."""
-        return f"predictive-{self.path.stem}"
+        """Name of its results; an audit's are apart."""
+        audit = "" if self.seed == self.definition.seed else f"-seed-{self.seed}"
+        return f"predictive-{self.path.stem}{audit}"
 
     @property
-    def own(self) -> bool:
-        """Whether it is one of the package's."""
-        return self.path.is_relative_to(data_folder())
+    def test_set(self) -> str:
+        """Name of its drawn test set, with the seed."""
+        return f"predictive-{self.definition.version}, seed {self.seed}"
 
 
 def protocol_path(protocol: str) -> Path:
@@ -87,8 +89,13 @@ def protocol_path(protocol: str) -> Path:
     return named_file("protocol", "protocols", protocol)
 
 
-def load_protocol(protocol: str) -> Protocol:
+def load_protocol(protocol: str, seed: int | None = None) -> Protocol:
     """A protocol by the name of a file of the package's data, or by the path of a TOML file.
+
+    Parameters
+    ----------
+    seed
+        Of the drawn runs, for an audit; by default that of the file.
 
     Raises
     ------
@@ -98,14 +105,14 @@ def load_protocol(protocol: str) -> Protocol:
     path = protocol_path(protocol)
     definition = read_toml(path, ProtocolFile)
     try:
-        return _resolved(path, definition)
+        return _resolved(path, definition, definition.seed if seed is None else seed)
     except PlugInError:
         raise
     except (GeometryError, InputError) as error:
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
+def _resolved(path: Path, definition: ProtocolFile, seed: int) -> Protocol:
     model = build(definition.model)
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
     if definition.straight:
@@ -114,7 +121,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
         choice(f"output of {model.name}", output, model.outputs)
     sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
-    check_boxes(model, definition)
+    _check_boxes(model, definition)
     contestants = tuple(_contestant(model, e, sets) for e in definition.contestants)
     labels = [label for contestant in contestants for label in contestant.row_labels]
     for label in labels:
@@ -123,7 +130,7 @@ def _resolved(path: Path, definition: ProtocolFile) -> Protocol:
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
         choice("row that a target is against", target.against, known)
-    return Protocol(path, definition, model, sets, contestants)
+    return Protocol(path, definition, model, sets, contestants, seed)
 
 
 def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenario, ...]:
@@ -166,6 +173,28 @@ def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
             if run in seen:
                 raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
             seen[run] = key
+
+
+def _check_boxes(model: Model, definition: ProtocolFile) -> None:
+    """Raise `InputError` if a corner of a box is no scenario of the model."""
+    for purpose in DRAWN:
+        draw: Draw | None = getattr(definition, purpose)
+        for number, box in enumerate(draw.boxes if draw else (), start=1):
+            try:
+                _check_corners(model, box)
+            except InputError as error:
+                raise type(error)(f"{purpose}, box {number}: {error}") from None
+
+
+def _check_corners(model: Model, box: Box) -> None:
+    maneuver: Maneuver = component("maneuver", box.maneuver)
+    for start in box.start:
+        choice(f"start of {model.name}", start, model.starts)
+    for frequency in box.frequency:
+        for speed in box.speed or [None]:
+            for amplitude in box.amplitude:
+                corner = maneuver.perturbed(frequency, amplitude)
+                check(model, Scenario(corner, (box.start or model.starts)[0], speed))
 
 
 def _contestant(

@@ -7,6 +7,9 @@ from pydantic import Field, model_validator
 
 from vehiclemor.toml_files import FileSchema, Line
 
+# Of the test sets of every protocol that gives none.
+SEED = 20261122
+
 
 class Bound(FileSchema):
     """Largest allowed error of an output: its RMS, or its largest absolute value."""
@@ -79,7 +82,7 @@ class Box(FileSchema):
 
 
 class Draw(FileSchema):
-    """Runs drawn from boxes once all that they test is settled; nobody can choose the seed."""
+    """Runs drawn from boxes."""
 
     runs: int = Field(ge=1, le=100_000, description="how many")
     boxes: list[Box] = Field(min_length=1, description="what they are drawn from")
@@ -138,7 +141,9 @@ class ProtocolFile(FileSchema):
     outside: list[Group] = Field(
         default_factory=list, description="beyond what was trained: reported, not judged"
     )
-    drawn: Draw | None = Field(None, description="sealed test: drawn when all else is settled")
+    version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
+    seed: int = Field(SEED, ge=0, description="of the drawn runs")
+    drawn: Draw | None = Field(None, description="test set: drawn from boxes")
     drawn_outside: Draw | None = Field(
         None, description="the same beyond the boxes: whether models warn"
     )

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Container, Sequence
-from dataclasses import asdict, replace
-from datetime import UTC, datetime
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.study.plans.choice import Row, Validation, outcomes
-from vehiclemor.study.plans.ledger import Drawn, Shown
-from vehiclemor.study.plans.protocol import FULL_ORDER, Protocol
-from vehiclemor.study.plans.seal import rules
-from vehiclemor.study.provenance import attributes, versions
+from vehiclemor.study.plans.choice import Row, Validation
+from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.provenance import attributes
 from vehiclemor.study.variables import variables
 
 if TYPE_CHECKING:
@@ -26,7 +23,6 @@ def protocol_dataset(
     rows: Sequence[Row],
     found: dict[str, list[xr.Dataset]],
     measured: tuple[xr.Dataset, dict[str, list[str]]],
-    digest: str,
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `row`, `scenario` and `output`.
 
@@ -39,8 +35,6 @@ def protocol_dataset(
         Set -> results of the rows.
     measured
         Timing of the first scenarios of what is judged, and set -> why scenarios are not.
-    digest
-        Seal of the draw.
     """
     timed, apart = measured
     import xarray as xr
@@ -89,10 +83,7 @@ def protocol_dataset(
             model=protocol.model.name,
             evaluations=protocol.model.evaluations,
             configuration=protocol.definition.model_dump_json(),
-            digest=digest,
-            rules=rules(protocol),
-            own=int(protocol.own),
-            drawn_on=datetime.now(UTC).isoformat(timespec="seconds"),
+            test_set=protocol.test_set if protocol.definition.drawn else "listed",
         )
     )
 
@@ -107,47 +98,6 @@ def judged_part(dataset: xr.Dataset) -> xr.Dataset:
     sets = dataset["scenario_set"].values
     chosen = (sets == judged_set(set(sets))) & (dataset["apart"].values == "")
     return dataset.isel(scenario=chosen)
-
-
-def opened(protocol: Protocol, digest: str) -> Drawn:
-    """A draw of which nothing has been seen yet."""
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return Drawn(now, versions(), protocol.model.name, digest, rules(protocol), 0, 0, {})
-
-
-def entry_of(dataset: xr.Dataset, protocol: Protocol) -> Drawn:
-    """What the ledger keeps of a draw: every reduced model's misses, warnings and worst errors."""
-    part = judged_part(dataset)
-    apart = dataset["apart"].values[dataset["scenario_set"].values == "drawn"]
-    return replace(
-        opened(protocol, str(dataset.attrs["digest"])),
-        date=str(dataset.attrs["drawn_on"]),
-        version=str(dataset.attrs["versions"]),
-        runs=part.sizes["scenario"],
-        apart=int((apart != "").sum()),
-        rows={
-            str(label): _shown(part.sel(row=label), protocol)
-            for label in part["row"].values
-            if str(part["role"].sel(row=label).item()) != FULL_ORDER
-        },
-    )
-
-
-def _shown(row: xr.Dataset, protocol: Protocol) -> Shown:
-    outcome = outcomes(row, protocol.definition.bounds)
-    worst = {
-        output: float(row[f"{bound.measure}_error"].sel(output=output).max())
-        for output, bound in protocol.definition.bounds.items()
-    }
-    return Shown(
-        str(row["method"].item()),
-        json.loads(str(row["settings"].item())),
-        bool(row["winner"]),
-        int(outcome.missed.sum()),
-        int(outcome.silent.sum()),
-        int(outcome.flagged.sum()),
-        {output: float(f"{v:.4g}") for output, v in worst.items() if np.isfinite(v)},
-    )
 
 
 def _settings(row: Row) -> str:

@@ -1,7 +1,6 @@
-"""Running a protocol: fit, validate, choose; only then draw the test, and test.
+"""Running a protocol: fit, validate, choose, test.
 
-The stages are functions of what they may see: `validate` gets no scenario of the test set, and a
-draw is made when all that it tests is settled.
+The stages are functions of what they may see: `validate` gets no scenario of the test set.
 """
 
 from __future__ import annotations
@@ -21,11 +20,10 @@ from vehiclemor.study import timing
 from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
-from vehiclemor.study.plans.ledger import Ledger
+from vehiclemor.study.plans.drawn_runs import drawn_sets
 from vehiclemor.study.plans.protocol import CONTENDER, DRAWN, FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.plans.protocol_results import entry_of, opened, protocol_dataset
-from vehiclemor.study.plans.seal import seal, sealed_sets
+from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.sensitive import reasons, second_run
 from vehiclemor.study.plans.study_file import owner
 from vehiclemor.study.provenance import layout_digest
@@ -62,13 +60,8 @@ def run_protocol(
         workers,
     )
     rows = with_winner(protocol, rows, path)
-    digest = seal(protocol, rows)
     sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
-    sets |= sealed_sets(protocol, digest)
-    ledger = Ledger(protocol.path.stem, folder, protocol.own)
-    if "drawn" in sets:
-        # Nothing of a draw is seen before it stands in the ledger.
-        ledger.open(opened(protocol, digest))
+    sets |= drawn_sets(protocol)
     found = test(protocol.model, rows, sets, workers)
     apart = _sensitive(protocol, sets, workers)
     if "drawn" in sets and all(apart["drawn"]):
@@ -77,18 +70,15 @@ def run_protocol(
         )
     timed = timed_rows(protocol, rows, found, sets, path)
     keys = sorted(workers.asked)
-    parts = [layout_digest(), protocol.definition.model_dump_json(), digest, *keys]
-    dataset = stored(
+    parts = [layout_digest(), protocol.definition.model_dump_json(), *keys]
+    return stored(
         path,
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
-        lambda: protocol_dataset(protocol, rows, found, (timed, apart), digest),
+        lambda: protocol_dataset(protocol, rows, found, (timed, apart)),
         lambda: [Path(timed.encoding["source"]), *(result_path(folder, key) for key in keys)],
         of,
     )
-    if "drawn" in sets:
-        ledger.record(entry_of(dataset, protocol))
-    return dataset
 
 
 def validate(
