@@ -6,10 +6,8 @@ import runpy
 import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import CancelledError, Future
 from contextlib import nullcontext
-from contextvars import ContextVar
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -23,11 +21,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.texts.markdown import blocks
-from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError, MachineError
 from vehiclemor.study import cluster as engine
 from vehiclemor.study.cell_file import ENDING
-from vehiclemor.study.cluster_worker import from_others
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.progress import listening
@@ -176,65 +172,6 @@ def test_nobody_else_reaches_the_workers_of_this_machine():
             assert "came in" not in ended.stdout
             assert "Stream is closed" in ended.stderr or "Timed out" in ended.stderr
         assert client.submit(sum, [1, 2]).result() == 3
-
-
-# Kernels
-
-
-OWN_CACHE: ContextVar[str] = ContextVar("own cache")
-
-
-def file_of(name: str, topic: str, folder: str) -> bytes:
-    """What a worker gets that has a cache of its own, or else makes."""
-    OWN_CACHE.set(folder)
-
-    def make() -> bytes:
-        time.sleep(0.5)
-        return f"made for {folder}".encode()
-
-    with cache.asking(partial(from_others, topic)):
-        return cache.fetched(name, make)
-
-
-def test_what_the_cache_lacks_is_the_drivers_or_is_made_once(client, tmp_path, monkeypatch):
-    driver = str(tmp_path / "driver")
-    monkeypatch.setattr(cache, "_chosen", lambda: OWN_CACHE.get(driver))
-    cache.fetched("kernels/known.o", lambda: b"the driver's")
-    with engine.reached(client.scheduler.address, 1) as elsewhere:
-        topic = elsewhere.keywords["topic"]
-
-        def on_both(name: str) -> list[bytes]:
-            folders = [str(tmp_path / number) for number in "01"]
-            futures = [
-                client.submit(file_of, name, topic, folder, workers=[worker])
-                for worker, folder in zip(client.nthreads(), folders, strict=True)
-            ]
-            found = client.gather(futures)
-            # Each has it in its own cache now, as it was sent.
-            for folder in folders:
-                assert (Path(folder) / name).read_bytes().endswith(b"\n" + found[0])
-            return found
-
-        assert on_both("kernels/known.o") == [b"the driver's"] * 2
-        first, second = on_both("kernels/new.o")
-        assert first == second
-        assert first.startswith(b"made for ")
-
-
-def test_a_file_that_was_changed_on_its_way_is_not_used():
-    sent = cache.packed("kernels/a.o", b"machine code")
-    assert cache.unpacked("kernels/a.o", sent) == b"machine code"
-    for place in range(len(sent)):
-        changed = sent[:place] + bytes([sent[place] ^ 1]) + sent[place + 1 :]
-        assert cache.unpacked("kernels/a.o", changed) is None
-    assert cache.unpacked("kernels/b.o", sent) is None
-
-
-def test_the_driver_hands_out_nothing_but_its_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "secret").write_text("hash\nkeep this")
-    assert cache.held("../secret") is None
-    assert cache.held("kernels/none.o") is None
 
 
 # Batches

@@ -20,7 +20,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from contextvars import ContextVar
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
@@ -34,9 +33,6 @@ from vehiclemor.progress import making
 
 PACKAGE = Path(__file__).resolve().parents[1]
 Made = TypeVar("Made")
-# Gives a file by its name, or by making it.
-Asked = Callable[[str, Callable[[], bytes]], bytes]
-_OTHERS: ContextVar[Asked | None] = ContextVar("others", default=None)
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
@@ -209,37 +205,9 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     with making(what, derived=derived), locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
-            others = _OTHERS.get()
-            content = others(name, make) if others else make()
-            _keep(folders, name, packed(name, content))
+            content = make()
+            _keep(folders, name, _digest(name, content) + b"\n" + content)
     return content
-
-
-@contextmanager
-def asking(others: Asked) -> Iterator[None]:
-    """Ask others inside for files that the cache lacks."""
-    token = _OTHERS.set(others)
-    try:
-        yield
-    finally:
-        _OTHERS.reset(token)
-
-
-def packed(name: str, content: bytes) -> bytes:
-    """A file of the cache as it is kept and sent: a hash of name and content before the content."""
-    return _digest(name, content) + b"\n" + content
-
-
-def unpacked(name: str, file: bytes) -> bytes | None:
-    """Content of a file of the cache; None if it is not what was packed."""
-    digest, _, content = file.partition(b"\n")
-    return content if digest == _digest(name, content) else None
-
-
-def held(name: str) -> bytes | None:
-    """Content of a file, if the cache has it."""
-    found = (_checked(folder / name, name)[0] for folder in _folders_of(name))
-    return next((content for content in found if content is not None), None)
 
 
 @contextmanager
@@ -255,7 +223,7 @@ def _no_collection() -> Iterator[None]:
 
 
 def _digest(name: str, content: bytes) -> bytes:
-    """Hash by which a file is checked; it does not hold under another name."""
+    """Hash that stands before the content; it does not hold under another name."""
     return hashlib.sha256(name.encode() + b"\n" + content).hexdigest().encode()
 
 
@@ -263,14 +231,14 @@ def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
     """Content of a file, or why it can't be trusted; neither where there is none."""
     try:
         reason = _distrust(path.lstat())
-        content = None if reason else unpacked(name, path.read_bytes())
+        digest, _, content = (b"" if reason else path.read_bytes()).partition(b"\n")
     except FileNotFoundError:
         return None, ""
     except OSError as error:
-        content, reason = None, error.strerror or "it can't be read"
-    if not reason and content is not None:
-        return content, ""
-    return None, reason or "the file is damaged"
+        return None, error.strerror or "it can't be read"
+    if reason or digest != _digest(name, content):
+        return None, reason or "the file is damaged"
+    return content, ""
 
 
 def _keep(folders: list[Path], name: str, content: bytes) -> None:

@@ -1,7 +1,7 @@
 """Studies on a cluster: workers of dask.distributed, at a scheduler's address or on this machine.
 
-Workers write their results into the driver's folder where they see it, else the driver does.  Of
-compiled kernels they ask the driver, and one another, before one of them makes it.
+Workers write their results into the driver's folder where they see it, else the driver does.  They
+compile what their cache lacks.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.cache import cache_folder, held, packed
+from vehiclemor.codegen.cache import cache_folder
 from vehiclemor.errors import InputError, MachineError, one_line
 from vehiclemor.files import temporary_path, write_text
 from vehiclemor.study.cluster_worker import Place, Sent, on_worker
@@ -83,15 +83,7 @@ def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
                     env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"} | word,
                 )
             )
-        client = stack.enter_context(_client(address))
-        topic = f"vehiclemor-{uuid.uuid4().hex}"
-        asked: set[str] = set()
-        client.subscribe_topic(topic, partial(_answer, client, topic, asked))
-        try:
-            yield partial(evaluated_by_cluster, client=client, topic=topic)
-        finally:
-            for name in asked:
-                distributed.Variable(name, client=client).delete()
+        yield partial(evaluated_by_cluster, client=stack.enter_context(_client(address)))
 
 
 @contextmanager
@@ -163,26 +155,12 @@ def _versions(entry: dict[str, Any] | None) -> dict[str, str]:
     return found | {"python": ".".join(found["python"].split(".")[:2])}
 
 
-async def _answer(client: Client, topic: str, asked: set[str], event: tuple[float, str]) -> None:
-    """Give a worker a file of this process's cache; nothing if it has none."""
-    import asyncio
-
-    from distributed import Variable
-
-    name = event[1]
-    shared = f"{topic} {name}"
-    asked.add(shared)
-    content = await asyncio.to_thread(held, name)
-    await Variable(shared, client=client).set(b"" if content is None else packed(name, content))
-
-
 def evaluated_by_cluster(
     groups: Groups,
     folder: Path,
     alone: bool = False,
     *,
     client: Client,
-    topic: str,
     work: Callable[..., tuple[Done, Sent]] | None = None,
 ) -> Generator[Done, None, None]:
     """What `evaluate_and_store` gives for each batch, by the workers of a cluster.
@@ -196,7 +174,7 @@ def evaluated_by_cluster(
 
     folder = folder.absolute()
     token = temporary_path(folder / "cells" / "token")
-    place = Place(folder, token, uuid.uuid4().hex, topic)
+    place = Place(folder, token, uuid.uuid4().hex)
     pool = ClientExecutor(client, pure=False)
     seen, number, most = 0.0, 0, 1 if alone else LARGEST
 

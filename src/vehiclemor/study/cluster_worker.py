@@ -1,14 +1,14 @@
-"""What a worker of a cluster does: its cells, as its driver would, with its driver's kernels."""
+"""What a worker of a cluster does: its cells, as its driver would."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
-from functools import cache, partial
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from vehiclemor.codegen.cache import asking, once, packed, unpacked
+from vehiclemor.codegen.cache import once
 from vehiclemor.errors import FileError, InputError, MachineError
 from vehiclemor.files import probe_folder
 from vehiclemor.study.cell_file import encoded
@@ -20,8 +20,6 @@ from vehiclemor.study.workers import Done, evaluate_and_store, evaluated
 if TYPE_CHECKING:
     import xarray as xr
 
-# Seconds until the driver has answered.
-ANSWER = 20.0
 # Key -> content of a cell's file, and whether a bug has ended it: what the driver is to write.
 Sent = dict[str, tuple[bytes, bool]]
 
@@ -33,19 +31,16 @@ class Place(NamedTuple):
     ----------
     token, text
         A file of the driver's, and what it holds.
-    topic
-        Under which the driver is asked for kernels.
     """
 
     folder: Path
     token: Path
     text: str
-    topic: str
 
 
 def on_worker(experiments: Sequence[Experiment], place: Place) -> tuple[Done, Sent]:
     """Evaluate some experiments; gives their results too, if the driver is to write them."""
-    with _turn(), asking(partial(from_others, place.topic)):
+    with _turn():
         _same_source(experiments)
         if _sees(place):
             return evaluate_and_store(experiments, place.folder), {}
@@ -93,24 +88,3 @@ def _same_source(experiments: Sequence[Experiment]) -> None:
                 f"scheduler: worker {get_worker().address} has {what} {e.model} with {e.method}; "
                 f"cells are known by what computes them, so it must be the driver's own"
             )
-
-
-def from_others(topic: str, name: str, make: Callable[[], bytes]) -> bytes:
-    """A file of the cache: the driver's, or another worker's, or else made for all."""
-    from distributed import Lock, Variable, get_client, get_worker
-
-    client = get_client()
-    shared: Any = Variable(f"{topic} {name}", client=client)
-    with Lock(f"{topic} {name}"):
-        for answer in (0.0, ANSWER):
-            if answer:
-                get_worker().log_event(topic, name)
-            try:
-                content = unpacked(name, shared.get(timeout=answer))
-            except TimeoutError:
-                continue
-            if content is not None:
-                return content
-        content = make()
-        shared.set(packed(name, content))
-    return content
