@@ -30,11 +30,9 @@ def study(tmp_path_factory):
 
 
 @pytest.mark.parametrize("to", ["csv", "parquet"])
-@pytest.mark.parametrize("part", [study_formats.PART, 2000])
-def test_a_table_has_a_row_for_each_point(study, tmp_path, monkeypatch, to, part):
+def test_a_table_has_a_row_for_each_point(study, tmp_path, to):
     if to == "parquet":
         pytest.importorskip("pyarrow")
-    monkeypatch.setattr(study_formats, "PART", part)
     found, folder = study
     path = vm.convert(folder / "mine.toml", to, tmp_path / f"mine.{to}", folder / "results")
     read = {"csv": lambda p: pd.read_csv(p, keep_default_na=False), "parquet": pd.read_parquet}

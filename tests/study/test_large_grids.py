@@ -1,20 +1,14 @@
-"""Grids that are too large to be held: experiments and results are made part by part."""
+"""Large grids: experiments are made when they are asked for, histories have a limit."""
 
 import weakref
 
-import netCDF4
-import numpy as np
 import pytest
-import xarray as xr
 
-from vehiclemor.errors import SpoiledError
-from vehiclemor.study import netcdf_file, run, workers
+import vehiclemor as vm
+from vehiclemor.errors import FileError
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.netcdf_file import read_dataset, regions
-from vehiclemor.study.plans import grid_results
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import StudyFile
-from vehiclemor.study.run import run_studies
 
 STUDY = """
 title = "for the tests"
@@ -25,7 +19,7 @@ method = "full_order"
 [[methods]]
 method = "pod"
 """
-TIMED = ["seconds", "offline_seconds"]
+AMPLITUDES = "amplitude_factor = { first = 0.5, last = 0.9, count = 60 }"
 
 
 def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
@@ -59,45 +53,10 @@ def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
     assert max(alive) < 10
 
 
-@pytest.mark.parametrize("sizes", [(), (1,), (7,), (3, 1, 5), (2, 3, 4, 1)])
-@pytest.mark.parametrize("at_once", [1, 3, 4, 8, 24])
-def test_regions_cover_an_array_once_in_order(sizes, at_once):
-    array = np.arange(int(np.prod(sizes))).reshape(sizes)
-    parts = [array[region].ravel() for region in regions(sizes, at_once)]
-    assert max(map(len, parts)) <= at_once
-    np.testing.assert_array_equal(np.concatenate(parts), array.ravel())
-
-
-def test_a_dataset_in_parts_is_the_same_as_in_one(tmp_path, monkeypatch):
+def test_histories_that_can_not_be_held_are_refused_before_anything_is_run(tmp_path):
+    grid = "frequency_factor = { first = 0.7, last = 1.3, count = 600 }"
     path = tmp_path / "mine.toml"
-    path.write_text(STUDY)
-    whole = run_studies(str(path), tmp_path / "results")["mine"]
-    file = tmp_path / "results" / "studies" / "mine.nc"
-    file.unlink()
-    held, given = [], []
-    part = grid_results._part
-    call = workers.Workers.__call__
-    monkeypatch.setattr(
-        grid_results, "_part", lambda *given: held.append(part(*given).sizes) or part(*given)
-    )
-    monkeypatch.setattr(
-        workers.Workers, "__call__", lambda self, g: given.append(len(g)) or call(self, g)
-    )
-    monkeypatch.setattr(run, "AT_ONCE", 4)
-    for module in (netcdf_file, grid_results):
-        monkeypatch.setattr(module, "PART", 3 * whole.nbytes // 12)
-    monkeypatch.setattr(netcdf_file, "LARGE", 1)
-    found = run_studies(str(path), tmp_path / "results")["mine"]
-    assert given == [4, 4, 1]
-    assert len(held) > 2
-    # Nothing has been read before it is asked for.
-    assert all(not isinstance(v.variable._data, np.ndarray) for v in found.data_vars.values())
-    xr.testing.assert_identical(found.load(), whole)
-    found.close()
-    again = read_dataset(file, "source", "vehiclemor")
-    xr.testing.assert_identical(again.load(), whole)
-    again.close()
-    with netCDF4.Dataset(file, "a") as opened:
-        opened["rms_error"][0, 2, 0, 0, 0, 0] = 7.0
-    with pytest.raises(SpoiledError, match="not what was written"):
-        read_dataset(file, "source", "vehiclemor")
+    path.write_text(STUDY.replace("amplitude_factor = [0.5, 0.7, 0.9]", f"{grid}, {AMPLITUDES}"))
+    with pytest.raises(FileError, match='GB, more than 4: give keep = "metrics"'):
+        vm.run_study(path, out=tmp_path / "results")
+    assert not (tmp_path / "results").exists()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +15,6 @@ from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_folder, write_text, write_whole
 from vehiclemor.registry import choice
 from vehiclemor.report.result_selection import stored_result
-from vehiclemor.study.netcdf_file import PART, regions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +32,7 @@ def convert(
     out: str | Path | None = None,
     results: str | Path = "results",
 ) -> Path:
-    """Write the stored result of a study in another format, part by part.
+    """Write the stored result of a study in another format.
 
     Parameters
     ----------
@@ -78,19 +76,26 @@ def convert(
     if columns.exists() and columns.read_bytes() != described.encode():
         raise FileError(f"{columns}: exists already; move it away")
     write_text(columns, described)
-    write = _write_csv if to == "csv" else _write_parquet
-    return write_whole(path, partial(write, tables(dataset)))
+    rows = table(dataset)
+    write = rows.to_csv if to == "csv" else rows.to_parquet
+    return write_whole(path, partial(write, index=False))
 
 
-def tables(dataset: xr.Dataset) -> Iterator[pd.DataFrame]:
-    """Rows of the points of a grid, in order, in parts that can be held."""
-    grid = [str(dimension) for dimension in dataset["status"].dims]
-    sizes = [dataset.sizes[dimension] for dimension in grid]
-    kept = [name for name, of in _rest(dataset).items() if of is not None]
-    rows = dataset[kept]
-    at_once = max(PART * max(int(np.prod(sizes)), 1) // max(rows.nbytes, 1), 1)
-    for region in regions(sizes, at_once):
-        yield _table(rows.isel(dict(zip(grid, region, strict=True))).load(), grid)
+def table(dataset: xr.Dataset) -> pd.DataFrame:
+    """A row for each point of a grid, in order."""
+    import pandas as pd
+    import xarray as xr
+
+    columns: dict[str, np.ndarray] = {}
+    like = dataset["status"]
+    grid = [str(dimension) for dimension in like.dims]
+    kept = {name: rest for name, rest in _rest(dataset).items() if rest is not None}
+    for name, rest in sorted(kept.items(), key=lambda item: item[0] not in dataset.coords):
+        whole = xr.broadcast(dataset[name], like)[0].transpose(*grid, *rest)
+        values = whole.values.reshape(like.size, -1)
+        for number, column in enumerate(_names(dataset, name, rest)):
+            columns[column] = values[:, number]
+    return pd.DataFrame(columns)
 
 
 def _rest(dataset: xr.Dataset) -> dict[str, list[str] | None]:
@@ -104,21 +109,6 @@ def _rest(dataset: xr.Dataset) -> dict[str, list[str] | None]:
             history = {"time", "input"} & set(rest)
             found[str(name)] = None if history else rest
     return found
-
-
-def _table(part: xr.Dataset, grid: list[str]) -> pd.DataFrame:
-    import pandas as pd
-    import xarray as xr
-
-    columns: dict[str, np.ndarray] = {}
-    like = part["status"]
-    for name, rest in sorted(_rest(part).items(), key=lambda item: item[0] not in part.coords):
-        assert rest is not None
-        whole = xr.broadcast(part[name], like)[0].transpose(*grid, *rest)
-        values = whole.values.reshape(like.size, -1)
-        for number, column in enumerate(_names(part, name, rest)):
-            columns[column] = values[:, number]
-    return pd.DataFrame(columns)
 
 
 def _names(dataset: xr.Dataset, name: str, rest: list[str]) -> list[str]:
@@ -146,23 +136,6 @@ def _columns(dataset: xr.Dataset) -> pd.DataFrame:
             for column, unit in zip(names, units, strict=True)
         ]
     return pd.DataFrame(rows)
-
-
-def _write_csv(parts: Iterator[pd.DataFrame], path: Path) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        for number, part in enumerate(parts):
-            part.to_csv(file, index=False, header=number == 0)
-
-
-def _write_parquet(parts: Iterator[pd.DataFrame], path: Path) -> None:
-    from pyarrow import Table
-    from pyarrow.parquet import ParquetWriter
-
-    first = Table.from_pandas(next(parts), preserve_index=False)
-    with ParquetWriter(path, first.schema) as file:
-        file.write_table(first)
-        for part in parts:
-            file.write_table(Table.from_pandas(part, first.schema, preserve_index=False))
 
 
 def _write_zarr(dataset: xr.Dataset, path: Path) -> None:

@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from vehiclemor.errors import SpoiledError
 from vehiclemor.files import make_folder
-from vehiclemor.study.netcdf_file import (
-    LARGE,
-    Parts,
-    global_attributes,
-    opened_lazily,
-    read_dataset,
-    write_dataset,
-    write_parts,
-)
+from vehiclemor.study.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.study.store import set_aside
 
 if TYPE_CHECKING:
@@ -61,7 +53,7 @@ def stored(
     path: Path,
     attribute: str,
     key: str,
-    make: Callable[[], xr.Dataset | Parts],
+    make: Callable[[], xr.Dataset],
     sources: Callable[[], Iterable[Path]] = list,
     owner: Owner | None = None,
 ) -> xr.Dataset:
@@ -87,14 +79,9 @@ def stored(
     if same is not None and owner is None:
         return same
     make_folder(path.parent)
-    made = make() if same is None else same
-    further = {attribute: key} | (owner._asdict() if owner else {})
-    if isinstance(made, Parts):
-        write_parts(made, path, further)
-        dataset = opened_lazily(path)
-    else:
-        dataset = made.assign_attrs(further)
-        write_dataset(dataset, path)
+    dataset = make() if same is None else same
+    dataset = dataset.assign_attrs({attribute: key} | (owner._asdict() if owner else {}))
+    write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
 
@@ -102,11 +89,9 @@ def stored(
 def _under_another_name(
     path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
 ) -> xr.Dataset | None:
-    """As `_current`, of any file beside that can be held: its study was renamed since."""
+    """As `_current`, of any file beside: its study was renamed since."""
     for other in sorted(path.parent.glob("[!.]*.nc")):
-        if other == path or other.stat().st_size >= LARGE:
-            continue
-        if global_attributes(other).get(attribute) == key:
+        if other != path and global_attributes(other).get(attribute) == key:
             return _current(other, attribute, key, sources)
     return None
 

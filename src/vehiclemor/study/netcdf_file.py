@@ -7,15 +7,13 @@ ones it may never come back.  Other files are first read in a process that can b
 from __future__ import annotations
 
 import hashlib
-import itertools
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from vehiclemor.errors import FileError, MachineError, SpoiledError, machine_reason
 from vehiclemor.files import write_whole
@@ -33,78 +31,28 @@ import sys, netCDF4
 with netCDF4.Dataset(sys.argv[1]) as file:
     for owner in (file, *file.variables.values()):
         owner.__dict__
-    for variable in file.variables.values() if int(sys.argv[2]) else ():
+    for variable in file.variables.values():
         variable[...]
 """
 LIMIT = 10.0
-# Bytes of the largest part of a dataset that is made, written or checked at a time, and of the
-# smallest file that is read only where it is asked for.
-PART, LARGE = 1 << 24, 1 << 28
-# One slice of each dimension.
-Region = tuple[slice, ...]
-
-
-class Parts(NamedTuple):
-    """A dataset that is too large to be held.
-
-    Attributes
-    ----------
-    dimensions
-        Those along which it is in parts.
-    parts
-        Region of these dimensions, and what the dataset has there; the first begins at zero.
-    """
-
-    dimensions: tuple[str, ...]
-    parts: Iterator[tuple[Region, xr.Dataset]]
+# Bytes that are read at a time for a hash.
+AT_ONCE = 1 << 24
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as a whole file."""
-    from xarray.backends import NetCDF4DataStore
-
-    _write(path, lambda file: dataset.dump_to_store(NetCDF4DataStore(file)), dataset.nbytes)
-
-
-def write_parts(parts: Parts, path: Path, further: Mapping[str, object]) -> None:
-    """Write a dataset as a whole file, part by part, with further attributes."""
-    from xarray.backends import NetCDF4DataStore
-
-    def fill(file: netCDF4.Dataset) -> None:
-        _, first = next(parts.parts)
-        found = first.variables.items()
-        grown = [str(n) for n, v in found if set(v.dims) & set(parts.dimensions)]
-        first.assign_attrs(further).dump_to_store(
-            NetCDF4DataStore(file),
-            encoding={name: {"chunksizes": first[name].shape} for name in grown},
-            unlimited_dims=list(parts.dimensions),
-        )
-        file.set_auto_maskandscale(False)
-        for name in grown:
-            # Chunks are written whole and once: kept ones would fill the memory.
-            file[name].set_var_chunk_cache(size=1)
-        for region, part in parts.parts:
-            at = dict(zip(parts.dimensions, region, strict=True))
-            for name in grown:
-                place = tuple(at.get(str(d), slice(None)) for d in part[name].dims)
-                file[name][place] = part[name].values
-
-    _write(path, fill, PART)
-
-
-def _write(path: Path, fill: Callable[[netCDF4.Dataset], object], size: int) -> None:
-    """Write a file that `fill` fills with about so many bytes."""
     import netCDF4
+    from xarray.backends import NetCDF4DataStore
 
     def write(temporary: Path) -> None:
         try:
             with netCDF4.Dataset(temporary, "w") as file:
-                fill(file)
+                dataset.dump_to_store(NetCDF4DataStore(file))
                 file.createGroup(INTEGRITY)
             _seal(temporary)
         except (OSError, RuntimeError):
             # The library hides the reason; plain writing of as much as there is tells it.
-            temporary.write_bytes(bytes(size + (1 << 16)))
+            temporary.write_bytes(bytes(dataset.nbytes + (1 << 16)))
             raise
 
     try:
@@ -114,7 +62,7 @@ def _write(path: Path, fill: Callable[[netCDF4.Dataset], object], size: int) -> 
 
 
 def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
-    """Read a result file of this package into memory; a large one where it is asked for.
+    """Read a result file of this package into memory.
 
     Parameters
     ----------
@@ -135,35 +83,8 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
         if getattr(file, attribute, None) != expected:
             reason = f"not the result that belongs here ({attribute} is not {expected})"
             raise SpoiledError(reason, path, mend)
-        if path.stat().st_size < LARGE:
-            file.set_auto_maskandscale(True)
-            return xr.open_dataset(NetCDF4DataStore(file)).load()
-    return opened_lazily(path)
-
-
-def opened_lazily(path: Path) -> xr.Dataset:
-    """A dataset that is read where it is asked for; with dask in the parts that were written."""
-    import xarray as xr
-
-    chunks: Any = {} if find_spec("dask") else None
-    return xr.open_dataset(path, engine="netcdf4", cache=False, chunks=chunks)
-
-
-def regions(sizes: Sequence[int], at_once: int) -> Iterator[Region]:
-    """Parts of an array of at most so many elements that cover it, in the order of its elements."""
-    split, inside = len(sizes), 1
-    while split and inside * sizes[split - 1] <= at_once:
-        split -= 1
-        inside *= sizes[split]
-    if not split:
-        yield tuple(slice(0, size) for size in sizes)
-        return
-    step = max(at_once // inside, 1)
-    rest = tuple(slice(0, size) for size in sizes[split:])
-    for lead in itertools.product(*map(range, sizes[: split - 1])):
-        before = tuple(slice(i, i + 1) for i in lead)
-        for begin in range(0, sizes[split - 1], step):
-            yield (*before, slice(begin, min(begin + step, sizes[split - 1])), *rest)
+        file.set_auto_maskandscale(True)
+        return xr.open_dataset(NetCDF4DataStore(file)).load()
 
 
 def global_attributes(path: Path) -> dict[str, Any]:
@@ -231,8 +152,8 @@ def _sealed(path: Path) -> bool:
         if not end.startswith(SEAL):
             return False
         file.seek(0)
-        for begin in range(0, size, PART):
-            digest.update(file.read(min(size - begin, PART)))
+        for begin in range(0, size, AT_ONCE):
+            digest.update(file.read(min(size - begin, AT_ONCE)))
     if end.removeprefix(SEAL) != digest.hexdigest().encode():
         raise ValueError("what it holds is not what was written")
     return True
@@ -240,8 +161,7 @@ def _sealed(path: Path) -> bool:
 
 def _read_elsewhere(path: Path) -> None:
     """Raise `ValueError` if the library can't read a file, crashes, or does not come to an end."""
-    whole = path.stat().st_size < LARGE
-    command = [sys.executable, "-P", "-c", READ, str(path.absolute()), str(int(whole))]
+    command = [sys.executable, "-P", "-c", READ, str(path.absolute())]
     try:
         ended = subprocess.run(command, capture_output=True, timeout=LIMIT, check=False)  # noqa: S603
     except subprocess.TimeoutExpired:

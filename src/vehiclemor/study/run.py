@@ -14,7 +14,6 @@ from vehiclemor.errors import InputError
 from vehiclemor.progress import telling
 from vehiclemor.study.cluster import LOCAL, reached
 from vehiclemor.study.combined import combined_path, stored
-from vehiclemor.study.netcdf_file import Parts
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, combined
 from vehiclemor.study.plans.protocol import load_protocol
@@ -84,7 +83,7 @@ def run_studies(
     return results
 
 
-def _combined(grid: Grid, workers: Workers) -> xr.Dataset | Parts:
+def _combined(grid: Grid, workers: Workers) -> xr.Dataset:
     experiments = iter(grid.unique.values())
     while part := [[cell] for cell in islice(experiments, AT_ONCE)]:
         workers(part)

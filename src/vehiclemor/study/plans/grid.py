@@ -7,6 +7,7 @@ kept.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
+from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -29,6 +31,8 @@ from vehiclemor.study.scenario import Values
 
 # Place in the grid: one index per dimension.
 Place = tuple[int, ...]
+# Histories of a study that are held at once.
+MOST_BYTES = 4e9
 # A key is 20 characters of ASCII.
 KEY = "S20"
 
@@ -103,11 +107,24 @@ class Grid:
         for place in itertools.product(*runs):
             check_run(self.model, self._run(place))
         if self.definition.keep == "trajectories":
+            self._check_size()
             known = [component("maneuver", name) for name in self.dimensions.get("maneuver", ())]
             if any(not np.array_equal(known[0].times, other.times) for other in known[1:]):
                 raise InputError('maneuvers of other output times need keep = "metrics"')
         for method in range(self.sizes[-1]):
             self._some_fits(method)
+
+    def _check_size(self) -> None:
+        """Raise `InputError` if the histories of all runs can't be held."""
+        maneuver: Maneuver = component("maneuver", self._run((0,) * len(self.sizes)).maneuver)
+        model = self.model
+        columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
+        size = 8.0 * maneuver.samples * columns * math.prod(self.sizes)
+        if size > MOST_BYTES:
+            raise InputError(
+                f"histories of {math.prod(self.sizes)} runs take {size / 1e9:.0f} GB, more than "
+                f'{MOST_BYTES / 1e9:g}: give keep = "metrics", or make several studies of it'
+            )
 
     def _run(self, place: Place) -> Run:
         fixed = {"maneuver": self.definition.maneuver or self.model.definition.maneuver}

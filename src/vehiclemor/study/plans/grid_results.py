@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,6 @@ import numpy as np
 
 from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.netcdf_file import PART, Parts, Region, regions
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.plans.study_file import PARAMETER
 from vehiclemor.study.provenance import attributes, layout_digest, versions
@@ -34,29 +32,17 @@ def cells_digest(grid: Grid) -> str:
     return digest.hexdigest()[:20]
 
 
-def combined(grid: Grid, folder: Path) -> xr.Dataset | Parts:
-    """All cells of a grid put together; in parts if they are too large to be held.
+def combined(grid: Grid, folder: Path) -> xr.Dataset:
+    """All cells of a grid put together.
 
     Raises
     ------
     FileError
         If a cell is missing, corrupt or foreign.
     """
-    size = read_cell(folder, next(iter(grid.unique))).nbytes
-    parts = regions(grid.sizes, max(PART // size, 1))
-    whole = tuple(slice(0, length) for length in grid.sizes)
-    first = next(parts)
-    if first == whole:
-        return _part(grid, folder, whole)
-    made = ((region, _part(grid, folder, region)) for region in itertools.chain([first], parts))
-    return Parts(tuple(grid.dimensions), made)
-
-
-def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:
-    """The cells in a region of a grid, with the attributes of the whole."""
     import xarray as xr
 
-    names, keys = tuple(grid.dimensions), grid.keys[region]
+    names, keys = tuple(grid.dimensions), grid.keys
     arrays: dict[str, np.ndarray] = {}
     found, numbers = np.unique(keys, return_inverse=True)
     order = np.argsort(numbers, axis=None, kind="stable")
@@ -78,7 +64,7 @@ def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:
     }
     combined |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
     coordinates = {str(name): variable for name, variable in template.coords.items()}
-    dataset = xr.Dataset(combined, _coordinates(grid, region) | coordinates)
+    dataset = xr.Dataset(combined, _coordinates(grid) | coordinates)
     definition, model = grid.definition, grid.model
     own = {
         "study": grid.name,
@@ -89,13 +75,12 @@ def _part(grid: Grid, folder: Path, region: Region) -> xr.Dataset:
     return dataset.assign_attrs(attributes(definition.title, model.kernel_hash, **own))
 
 
-def _coordinates(grid: Grid, region: Region) -> dict[str, Any]:
-    """Values of the dimensions in a region, and of what is sampled; with meanings."""
-    parts = dict(zip(grid.dimensions, region, strict=True))
+def _coordinates(grid: Grid) -> dict[str, Any]:
+    """Values of the dimensions, and of what is sampled; with meanings."""
     found = {name: (name, values) for name, values in grid.dimensions.items()}
     found |= {name: ("sample", values) for name, values in grid.samples.items()}
     return {
-        name: (dimension, values[parts[dimension]], described(grid.model, name))
+        name: (dimension, values, described(grid.model, name))
         for name, (dimension, values) in found.items()
     }
 
