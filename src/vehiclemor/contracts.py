@@ -15,7 +15,7 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import checked_run, validated
-from vehiclemor.registry import component, names
+from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
@@ -45,8 +45,6 @@ def check_model(name: str) -> None:
     except InputError as error:
         raise AssertionError(str(error)) from None
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
-    timed = {case.method for case in definition.shown.timing}
-    assert timed <= set(names("method")), f"{name}: unknown methods among {sorted(timed)} are timed"
     maneuver = _nominal(model)
     inputs = tuple(quantity.name for quantity in definition.inputs)
     assert maneuver.inputs == inputs, f"{name}: its maneuver gives other inputs"

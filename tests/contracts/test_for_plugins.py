@@ -8,7 +8,6 @@ import pytest
 
 from vehiclemor import contracts
 from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.multibody.report import ModelReport, TimingCase
 from vehiclemor.registry import component, names
 
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
@@ -71,17 +70,6 @@ def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message:
         ({"inputs": (Quantity("s0", "m", "one"), Quantity("z", "m", "two"))}, "other inputs"),
         ({"coordinates": (Quantity("one", "m", "one"),), "stops": {}}, "residual has shape"),
         ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
-        (
-            {
-                "report": ModelReport(
-                    timing=(
-                        TimingCase("baseline", "one", "full_order"),
-                        TimingCase("strongest", "two", "no_such_method"),
-                    )
-                )
-            },
-            "unknown methods",
-        ),
     ],
 )
 def test_broken_declaration_is_named(monkeypatch: pytest.MonkeyPatch, change, message: str) -> None:

@@ -9,8 +9,9 @@ import pytest
 from scipy.linalg import expm
 
 import vehiclemor as vm
-from vehiclemor.multibody import report
 from vehiclemor.registry import component
+from vehiclemor.report.predictive.paper_terms import paper_cases
+from vehiclemor.report.shown import main_outputs, of_kind, tabled_outputs, timing_cases
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
@@ -113,7 +114,7 @@ def test_second_order_form_is_that_of_the_masses(car):
 
 def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
     definition = component("model", "quarter_car")
-    cases = definition.shown.timing
+    cases = timing_cases(definition)
     ids = [case.id for case in cases]
     assert ids[:2] == ["baseline", "strongest"]
     assert len(set(ids)) == len(ids)
@@ -121,15 +122,17 @@ def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
     # Of two coordinates, one is a reduction.
     assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {1}
     outputs = ("body_acceleration", "suspension_travel", "tire_force")
-    assert definition.shown.outputs == definition.shown.printed_outputs == outputs
-    assert set(definition.shown.counts) <= set(build("quarter_car").counts)
-    variants = list(report.paper_cases(definition.shown))
+    assert tabled_outputs(definition) == main_outputs(definition) == outputs
+    model = build("quarter_car")
+    assert set(of_kind(model.kind).counts) <= set(model.counts)
+    variants = list(paper_cases(model))
+    assert {case.settings["rank"] for case in variants[2:]} == {1}
     assert [case.id for case in variants[:2]] == ["baseline", "strongest"]
     assert len({case.id for case in variants}) == len(variants) == 2 + 2 * 2 * 2 * 3
 
 
 def test_every_row_of_its_cost_table_can_be_run():
-    for case in component("model", "quarter_car").shown.timing:
+    for case in timing_cases(component("model", "quarter_car")):
         data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
         assert data["status"].item() == "ok", case.id
 

@@ -16,6 +16,7 @@ from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.predictive import paper_terms
 from vehiclemor.report.published import load_published
 from vehiclemor.report.regenerate import regenerate_figures
+from vehiclemor.report.shown import tables_file
 from vehiclemor.report.tables import latex, markdown, regenerate_tables
 from vehiclemor.report.verdicts import LARGEST_SPREAD
 from vehiclemor.study.run import run_studies
@@ -322,10 +323,11 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
     # The whole study of settings has hundreds of cells: a few stand in for them.
     path = tmp_path / "a-few-settings.toml"
     path.write_text(SETTINGS)
-    monkeypatch.setattr(tables, "settings_studies", lambda: {str(path): ("pitch", "yaw")})
+    chosen = tables_file().model_copy(update={"settings": {str(path): ["pitch", "yaw"]}})
+    monkeypatch.setattr(tables, "tables_file", lambda: chosen)
     # Of the paper's terms too: the baselines and every eighth variant.
     cases = paper_terms.paper_cases
-    few = lambda shown: [*(every := list(cases(shown)))[:2], *every[2::8]]  # noqa: E731
+    few = lambda model: [*(every := list(cases(model)))[:2], *every[2::8]]  # noqa: E731
     monkeypatch.setattr(paper_terms, "paper_cases", few)
     names = ["10"]
     contents = []

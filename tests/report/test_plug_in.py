@@ -9,12 +9,14 @@ import pytest
 
 from vehiclemor import registry
 from vehiclemor.cli import main
-from vehiclemor.multibody.report import paper_cases
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import legend, nominal, unseen
 from vehiclemor.report.errors import study_tables
 from vehiclemor.report.figures import saving
+from vehiclemor.report.predictive.paper_terms import paper_cases
+from vehiclemor.report.shown import tabled_outputs, timing_cases
 from vehiclemor.report.tables import model_tables
+from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
 CAR = "quarter_car"
@@ -33,7 +35,7 @@ def tables(folder):
 
 def test_costs_have_a_row_for_every_case_and_start(tables):
     costs = tables["costs"].set_index(["start", "case"])
-    cases = [case.id for case in component("model", CAR).shown.timing]
+    cases = [case.id for case in timing_cases(component("model", CAR))]
     assert list(costs.loc["equilibrium"].index) == cases
     assert list(costs.loc["dropped"].index) == cases
     assert costs.loc[("dropped", "baseline"), "speed_up"] == 1.0
@@ -45,7 +47,7 @@ def test_errors_have_every_method_and_output(tables):
     assert set(errors["method"]) >= METHODS
     replayed = errors[(errors["method"] == "replay") & (errors["study"] == f"{CAR}-perturbed")]
     full = errors[errors["method"] == "full_order"]
-    for output in component("model", CAR).shown.outputs:
+    for output in tabled_outputs(component("model", CAR)):
         # The reference is more accurate than the integrator that is compared.
         assert 0.0 < full[f"rms_{output}"].max() < 1e-3 * replayed[f"rms_{output}"].max()
     nominal = (replayed["frequency_factor"] == 1.0) & (replayed["amplitude_factor"] == 1.0)
@@ -54,7 +56,7 @@ def test_errors_have_every_method_and_output(tables):
 
 def test_the_fastest_variant_of_pod_within_the_bounds_wins(tables):
     terms = tables["paper-terms"]
-    assert len(terms) == len(list(paper_cases(component("model", CAR).shown))) - 2
+    assert len(terms) == len(list(paper_cases(build(CAR)))) - 2
     within = terms[terms["within_bounds"]]
     # Of two coordinates one is kept: a variant that is within 1 % would be luck.
     assert terms["winner"].sum() == min(1, len(within))
@@ -99,7 +101,7 @@ def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
     entries = {"method": {**known, "mine": mine}}
     monkeypatch.setattr(registry, "_entries", lambda kind: entries.get(kind) or real(kind))
     table = study_tables(CAR, [nominal(CAR, tmp_path)], tmp_path).set_index("method")
-    for output in component("model", CAR).shown.outputs:
+    for output in tabled_outputs(component("model", CAR)):
         errors = table[f"rms_{output}"]
         assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])
     assert "mine" in legend(CAR)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from vehiclemor.maneuver import sine_travel
-from vehiclemor.multibody.report import TimingCase
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.signals import Signal
 from vehiclemor.simulation import run_timer
@@ -15,7 +14,14 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
 from vehiclemor.study.scenario import Scenario, input_hash
-from vehiclemor.study.timing import called, case_experiments, timed_cases, timed_model, timed_tests
+from vehiclemor.study.timing import (
+    TimingCase,
+    called,
+    case_experiments,
+    timed_cases,
+    timed_model,
+    timed_tests,
+)
 
 CASES = (
     TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),

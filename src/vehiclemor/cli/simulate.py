@@ -91,9 +91,10 @@ def simulate(
         training=training,
         **chosen,
     )
+    from vehiclemor.report.shown import tabled_outputs
     from vehiclemor.report.simulation import simulation_text
 
-    shown = ready.outputs if all_outputs else ready.definition.shown.outputs
+    shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, shown, ready.counts))
     _keep(dataset, out, picture)
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0

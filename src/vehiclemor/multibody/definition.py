@@ -13,7 +13,6 @@ import numpy as np
 from vehiclemor.arguments import line_of_text
 from vehiclemor.errors import InputError, did_you_mean
 from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.multibody.report import ModelReport, completed
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
@@ -101,8 +100,10 @@ class ModelDefinition(ShortRepr):
         A run that leaves that of an output has diverged, an input beyond its own is refused.
     loads
         Outputs that are zero where a wheel has left the road.
-    report
-        What tables and figures show of it; see `shown`.
+    tabled_outputs
+        Outputs whose errors are listed in tables, all by default.
+    main_outputs
+        Those of them that are printed beside the times and drawn, by default the first three.
 
     Raises
     ------
@@ -152,13 +153,8 @@ class ModelDefinition(ShortRepr):
     error_scale: Mapping[str, float] = field(default_factory=dict)
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loads: tuple[str, ...] = ()
-    report: ModelReport = field(default_factory=ModelReport)
-
-    @cached_property
-    def shown(self) -> ModelReport:
-        """What tables and figures show: as declared or else by the kind."""
-        outputs = tuple(output.name for output in self.outputs)
-        return completed(self.report, self.kind, len(self.coordinates), outputs)
+    tabled_outputs: tuple[str, ...] = ()
+    main_outputs: tuple[str, ...] = ()
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -197,7 +193,6 @@ class ModelDefinition(ShortRepr):
         if self.heading_pairs and len(self.planar) != 3:
             raise InputError(f"model {self.name!r} has heading_pairs, but no heading in planar")
         outputs = {q.name for q in self.outputs}
-        report = self.report
         self._known("stops", self.stops, (q.name for q in self.coordinates))
         self._known("cyclic", self.cyclic, self.states)
         self._known("planar", self.planar, self.states)
@@ -205,15 +200,8 @@ class ModelDefinition(ShortRepr):
         self._known("error_scale", self.error_scale, self.states)
         self._known("validity", self.validity, outputs | {q.name for q in self.inputs})
         self._known("loads", self.loads, outputs)
-        shown = (*report.outputs, *report.printed_outputs, *report.settings_outputs)
-        self._known("report", (*shown, *report.bounds), outputs)
-        cases = [case.id for case in report.timing]
-        if cases:
-            for needed in ("baseline", "strongest"):
-                if needed not in cases:
-                    raise InputError(f"model {self.name!r}: report.timing has no case {needed!r}")
-        if len(set(cases)) != len(cases):
-            raise InputError(f"model {self.name!r}: report.timing has an id twice")
+        self._known("tabled_outputs", self.tabled_outputs, outputs)
+        self._known("main_outputs", self.main_outputs, self.tabled_outputs or outputs)
 
     def _known(self, where: str, names: Iterable[str], known: Iterable[str]) -> None:
         allowed = set(known)

@@ -9,6 +9,7 @@ import xarray as xr
 from vehiclemor.registry import component
 from vehiclemor.report.labels import label_of
 from vehiclemor.report.printing import Line, fixed, number, power, table_text, wrapped
+from vehiclemor.report.shown import main_outputs, of_kind, timing_cases
 from vehiclemor.simulation.build import build
 from vehiclemor.study.timing import timed_model
 
@@ -30,9 +31,9 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         solver), errors, `offline_us`, and the number of runs after which a reduced model has paid
         for its training against either baseline (missing where it never does).
     """
-    data = timing_of(model, folder)
+    data, kind = timing_of(model, folder), component("model", model).kind
     rows = [
-        _row(data.sel(start=start, case=case), list(component("model", model).shown.counts))
+        _row(data.sel(start=start, case=case), list(of_kind(kind).counts))
         for start in data["start"].values
         for case in data["case"].values
     ]
@@ -41,7 +42,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:
     """Stored timing of the cases of a model, measured first if it is missing."""
-    cases = component("model", model).shown.timing
+    cases = timing_cases(component("model", model))
     return timed_model(build(model), cases, folder, f"timing-{model}")
 
 
@@ -83,8 +84,8 @@ def costs_text(model: str, folder: Path, brief: bool = False) -> str:
     """
     data, table = timing_of(model, folder), cost_table(model, folder)
     definition = component("model", model)
-    counts, outputs = definition.shown.counts, definition.shown.printed_outputs
-    baseline, strongest = definition.shown.baselines
+    shown, outputs = of_kind(definition.kind), main_outputs(definition)
+    counts, (baseline, strongest) = shown.counts, shown.against
     first, *_ = counts.items()
     starts = list(dict.fromkeys(table["start"]))
     times: list[Line] = []

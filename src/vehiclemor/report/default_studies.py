@@ -1,7 +1,7 @@
 """Studies of a model by its declaration: nominal, perturbed and unseen inputs, every method.
 
-What the model declares, or the package has, is taken; else a study file is written beside the
-results, so that it runs, resumes and can be read and changed like any other.
+What the package has is taken; else a study file is written beside the results, so that it runs,
+resumes and can be read and changed like any other.
 """
 
 import json
@@ -12,13 +12,14 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.files import write_text
-from vehiclemor.multibody.report import default_rank
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.shown import default_rank, tabled_outputs
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.method_settings import complete_settings, default_settings
+from vehiclemor.study.plans.study_file import load_studies
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.
@@ -41,6 +42,12 @@ POINTS = {
     "test": [[0.9, 1.0], [1.3, 1.0], [1.0, 0.5], [1.0, -1.0], [1.0, 0.0]],
     "outside": [[1.0, 1.2], [1.6, 1.0]],
 }
+
+
+def of_paper(name: str) -> str:
+    """Study of the paper's nominal run of a model, the first of its collection; else empty."""
+    studies = load_studies("paper").items()
+    return next((study for study, definition in studies if definition.model == name), "")
 
 
 def nominal(name: str, results: Path) -> str:
@@ -95,16 +102,14 @@ def legend(name: str) -> dict[str, str]:
 
 
 def bounds(model: Model) -> dict[str, float]:
-    """Largest RMS errors that count as good: published, declared, or a share of the range."""
+    """Largest RMS errors that count as good: published, or a share of the range."""
     published = rms_numbers(model.name)
     if published:
         return {output: number.value for output, number in published.items()}
     definition = component("model", model.name)
-    if definition.report.bounds:
-        return dict(definition.report.bounds)
     outputs = model.simulate(component("maneuver", definition.maneuver)).outputs
     ranges = dict(zip(model.outputs, np.ptp(outputs, axis=0), strict=True))
-    shown = [output for output in definition.shown.outputs if ranges[output] > 0.0]
+    shown = [output for output in tabled_outputs(definition) if ranges[output] > 0.0]
     return {output: INDISTINGUISHABLE * float(ranges[output]) for output in shown}
 
 
@@ -117,11 +122,11 @@ def _study(name: str, kind: str, results: Path, head: str, grid: str) -> str:
     lines += [f"start = {json.dumps(list(starts))}", "", "[grid]", grid]
     for label, (method, preset) in methods(model).items():
         lines += ["[[methods]]", f'method = "{method}"', f'label = "{label}"']
-        lines += [f'preset = "{preset}"', f"settings = {_inline(_rank(model, method))}", ""]
+        lines += [f'preset = "{preset}"', f"settings = {_inline(smaller_rank(model, method))}", ""]
     return str(write_text(results / "studies" / f"{name}-{kind}.toml", "\n".join(lines)))
 
 
-def _rank(model: Model, method: str) -> dict[str, int]:
+def smaller_rank(model: Model, method: str) -> dict[str, int]:
     """The rank of a default row, for a method whose own default the model is too small for."""
     rank = default_rank(len(model.coordinates))
     own = default_settings(model, method).get("rank")
@@ -147,7 +152,8 @@ def _protocol(model: Model) -> str:
             continue
         candidates = tolerances if label == "full_order" else [{}]
         role = {"full_order": "full order", "replay": "baseline"}.get(method, "contender")
-        chosen = [{"preset": preset, **_rank(model, method), **entry} for entry in candidates]
+        own = {"preset": preset, **smaller_rank(model, method)}
+        chosen = [own | entry for entry in candidates]
         words = label.replace("full_order_", "").replace("_", " ")
         lines += ["", "[[contestants]]", f'label = "{words}"', f'method = "{method}"']
         lines += [f'role = "{role}"', f"candidates = [{', '.join(map(_inline, chosen))}]"]

@@ -10,10 +10,11 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.registry import component
-from vehiclemor.report.default_studies import nominal, perturbed
+from vehiclemor.report.default_studies import nominal, of_paper, perturbed
 from vehiclemor.report.labels import trained_runs
 from vehiclemor.report.printing import ends_text
 from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.shown import tabled_outputs
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS
 from vehiclemor.study.run import run_studies
 
@@ -32,7 +33,7 @@ def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
 
 def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 1) -> pd.DataFrame:
     """RMS errors, floors, counts and status of every cell of studies of a model."""
-    outputs = component("model", model).shown.outputs
+    outputs = tabled_outputs(component("model", model))
     datasets = {k: v for study in studies for k, v in run_studies(study, results, jobs).items()}
     parts = [
         flat(dataset, outputs).assign(study=name)
@@ -45,7 +46,7 @@ def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 
 
 
 def settings_table(
-    study: str, outputs: tuple[str, ...], results: Path, jobs: int = 1
+    study: str, outputs: Sequence[str], results: Path, jobs: int = 1
 ) -> pd.DataFrame:
     """Control-period POD on a vehicle with every combination of its settings, as of `flat`."""
     dataset = next(iter(run_studies(study, results, jobs).values()))
@@ -61,7 +62,7 @@ def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
         For each method, start, group of quantities and unit: the largest RMS error, and of which
         quantity it is.  For constraints it is the RMS of the violation itself.
     """
-    study = component("model", model).report.study or nominal(model, results)
+    study = of_paper(model) or nominal(model, results)
     dataset = next(iter(run_studies(study, results, jobs).values()))
     rows: list[dict[str, object]] = []
     for label, start in itertools.product(dataset["method"].values, dataset["start"].values):
@@ -111,7 +112,7 @@ def counted_ends(dataset: xr.Dataset) -> str:
     return ends_text(ends.tolist(), int(doubted.sum())) + told
 
 
-def flat(dataset: xr.Dataset, outputs: tuple[str, ...]) -> pd.DataFrame:
+def flat(dataset: xr.Dataset, outputs: Sequence[str]) -> pd.DataFrame:
     """One row for each cell of a study: its place in the grid, errors, counts, status."""
     grid = list(dataset["status"].dims)
     kept = ["effective_rank", *(DYNAMIC_COUNTS | ALGEBRAIC_COUNTS), "growth_rate", "in_training"]

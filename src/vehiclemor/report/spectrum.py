@@ -20,6 +20,7 @@ from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
+from vehiclemor.report.default_studies import smaller_rank
 from vehiclemor.report.printing import Line, power, table_text, wrapped
 from vehiclemor.simulation.build import build
 
@@ -100,7 +101,7 @@ def _of_model(name: str) -> xr.Dataset:
     training = [TrainingRun(model, maneuver, model.starts[0])]
     parts, chosen = [], {}
     for preset in PRESETS:
-        settings = validated(pod.METHOD, model.kind, definition.shown.paper_fixed, preset)
+        settings = validated(pod.METHOD, model.kind, smaller_rank(model, "pod"), preset)
         try:
             pod.check(model, settings)
         except InputError:

@@ -11,6 +11,7 @@ from vehiclemor.report.comparison.paper import paper_comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.errors import error_table, quantity_table, settings_table
 from vehiclemor.report.predictive.paper_terms import paper_terms_rows
+from vehiclemor.report.shown import tables_file
 from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.simulation.build import build
 
@@ -22,7 +23,7 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
     tables = {"comparison": paper_comparison(results, jobs)}
     for model in names("model"):
         tables |= {f"{name}-{model}": t for name, t in model_tables(model, results, jobs).items()}
-    for study, outputs in settings_studies().items():
+    for study, outputs in tables_file().settings.items():
         tables[Path(study).stem] = settings_table(study, outputs, results, jobs)
     written: list[Path] = []
     for name, table in tables.items():
@@ -48,12 +49,6 @@ def model_tables(model: str, results: Path, jobs: int = 1) -> dict[str, pd.DataF
     if component("model", model).speeds:
         tables["quantities"] = quantity_table(model, results, jobs)
     return tables
-
-
-def settings_studies() -> dict[str, tuple[str, ...]]:
-    """Studies over all settings of control-period POD -> outputs whose errors are listed."""
-    reports = [component("model", model).report for model in names("model")]
-    return {r.settings_study: r.settings_outputs for r in reports if r.settings_study}
 
 
 def operation_table(model: str) -> pd.DataFrame:

@@ -14,6 +14,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.multibody.report import TimingCase
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
@@ -58,6 +58,28 @@ SPEED_UPS = {
     "loop_speed_up_strongest": ("strongest", LOOP),
 }
 QUANTILES = {"seconds_median": 0.5, "seconds_lower": 0.25, "seconds_upper": 0.75}
+
+
+@dataclass(frozen=True)
+class TimingCase:
+    """One row of a cost table: a method with settings, run on the nominal maneuver.
+
+    Attributes
+    ----------
+    id
+        By which the row is known; `baseline` is the paper's kind of full-order run and `strongest`
+        the best full-order solver, for every model.
+    label
+        As it is printed.
+    method, preset, settings
+        Registered name, one of its presets, and settings that differ from that.
+    """
+
+    id: str
+    label: str
+    method: str
+    preset: str = "recommended"
+    settings: Mapping[str, float | int | str | bool] = field(default_factory=dict)
 
 
 def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: str) -> xr.Dataset:

@@ -12,7 +12,6 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.high_fidelity import quantities
 from vehiclemor.multibody.high_fidelity.equilibrium import check, solve_equilibrium, starts
 from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.multibody.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -25,32 +24,6 @@ def derive() -> Program:
     return equations.derive()
 
 
-REPORT = ModelReport(
-    study="figures-9-10",
-    settings_study="high-fidelity-settings",
-    settings_outputs=("lateral_speed", "vertical_speed", "position_drift"),
-    outputs=(
-        "lateral_speed",
-        "vertical_speed",
-        "lateral_position",
-        "yaw",
-        "roll",
-        "position_drift",
-        "velocity_drift",
-    ),
-    printed_outputs=("lateral_speed", "vertical_speed", "lateral_position"),
-    timing=(
-        *DYNAMIC_BASELINES,
-        reduced_case("pod", 1),
-        reduced_case("pod", 1, tolerance=1e-4),
-        reduced_case("pod", 3),
-        reduced_case("pod", 3, formulation="coordinates"),
-        reduced_case("pod", 1, "literal"),
-        reduced_case("fixed_basis", 3),
-    ),
-    bounds={"lateral_speed": "hfv_rms_lateral_speed", "vertical_speed": "hfv_rms_vertical_speed"},
-    paper_fixed={"rank": 1, "control_period": 0.1},
-)
 DEFINITION = ModelDefinition(
     name="high_fidelity_vehicle",
     kind="dae",
@@ -82,5 +55,13 @@ DEFINITION = ModelDefinition(
         **UPRIGHT,
     },
     loads=TIRE_LOADS,
-    report=REPORT,
+    tabled_outputs=(
+        "lateral_speed",
+        "vertical_speed",
+        "lateral_position",
+        "yaw",
+        "roll",
+        "position_drift",
+        "velocity_drift",
+    ),
 )

@@ -14,7 +14,6 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.independent_suspension import quantities
 from vehiclemor.multibody.independent_suspension.equilibrium import check, starts
 from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
-from vehiclemor.multibody.report import DYNAMIC_BASELINES, ModelReport, reduced_case
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -27,24 +26,6 @@ def derive() -> Program:
     return equations.derive()
 
 
-REPORT = ModelReport(
-    study="figures-2-4",
-    settings_study="vehicle-settings",
-    settings_outputs=("pitch", "yaw"),
-    outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
-    printed_outputs=("pitch", "yaw", "lateral_position"),
-    timing=(
-        *DYNAMIC_BASELINES,
-        reduced_case("pod", 3),
-        reduced_case("pod", 3, tolerance=1e-4),
-        reduced_case("pod", 1),
-        reduced_case("pod", 3, formulation="state"),
-        reduced_case("pod", 3, "literal"),
-        reduced_case("fixed_basis", 3),
-    ),
-    bounds={"pitch": "gv_rms_pitch", "yaw": "gv_rms_yaw"},
-    paper_fixed={"rank": 3, "control_period": 0.5},
-)
 DEFINITION = ModelDefinition(
     name="independent_suspension_vehicle",
     kind="ode",
@@ -64,5 +45,6 @@ DEFINITION = ModelDefinition(
     # Steering as far as that of the car (CommonRoad, BMW 320i).
     validity={"longitudinal_speed": FORWARD, **UPRIGHT, "delta": (-1.066, 1.066)},
     loads=TIRE_LOADS,
-    report=REPORT,
+    tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
+    main_outputs=("pitch", "yaw", "lateral_position"),
 )

@@ -18,6 +18,7 @@ from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rows import predictive_comparison
 from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.report.printing import Footnotes, Line, power, table_text, wrapped
+from vehiclemor.report.shown import main_outputs
 from vehiclemor.report.spectrum import spectrum_table, spectrum_text
 from vehiclemor.simulation.build import build
 
@@ -58,7 +59,7 @@ def _largest(rows: Sequence[Mapping[str, Any]], column: str) -> str:
 
 def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
     """The comparison of a model as text."""
-    shown = component("model", name).shown.printed_outputs
+    shown = main_outputs(component("model", name))
     columns = {f"rms_{output}": label_of(output).short for output in shown}
     records, notes = rows.to_dict("records"), Footnotes()
     nominal_runs = [row for row in records if row["kind"] == "nominal"]

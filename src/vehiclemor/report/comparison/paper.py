@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vehiclemor.registry import component, names
+from vehiclemor.registry import names
 from vehiclemor.report.comparison.design import CLAIMS, design_rows
 from vehiclemor.report.comparison.rows import (
     COLUMNS,
@@ -15,6 +15,7 @@ from vehiclemor.report.comparison.rows import (
 )
 from vehiclemor.report.comparison.times import agreement_rows, slower_row, time_rows
 from vehiclemor.report.costs import cost_table
+from vehiclemor.report.default_studies import of_paper
 from vehiclemor.report.published import Number, load_published
 from vehiclemor.study.run import run_studies
 
@@ -40,7 +41,7 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
         if number.model not in costs:
             unknown.append(not_comparable(number, "this model is not in the suite yet"))
         elif number.kind == "rms_error":
-            errors += error_rows(number, results[component("model", number.model).report.study])
+            errors += error_rows(number, results[of_paper(number.model)])
         else:
             times += time_rows(number, costs[number.model])
     claims: list[Row] = []

@@ -24,6 +24,7 @@ from vehiclemor.report.printing import (
     terms,
     wrapped,
 )
+from vehiclemor.report.shown import main_outputs
 from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED
 from vehiclemor.study.plans.study_file import PARAMETER
 from vehiclemor.study.run import run_studies
@@ -172,7 +173,7 @@ def study_text(rows: pd.DataFrame) -> str:
 def _grid_text(rows: list[Row]) -> str:
     """One study: a block for each start and output that the model shows, then costs."""
     first = rows[0]
-    shown = component("model", first["model"]).shown.printed_outputs
+    shown = main_outputs(component("model", first["model"]))
     starts, notes = list(dict.fromkeys(row["start"] for row in rows)), Footnotes()
     head = f"{first['study']}: {first['title']}"
     about = f"{first['model']}, training {first['training']}"

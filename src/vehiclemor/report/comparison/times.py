@@ -4,12 +4,13 @@ from typing import Any
 
 import pandas as pd
 
-from vehiclemor.multibody.report import TimingCase
 from vehiclemor.registry import component
 from vehiclemor.report.comparison.rows import Row, claim_row, number_row
 from vehiclemor.report.criteria.finding import IN_WORDS, PRINTED, Finding
 from vehiclemor.report.published import Claim, Number, rms_numbers
+from vehiclemor.report.shown import timing_cases
 from vehiclemor.report.verdicts import MET, NOT_COMPARABLE, PUBLISHED_START, scatter
+from vehiclemor.study.timing import TimingCase
 
 # Preset -> what its rows are called.
 PRESETS = {"recommended": "default", "literal": "literal"}
@@ -52,7 +53,7 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
 
 def _cases(model: str, states: int) -> list[TimingCase]:
     """Timing cases of control-period POD with so many states and nothing else set."""
-    cases = component("model", model).shown.timing
+    cases = timing_cases(component("model", model))
     return [c for c in cases if c.method == "pod" and dict(c.settings) == {"rank": states}]
 
 

@@ -1,4 +1,4 @@
-"""Which figures there are: those of `data/figures`, and a set for every registered model."""
+"""Which figures there are: those of `figures.toml`, and a set for every registered model."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -25,6 +25,7 @@ from vehiclemor.report.figures import (
 )
 from vehiclemor.report.figures.curves import PATH
 from vehiclemor.report.figures.lines import Results
+from vehiclemor.report.shown import main_outputs
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.study_file import StudyFile, studies_and_files
 from vehiclemor.toml_files import FileSchema, read_toml
@@ -87,7 +88,7 @@ class Entry(FileSchema):
 
 
 class FigureFile(FileSchema):
-    """Schema of `data/figures/*.toml`."""
+    """Schema of `data/figures/figures.toml`."""
 
     parameters: str
     figures: list[Entry]
@@ -169,7 +170,7 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
 def _of_a_model(kind: str, model: str, results: Path) -> Entry:
     """One of the figures that every model has, of all registered methods."""
     drawing, content, study, caption = OF_A_MODEL[kind]
-    outputs = list(component("model", model).shown.printed_outputs)[:MOST_OUTPUTS]
+    outputs = list(main_outputs(component("model", model)))[:MOST_OUTPUTS]
     methods = default_studies.legend(model)
     options: dict[str, object] = {"outputs": outputs, "methods": methods}
     if drawing == "histories":

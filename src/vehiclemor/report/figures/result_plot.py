@@ -38,6 +38,7 @@ from vehiclemor.report.figures.sampled_errors import figure_samples, sample_axis
 from vehiclemor.report.figures.saving import save_figure, styled
 from vehiclemor.report.labels import full_label, marked, method_text, unit_of
 from vehiclemor.report.result_selection import drawn
+from vehiclemor.report.shown import main_outputs, tabled_outputs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,9 +120,9 @@ def shown_outputs(dataset: xr.Dataset) -> list[str]:
     """Outputs that the model shows; of a model that is not installed here, the first."""
     known = [str(output) for output in dataset["output"].values]
     try:
-        report = component("model", _model(dataset)).shown
-        printed = list(dict.fromkeys((*report.printed_outputs, *report.outputs)))
-        shown = printed[: max(2, len(report.printed_outputs))]
+        definition = component("model", _model(dataset))
+        main = main_outputs(definition)
+        shown = list(dict.fromkeys((*main, *tabled_outputs(definition))))[: max(2, len(main))]
     except InputError:
         shown = []
     # Of outputs that a user has chosen none may be among them.

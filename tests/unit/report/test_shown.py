@@ -1,0 +1,91 @@
+"""What tables show: the paper's models have rows of their own, others follow from their kind."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.unit import standard_problems
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.registry import component, names
+from vehiclemor.report.default_studies import of_paper, smaller_rank
+from vehiclemor.report.published import load_published
+from vehiclemor.report.shown import (
+    main_outputs,
+    of_kind,
+    tabled_outputs,
+    tables_file,
+    timing_cases,
+)
+from vehiclemor.resources import data_names
+from vehiclemor.simulation.build import build
+from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.plans.study_file import load_studies
+
+PLAIN = standard_problems.DEFINITION
+BUILT_IN = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
+NOMINAL = ("figures-6-7", "figures-2-4", "figures-9-10")
+
+
+@pytest.mark.parametrize(("name", "nominal"), [*zip(BUILT_IN, NOMINAL, strict=True)])
+def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
+    cases, model = timing_cases(component("model", name)), build(name)
+    assert [case.id for case in cases[:2]] == ["baseline", "strongest"]
+    for kind in ("id", "label"):
+        assert len({getattr(case, kind) for case in cases}) == len(cases)
+    assert {case.method for case in cases} <= set(names("method"))
+    assert set(of_kind(model.kind).counts) <= set(model.counts)
+    assert of_paper(name) == nominal
+    # Settings of the paper are the defaults of POD.
+    printed = [n for n in load_published().numbers.values() if n.model == name]
+    assert smaller_rank(model, "pod") == {}
+    settings = complete_settings(model, "pod")
+    for number in printed:
+        if number.kind == "rms_error":
+            assert settings["rank"] == number.states
+            assert settings["control_period"] == number.control_period
+
+
+def test_labels_tell_what_differs_from_the_recommended_settings():
+    labels = {c.id: c.label for c in timing_cases(component("model", BUILT_IN[0]))}
+    assert labels["pod_r3_1e-6"] == "pod r=3, 1e-6"
+    assert labels["pod_literal_r6"] == "pod literal r=6"
+    labels = {c.id: c.label for c in timing_cases(component("model", BUILT_IN[1]))}
+    assert labels["pod_state_r3"] == "pod state r=3"
+    assert labels["fixed_basis_r3"] == "fixed basis r=3"
+
+
+def test_listed_models_studies_and_outputs_exist():
+    assert set(tables_file().reduced) == set(BUILT_IN)
+    for study, outputs in tables_file().settings.items():
+        assert study in data_names("studies")
+        (definition,) = load_studies(study).values()
+        model = component("model", definition.model)
+        assert set(outputs) <= set(tabled_outputs(model))
+
+
+def test_defaults_follow_the_kind():
+    speeds = {"ae": (), "ode": PLAIN.speeds, "dae": PLAIN.speeds}
+    for kind, counted in (("ae", "iterations"), ("ode", "rhs_calls"), ("dae", "rhs_calls")):
+        made = replace(PLAIN, kind=kind, speeds=speeds[kind], design_coordinates=PLAIN.starts)
+        cases = [case.id for case in timing_cases(made)]
+        assert cases[:2] == ["baseline", "strongest"]
+        assert cases[-4:] == ["replay", "pod_r1", "pod_literal_r1", "fixed_basis_r1"]
+        assert counted in of_kind(kind).counts
+    assert tabled_outputs(PLAIN) == tuple(output.name for output in PLAIN.outputs)
+    assert main_outputs(PLAIN) == ("angle", "tracked", "angular_speed")
+
+
+def test_outputs_are_those_that_a_model_declares():
+    chosen = replace(PLAIN, tabled_outputs=("tracked",))
+    assert tabled_outputs(chosen) == main_outputs(chosen) == ("tracked",)
+    chosen = replace(PLAIN, main_outputs=("tracked",))
+    assert main_outputs(chosen) == ("tracked",)
+    assert tabled_outputs(chosen) == tabled_outputs(PLAIN)
+
+
+@pytest.mark.parametrize(("coordinates", "rank"), [(1, 1), (2, 1), (3, 2), (4, 3), (26, 3)])
+def test_the_default_rank_is_a_reduction_where_there_is_one(coordinates, rank):
+    made = tuple(Quantity(f"q{k}", "m", "a coordinate") for k in range(coordinates))
+    speeds = tuple(Quantity(f"v{k}", "m/s", "a speed") for k in range(coordinates))
+    cases = timing_cases(replace(PLAIN, coordinates=made, speeds=speeds))
+    assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {rank}
