@@ -16,7 +16,7 @@ from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.plans.protocol_results import judged_part
+from vehiclemor.study.plans.protocol_results import judged_part, judged_set
 from vehiclemor.study.run import run_studies
 
 STUDY = "predictive"
@@ -98,6 +98,8 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
     # What has come to its end, trusted or not, is timed.
     ok = np.isfinite(found.scores)
     runs, misses = part.sizes["scenario"], int(found.missed.sum())
+    sets = dataset["scenario_set"].values
+    of_set = dataset.isel(scenario=sets == judged_set(set(sets)))
     row: Row = {
         "kind": "method",
         "model": protocol.model,
@@ -111,7 +113,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
         "winner": bool(part["winner"]),
         "test_set": str(dataset.attrs["test_set"]),
         "runs": runs,
-        "apart": int((dataset["apart"].values != "").sum()),
+        "apart": int((of_set["apart"].values != "").sum()),
         "misses": misses,
         "silent": int(found.silent.sum()),
         "flagged": int(found.flagged.sum()),
