@@ -13,7 +13,6 @@ from vehiclemor.report.comparison.rows import ALL_MODELS, COLUMNS, Row
 from vehiclemor.report.comparison.times import agreement_rows, slower_row, time_rows
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.figures.catalogue import FIGURES
-from vehiclemor.report.predictive import paper_terms
 from vehiclemor.report.published import load_published
 from vehiclemor.report.regenerate import regenerate_figures
 from vehiclemor.report.shown import tables_file
@@ -325,10 +324,6 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
     path.write_text(SETTINGS)
     chosen = tables_file().model_copy(update={"settings": {str(path): ["pitch", "yaw"]}})
     monkeypatch.setattr(tables, "tables_file", lambda: chosen)
-    # Of the paper's terms too: the baselines and every eighth variant.
-    cases = paper_terms.paper_cases
-    few = lambda model: [*(every := list(cases(model)))[:2], *every[2::8]]  # noqa: E731
-    monkeypatch.setattr(paper_terms, "paper_cases", few)
     names = ["10"]
     contents = []
     # The first comparison is the one of the other tests.
@@ -339,7 +334,7 @@ def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeyp
         paths, _ = regenerate_figures(results_folder, out, names)
         paths += regenerate_tables(results_folder, out)
         contents.append({path.name: path.read_bytes() for path in paths})
-    assert len(contents[0]) == 3 * len(names) + 3 * 19
+    assert len(contents[0]) == 3 * len(names) + 3 * 16
     assert contents[0] == contents[1]
     assert all(contents[0].values())
 

@@ -51,7 +51,6 @@ class OfKind(FileSchema):
     against: list[Line] = Field(min_length=2, max_length=2)
     cases: list[Case]
     counts: dict[str, Line]
-    paper_open: dict[str, list[Value]]
 
 
 class TablesFile(FileSchema):

@@ -10,7 +10,6 @@ from vehiclemor.registry import component, names
 from vehiclemor.report.comparison.paper import paper_comparison
 from vehiclemor.report.costs import cost_table
 from vehiclemor.report.errors import error_table, quantity_table, settings_table
-from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.shown import tables_file
 from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.simulation.build import build
@@ -37,11 +36,10 @@ def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
 
 
 def model_tables(model: str, results: Path, jobs: int = 1) -> dict[str, pd.DataFrame]:
-    """Tables that every model has: costs, errors, paper's terms, spectrum, operations."""
+    """Tables that every model has: costs, errors, spectrum, operations."""
     tables = {
         "costs": cost_table(model, results),
         "errors": error_table(model, results, jobs),
-        "paper-terms": pd.DataFrame(paper_terms_rows([model], results)),
         "operations": operation_table(model),
     }
     if pod.METHOD.accepts(build(model))[0]:

@@ -1,4 +1,4 @@
-"""One model, whatever it declares: errors of every method, costs, unseen inputs, paper's terms."""
+"""One model, whatever it declares: errors of every method, costs, unseen inputs."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,6 @@ from vehiclemor.report.costs import cost_table, costs_text
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.errors import study_tables
 from vehiclemor.report.labels import label_of
-from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rows import predictive_comparison
 from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.report.printing import Footnotes, Line, power, table_text, wrapped
@@ -46,7 +45,6 @@ def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     if pod.METHOD.accepts(build(name))[0]:
         parts.append(spectrum_table(name).assign(kind="spectrum"))
     parts.append(predictive_comparison(folder, jobs, study=unseen(name, folder)))
-    parts.append(pd.DataFrame(paper_terms_rows([name], folder)))
     return pd.concat(parts, ignore_index=True).assign(model=name)
 
 

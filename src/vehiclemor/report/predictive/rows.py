@@ -9,7 +9,6 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.report.predictive.equal_error import at_error
-from vehiclemor.report.predictive.paper_terms import paper_terms_rows
 from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
 from vehiclemor.simulation.trajectory import FINISHED
@@ -41,13 +40,11 @@ def predictive_comparison(
         `kind` tells what a row is, `study` of which protocol.  `method`: one contestant on what is
         judged, with the columns of `method_rows`.  `target`: what the contender that validation
         has chosen must reach, with `id`, `bound`, `measured`, `unit`, `verdict` (`met`, `missed` or
-        `not_comparable`), `reason` and `threshold_source`.  `paper`: POD at the paper's rank and
-        control period, see `paper_terms`.  Errors `worst_<measure>_<output>` are in SI units.
+        `not_comparable`), `reason` and `threshold_source`.  Errors `worst_<measure>_<output>`
+        are in SI units.
     """
     results = run_studies(study, folder, jobs, seed=seed).values()
     rows = [row for dataset in results for row in protocol_rows(dataset)]
-    if study == STUDY and seed is None:
-        rows += paper_terms_rows([dataset.attrs["model"] for dataset in results], folder)
     return pd.DataFrame(rows)
 
 

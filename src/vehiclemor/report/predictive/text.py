@@ -7,7 +7,6 @@ import pandas as pd
 
 from vehiclemor.report.criteria.finding import OWN
 from vehiclemor.report.labels import label_of
-from vehiclemor.report.predictive.paper_terms import paper_terms_text
 from vehiclemor.report.predictive.targets import Row, chosen
 from vehiclemor.report.printing import Footnotes, Line, fixed, short, table_text, terms, wrapped
 from vehiclemor.report.verdicts import LARGEST_SPREAD, NOT_COMPARABLE, counted
@@ -31,18 +30,15 @@ LEGEND = {
 def predictive_text(rows: pd.DataFrame) -> str:
     """All models: targets, errors of what was chosen, contenders, full order beside them."""
     records: list[Row] = [dict(row) for row in rows.to_dict(orient="records")]
-    paper, targets = _of_kind(records, "paper"), _of_kind(records, "target")
+    targets = _of_kind(records, "target")
     title = "Reduced models on inputs that they have not seen"
     if targets:
         title += f": of their targets {counted(str(row['verdict']) for row in targets)}"
     parts = [wrapped(f"{title}."), terms(LEGEND)]
-    records = [row for row in records if row["kind"] != "paper"]
     parts += [
         _protocol_text([row for row in records if row["study"] == study])
         for study in dict.fromkeys(row["study"] for row in records)
     ]
-    if paper:
-        parts.append(paper_terms_text(paper))
     return "\n\n".join(parts)
 
 
