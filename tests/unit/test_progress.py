@@ -32,12 +32,12 @@ def test_what_takes_long_is_told_of_and_its_end_if_it_has_one(monkeypatch, caplo
     assert not caplog.messages
     monkeypatch.setattr(progress, "QUIET", 0.0)
     with suppress(ZeroDivisionError), first_use("what fails"), making("kernel"):
-        time.sleep(0.05)
+        time.sleep(0.2)
         raise ZeroDivisionError
     with first_use("a model"):
         for part in ("derivation", "kernel"):
             with making(part):
-                time.sleep(0.05)
+                time.sleep(0.2)
     failed, began, ended = caplog.messages
     assert "first use of what fails" in failed
     assert "first use of a model" in began
@@ -61,8 +61,8 @@ def test_own_lines_stand_back_behind_an_applications_handlers(monkeypatch):
 def test_a_process_tells_of_what_it_compiles_and_nothing_when_it_is_there(tmp_path: Path):
     def told(before: str, cache: Path) -> list[str]:
         command = [sys.executable, "-c", LOOP.format(before=before)]
-        given = {"capture_output": True, "text": True, "check": True}
-        done = subprocess.run(command, env={"VEHICLEMOR_CACHE": str(cache)}, **given)
+        own = {"VEHICLEMOR_CACHE": str(cache)}
+        done = subprocess.run(command, env=own, capture_output=True, text=True, check=True)
         return done.stderr.splitlines()
 
     began, ended = told("", tmp_path / "1")
