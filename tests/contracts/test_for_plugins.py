@@ -14,15 +14,22 @@ from vehiclemor.registry import component, names
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
-@pytest.mark.parametrize("name", KINEMATIC)
-def test_registered_models_pass(name: str) -> None:
-    contracts.check_model(name)
-
-
 @pytest.mark.parametrize("model", KINEMATIC)
 @pytest.mark.parametrize("name", names("method"))
 def test_registered_methods_pass(model: str, name: str) -> None:
     contracts.check_method(name, model)
+
+
+@pytest.fixture
+def instead(monkeypatch: pytest.MonkeyPatch):
+    """Let the contracts find this component in the place of any other of its kind."""
+
+    def found(kind: str, this: object) -> None:
+        monkeypatch.setattr(
+            contracts, "component", lambda k, n: this if k == kind else component(k, n)
+        )
+
+    return found
 
 
 class Altered:
@@ -55,14 +62,16 @@ class Altered:
         (lambda run, _: replace(run, status="fine"), "status 'fine'"),
     ],
 )
-def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message: str) -> None:
-    monkeypatch.setattr(
-        contracts,
-        "component",
-        lambda kind, name: Altered(alter) if kind == "method" else component(kind, name),
-    )
+def test_broken_method_is_named(instead, alter, message: str) -> None:
+    instead("method", Altered(alter))
     with pytest.raises(AssertionError, match=message):
         contracts.check_method("replay", KINEMATIC[0])
+
+
+UNKNOWN = (
+    TimingCase("baseline", "a", "full_order"),
+    TimingCase("strongest", "b", "no_such_method"),
+)
 
 
 @pytest.mark.parametrize(
@@ -71,25 +80,10 @@ def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message:
         ({"inputs": (Quantity("s0", "m", "one"), Quantity("z", "m", "two"))}, "other inputs"),
         ({"coordinates": (Quantity("one", "m", "one"),), "stops": {}}, "residual has shape"),
         ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
-        (
-            {
-                "report": ModelReport(
-                    timing=(
-                        TimingCase("baseline", "one", "full_order"),
-                        TimingCase("strongest", "two", "no_such_method"),
-                    )
-                )
-            },
-            "unknown methods",
-        ),
+        ({"report": ModelReport(timing=UNKNOWN)}, "unknown methods"),
     ],
 )
-def test_broken_declaration_is_named(monkeypatch: pytest.MonkeyPatch, change, message: str) -> None:
-    broken = replace(component("model", KINEMATIC[0]), **change)
-    monkeypatch.setattr(
-        contracts,
-        "component",
-        lambda kind, name: broken if kind == "model" else component(kind, name),
-    )
+def test_broken_declaration_is_named(instead, change, message: str) -> None:
+    instead("model", replace(component("model", KINEMATIC[0]), **change))
     with pytest.raises(AssertionError, match=message):
         contracts.check_model(KINEMATIC[0])
