@@ -38,11 +38,7 @@ def _declares(method: str, model: str) -> bool:
 
 PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(method, m)]
 # What they leave out or linearise shows in a lane change: findings, no defects.
-ROUGH = (
-    "fixed_basis",
-    "linear_single_track",
-    "modal_truncation",
-)
+ROUGH = ("fixed_basis", "linear_single_track", "modal_truncation")
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
 TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = dict.fromkeys(
     ("slow_manifold", "two_track", "guarded"),
@@ -101,59 +97,34 @@ def pair(request: pytest.FixtureRequest) -> Pair:
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_method_describes_itself(name: str) -> None:
+def test_a_method_describes_itself_and_its_settings(name: str) -> None:
     method: Method = component("method", name)
-    assert method.name == name
-    assert method.summary
-    assert "\n" not in method.summary
-    assert isinstance(method.reference, str)
+    assert (method.name, bool(method.summary)) == (name, True)
     assert method.settings
     assert set(method.presets) <= set(method.settings) <= set(KINDS)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", METHODS)
-def test_kinds_without_settings_are_refused(name: str, kind: str) -> None:
-    method: Method = component("method", name)
-    if kind in method.settings:
-        pytest.skip(f"{name} reduces models of kind {kind}")
-    accepted, reason = method.accepts(SimpleNamespace(name="box", kind=kind))
-    assert not accepted
-    assert reason.endswith(f"box is of kind {kind}")
-    assert "\n" not in reason
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", METHODS)
-def test_settings_are_documented_and_their_defaults_allowed(name: str, kind: str) -> None:
-    method: Method = component("method", name)
-    if kind not in method.settings:
+    for kind in set(KINDS) - set(method.settings):
         assert method.names_of(kind) == ()
-        pytest.skip(f"{name} reduces no model of kind {kind}")
-    declared = method.settings[kind]
-    assert issubclass(declared, Settings)
-    for key, field in declared.model_fields.items():
-        assert key.isidentifier()
-        assert field.description
-        assert "\n" not in field.description
-    defaults = {key: field.default for key, field in declared.model_fields.items()}
-    assert validated(method, kind, {}).model_dump() == defaults
-    # What cells store is what they are made of again.
-    assert validated(method, kind, defaults).model_dump() == defaults
-
-
-def test_presets_are_valid(pair: Pair) -> None:
-    presets = pair.method.presets_of(pair.model.kind)
-    assert "recommended" in presets
-    for preset, values in presets.items():
-        complete = validated(pair.method, pair.model.kind, {}, preset).model_dump()
-        assert set(complete) == set(pair.method.names_of(pair.model.kind))
-        assert {name: complete[name] for name in values} == values
-
-
-def test_unknown_setting_is_refused(pair: Pair) -> None:
-    with pytest.raises(InputError, match="unknown setting"):
-        validated(pair.method, pair.model.kind, {"no_such_setting": 1})
+        accepted, reason = method.accepts(SimpleNamespace(name="box", kind=kind))
+        assert not accepted
+        assert reason.endswith(f"box is of kind {kind}")
+    for kind, declared in method.settings.items():
+        assert issubclass(declared, Settings)
+        fields = declared.model_fields
+        for text in (method.summary, *(field.description for field in fields.values())):
+            assert text
+            assert "\n" not in text
+        defaults = {key: field.default for key, field in fields.items()}
+        # What cells store is what they are made of again.
+        for values in ({}, defaults):
+            assert validated(method, kind, values).model_dump() == defaults
+        with pytest.raises(InputError, match="unknown setting"):
+            validated(method, kind, {"no_such_setting": 1})
+        presets = method.presets_of(kind)
+        assert "recommended" in presets
+        for preset, values in presets.items():
+            complete = validated(method, kind, {}, preset).model_dump()
+            assert set(complete) == set(method.names_of(kind))
+            assert {key: complete[key] for key in values} == values
 
 
 def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
@@ -161,10 +132,9 @@ def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
     for preset in pair.method.presets_of(pair.model.kind):
         run = pair.run(pair.fit(preset))
         assert (run.status, run.message) == ("ok", "")
-        samples = pair.maneuver.samples
-        assert run.coordinates.shape == (samples, len(pair.model.coordinates))
-        assert run.speeds.shape == (samples, len(pair.model.speeds))
-        assert run.outputs.shape == (samples, len(pair.model.outputs))
+        for name in ("coordinates", "speeds", "outputs"):
+            shape = pair.maneuver.samples, len(getattr(pair.model, name))
+            assert getattr(run, name).shape == shape
         np.testing.assert_array_equal(run.time, pair.maneuver.times)
         np.testing.assert_array_equal(run.inputs, pair.maneuver.at(pair.maneuver.times))
         assert np.isfinite(run.states).all()
@@ -202,44 +172,35 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
     assert np.all(error[chosen] < bound * size[chosen])
 
 
-def test_it_is_exported_or_refused(pair: Pair) -> None:
-    fitted = pair.fit()
+def test_it_is_exported_or_refused_and_its_runs_are_labelled(pair: Pair) -> None:
+    fitted, model = pair.fit(), pair.model
     with suppress(InputError):
         assert exported_system(fitted, "car").name == "car"
-
-
-def test_runs_are_labelled(pair: Pair) -> None:
-    dataset = trajectory_dataset(pair.model, pair.run(pair.fit()))
-    assert tuple(dataset["coordinate"].values) == pair.model.coordinates
-    assert tuple(dataset["output"].values) == pair.model.outputs
-    assert tuple(dataset["input"].values) == pair.model.inputs
+    dataset = trajectory_dataset(model, pair.run(fitted))
+    for name in ("coordinate", "output", "input"):
+        assert tuple(dataset[name].values) == getattr(model, f"{name}s")
+    with pytest.raises(InputError, match="unknown start"):
+        fitted.simulate(pair.maneuver, "upside_down")
 
 
 def test_results_are_deterministic(pair: Pair) -> None:
     reduced = pair.fit()
     other = pair.maneuver.perturbed(0.9, 0.8)
-    first, _, again, refitted = (
-        pair.run(reduced),
-        pair.run(reduced, other),
-        pair.run(reduced),
-        pair.run(pair.fresh_fit()),
-    )
-    for run in (again, refitted):
+    first, _, again = (pair.run(reduced, maneuver) for maneuver in (None, other, None))
+    for run in (again, pair.run(pair.fresh_fit())):
         np.testing.assert_array_equal(run.states, first.states)
         np.testing.assert_array_equal(run.outputs, first.outputs)
         assert (run.counts, run.status, run.message) == (first.counts, first.status, first.message)
 
 
-@pytest.mark.parametrize("factors", [(1.2, 1.0), (1.0, 1.2), (2.0, 0.5)])
-def test_untrained_inputs_give_a_result_or_say_why_not(
-    pair: Pair, factors: tuple[float, float]
-) -> None:
-    perturbed = pair.maneuver.perturbed(*factors)
-    run = pair.run(pair.fit(), perturbed)
-    assert run.status in STATUSES
-    assert np.isfinite(run.outputs).all() == run.finished
-    assert bool(run.message) == (run.status != "ok")
-    np.testing.assert_allclose(run.inputs, perturbed.at(perturbed.times), rtol=1e-15)
+def test_untrained_inputs_give_a_result_or_say_why_not(pair: Pair) -> None:
+    for factors in ((1.2, 1.0), (1.0, 1.2), (2.0, 0.5)):
+        perturbed = pair.maneuver.perturbed(*factors)
+        run = pair.run(pair.fit(), perturbed)
+        assert run.status in STATUSES
+        assert np.isfinite(run.outputs).all() == run.finished
+        assert bool(run.message) == (run.status != "ok")
+        np.testing.assert_allclose(run.inputs, perturbed.at(perturbed.times), rtol=1e-15)
 
 
 def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
@@ -290,10 +251,8 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
     scale = pair.model.error_scale if dynamic else 1.0
     for sample in range(1, 2 * count + 1):
         k, half = divmod(sample - 1, 2)
-        at_ends = [
-            inputs[k] + part * (inputs[k + 1] - inputs[k]) for part in (half / 2, (half + 1) / 2)
-        ]
-        u, ends = (inputs[k], None) if zero else at_ends
+        rise = 0.0 if zero else 0.5 * (inputs[k + 1] - inputs[k])
+        u, ends = inputs[k] + half * rise, None if zero else inputs[k] + (half + 1) * rise
         state = space.step(state, u, ends, dt, (sample - 1) * dt)
         now = u if ends is None else ends
         if zero and half:
@@ -409,13 +368,5 @@ def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> Non
         steps = [rom.step(rom.state(inputs=inputs), inputs, 1e-2) for rom in (made, again)]
         np.testing.assert_array_equal(steps[1], steps[0])
         if pair.model.kind != "ae":
-            first, second = (
-                rom.jacobian(step, inputs, of="outputs")
-                for rom, step in zip((made, again), steps, strict=True)
-            )
-            np.testing.assert_array_equal(second, first)
-
-
-def test_unknown_start_is_refused(pair: Pair) -> None:
-    with pytest.raises(InputError, match="unknown start"):
-        pair.fit().simulate(pair.maneuver, "upside_down")
+            slopes = [rom.jacobian(steps[0], inputs, of="outputs") for rom in (made, again)]
+            np.testing.assert_array_equal(slopes[1], slopes[0])

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -24,31 +25,23 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_write_that_breaks_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+def test_a_write_leaves_the_old_file_until_the_new_one_is_complete(tmp_path: Path) -> None:
     path = write_text(tmp_path / "file.txt", "old")
-
-    def broken(temporary: Path) -> None:
-        temporary.write_text("half of the n")
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_whole(path, broken)
-    assert path.read_text() == "old"
-    assert names_in(tmp_path) == ["file.txt"]
-
-
-def test_the_old_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
-    path = write_text(tmp_path / "file.txt", "old")
-    seen = []
 
     def write(temporary: Path) -> None:
-        temporary.write_text("new")
-        seen.append(path.read_text())
         assert temporary.suffix == ".txt"
+        temporary.write_text("new")
+        assert path.read_text() == "old"
 
-    write_whole(path, write)
-    assert seen == ["old"]
-    assert path.read_text() == "new"
+    def broken(temporary: Path) -> None:
+        write(temporary)
+        raise KeyboardInterrupt
+
+    for writer, content in ((broken, "old"), (write, "new")):
+        with suppress(KeyboardInterrupt):
+            write_whole(path, writer)
+        assert path.read_text() == content
+        assert names_in(tmp_path) == ["file.txt"]
 
 
 def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
