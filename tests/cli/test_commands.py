@@ -25,18 +25,9 @@ def test_names_and_citation(capsys):
 
 def test_simulate_writes_what_the_interface_returns(tmp_path, capsys):
     out, point = tmp_path / "run.nc", [0.0, 0.8, -0.13]
-    arguments = [
-        "--method",
-        "pod",
-        "--set",
-        "rank=2",
-        "--frequency",
-        "1.1",
-        "--training",
-        "nominal",
-    ]
-    arguments += ["--parameter", "wheel_centre=0,0.8,-0.13", "--out", str(out)]
-    assert main(["simulate", "double_wishbone", *arguments]) == 0
+    pod = "--method pod --set rank=2 --frequency 1.1 --training nominal"
+    parameter = "--parameter wheel_centre=0,0.8,-0.13"
+    assert main(f"simulate double_wishbone {pod} {parameter} --out {out}".split()) == 0
     assert f"written: {out}" in capsys.readouterr().out
     model = vm.model("double_wishbone", {"wheel_centre": point})
     expected = vm.simulate(model, "pod", rank=2, frequency=1.1, training="nominal")

@@ -1,23 +1,62 @@
 """The contracts that authors of plug-ins call: they pass what works and name what is broken."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import vehiclemor as vm
+from tests.plugin.installation import installed
 from vehiclemor import contracts
+from vehiclemor.errors import InputError
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.multibody.report import ModelReport, TimingCase
 from vehiclemor.registry import component, names
+from vehiclemor.study.method_settings import complete_settings
 
+PAGE = Path(__file__).parents[2] / "paper" / "handbook" / "add-a-model-or-method.md"
+PROJECT = """
+[project]
+name = "handbook"
+version = "1"
+[project.entry-points."vehiclemor.methods"]
+interpolation = "handbook_method:METHOD"
+"""
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
-@pytest.mark.parametrize("model", KINEMATIC)
+@pytest.mark.usefixtures("plug_in_package")
+@pytest.mark.parametrize("model", [*KINEMATIC, "quarter_car"])
 @pytest.mark.parametrize("name", names("method"))
-def test_registered_methods_pass(model: str, name: str) -> None:
+def test_registered_methods_pass_also_on_a_small_model(model: str, name: str) -> None:
     contracts.check_method(name, model)
+
+
+@pytest.mark.usefixtures("plug_in_package")
+@pytest.mark.parametrize("method", ["pod", "fixed_basis"])
+def test_a_preset_lowers_its_rank_to_the_number_of_coordinates(method: str) -> None:
+    car = vm.model("quarter_car")
+    for preset in component("method", method).presets_of("ode"):
+        assert complete_settings(car, method, {}, preset)["rank"] == len(car.coordinates) == 2
+        # One that is given is never changed.
+        with pytest.raises(InputError, match="rank 3 is above the 2 coordinates"):
+            vm.simulate(car, method, preset=preset, rank=3, formulation="coordinates")
+    assert complete_settings(vm.model("double_wishbone"), method, {})["rank"] == 3
+
+
+def test_the_method_that_the_handbook_shows_works_as_it_stands(tmp_path: Path) -> None:
+    method, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (tmp_path / "handbook_method.py").write_text(method)
+    (tmp_path / "pyproject.toml").write_text(PROJECT)
+    with installed(tmp_path):
+        contracts.check_method("interpolation", "double_wishbone")
+        arguments = {"frequency": 1.4, "training": "nominal"}
+        data = vm.simulate("double_wishbone", "interpolation", **arguments)
+    # The mechanism's path is a curve: wheel travel alone determines all coordinates.
+    assert float(data["rms_error"].sel(output="second_euler_angle")) < 1e-7
 
 
 @pytest.fixture

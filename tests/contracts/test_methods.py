@@ -22,6 +22,7 @@ from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
+from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
@@ -217,21 +218,6 @@ def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
         np.testing.assert_allclose(again, best, rtol=0, atol=1e-12)
 
 
-def held(maneuver: Maneuver, count: int, hold: float, zero: bool) -> Maneuver:
-    """A maneuver's inputs at `count` times, held until the next one, or straight lines to it."""
-    ends = hold * np.arange(count + 1)
-    table = maneuver.at(np.linspace(0.0, 3.0, count + 1))
-
-    def signal(times: np.ndarray, _: float, __: float) -> np.ndarray:
-        first = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, count - 1)
-        part = 0.0 if zero else (times / hold - first)[:, None]
-        return table[first] + part * (table[first + 1] - table[first])
-
-    inner = tuple(ends[1:-1].tolist())
-    name, samples = f"{maneuver.name} held {zero}", 2 * count + 1
-    return Maneuver(name, "", signal, maneuver.inputs, ends[-1], samples, lambda _: inner)
-
-
 @pytest.mark.parametrize("zero", [True, False], ids=["held", "linear"])
 def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
     if not hasattr(pair.fit(), "state_space"):
@@ -240,11 +226,16 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
     tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
     reduced = replace(pair.fit(), **tight)
     count, dt = 8, 0.13
-    maneuver = held(pair.maneuver, count, 2.0 * dt, zero)
+    times, inputs = (
+        2.0 * dt * np.arange(count + 1),
+        pair.maneuver.at(np.linspace(0.0, 3.0, count + 1)),
+    )
+    hold, names = "zero" if zero else "linear", pair.maneuver.inputs
+    maneuver = Signal.from_samples(times, inputs, hold, inputs=names, output_step=dt)
     # A guarded model steps its fast one, which hands over whole runs that are steered like this.
     run = pair.run(getattr(reduced, "ahead", reduced), maneuver)
     assert run.finished
-    space, inputs = reduced.state_space, maneuver.at(2.0 * dt * np.arange(count + 1))
+    space = reduced.state_space
     state = space.begin(pair.model.starts[0], inputs[0])
     assert len(space.states) == len(state)
     dynamic = pair.model.kind != "ae"

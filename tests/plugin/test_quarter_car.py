@@ -88,18 +88,6 @@ def test_outputs_are_acceleration_travel_and_tire_force(car):
     np.testing.assert_allclose(rates[:, 2:] @ masses, run.outputs[:, 2], rtol=0, atol=1e-9)
 
 
-def test_steady_amplitude_is_that_of_the_transfer_function(car):
-    a, b = matrices(car)
-    for frequency in (0.3, 1.0, 4.0):
-        maneuver = component("maneuver", "quarter_car_road").perturbed(frequency)
-        rate = 2.0 * np.pi * 1.5 * frequency
-        response = 0.02 * np.linalg.solve(1j * rate * np.eye(4) - a, b)
-        # Started on the periodic solution, it stays there.
-        run = car.simulate(maneuver, response.imag.copy(), tolerance=1e-10)
-        expected = np.imag(np.exp(1j * rate * run.time)[:, None] * response)
-        assert np.abs(run.states - expected).max() < 1e-8 * np.abs(response).max()
-
-
 def test_second_order_form_is_that_of_the_masses(car):
     x = np.array([0.01, -0.02, 0.3, -0.4])
     np.testing.assert_array_equal(car.mass_matrix(x), np.diag([250.0, 45.0]))

@@ -120,9 +120,7 @@ def faulty(plug_in):
         ("METHOD = replace(METHOD, fit=ends(BaseException('mine')))", "BaseException: mine (/"),
         ("METHOD = replace(METHOD, fit=ends(OSError(2, 'x')))", "fit: FileNotFoundError"),
         ("METHOD = replace(METHOD, fit=ends(ValueError('\\x1b[31m')))", r"ValueError: \x1b[31m (/"),
-        ("METHOD = replace(METHOD, check=lambda *_: 1 / 0)", "check: ZeroDivisionError"),
         ("METHOD = replace(METHOD, check=ends(SystemExit(0)))", "check: SystemExit: 0 (/"),
-        ("Reduced.simulate = lambda *_: 1 / 0", "simulate: ZeroDivisionError"),
         ("Reduced.simulate = lambda *_: None", "simulate gives None"),
         ("Reduced.simulate = ends(SystemExit(0))", "simulate: SystemExit: 0 (/"),
         ("Reduced.best_approximation = lambda _, s: s[:3]", "(3, 8)"),
@@ -167,16 +165,12 @@ def test_a_study_with_a_broken_method_is_finished(faulty, tmp_path, change, stat
             vm.simulate("double_wishbone", "faulty")
 
 
-def test_what_the_machine_does_to_a_method_is_named(faulty, capsys):
+def test_the_machine_or_the_user_stops_a_method(faulty, capsys):
     faulty("METHOD = replace(METHOD, fit=ends(OSError(28, 'no space')))")
     assert main(["simulate", "double_wishbone", "--method", "faulty"]) == 1
     assert "method 'faulty': fit: no space (/" in capsys.readouterr().err
-
-
-def test_the_user_stops_a_method(faulty, capsys):
     faulty("METHOD = replace(METHOD, fit=interrupted)")
     assert main(["simulate", "double_wishbone", "--method", "faulty"]) == 130
-    assert "stopped" in capsys.readouterr().err
     with pytest.raises(KeyboardInterrupt):
         vm.simulate("double_wishbone", "faulty")
 
@@ -276,11 +270,9 @@ def car(plug_in, plug_in_package, tmp_path):
     ("change", "words"),
     [
         ("faulty(derive=lambda: 1 / 0)", "equations can't be derived: ZeroDivisionError"),
-        ("faulty(derive=lambda: None)", "equations can't be derived: AttributeError"),
         ("faulty(derive=derived(lambda x: x[:3], [0, 0, 0]))", "derivative has 3 results"),
         ("faulty(derive=derived(lambda x: x, [0]))", "outputs has shape"),
         ("faulty(check=lambda p: 1 / 0)", "check: ZeroDivisionError"),
-        ("faulty(starts=lambda p: 1 / 0)", "starts: ZeroDivisionError"),
         ("faulty(starts=lambda p: None)", "starts: AttributeError"),
         ("faulty(starts=lambda p: {})", "has no start"),
         ("faulty(starts=lambda p: {'a': [0.0]})", "start 'a' has shape"),
@@ -303,6 +295,5 @@ def test_a_model_that_breaks_is_named(car, change, words):
 def test_plain_numbers_among_the_results_of_a_model(car):
     model = car("faulty(derive=derived(lambda x: [x[2], x[3], 0, -1.5], [0, 1, 2.5]))")
     np.testing.assert_array_equal(model.derivative([0, 0, 1, 2], 0.0), [1, 2, 0, -1.5])
-    np.testing.assert_array_equal(
-        model.outputs_at(np.zeros((2, 4)), np.zeros((2, 1))), [[0, 1, 2.5]] * 2
-    )
+    outputs = model.outputs_at(np.zeros((2, 4)), np.zeros((2, 1)))
+    np.testing.assert_array_equal(outputs, [[0, 1, 2.5]] * 2)

@@ -1,6 +1,5 @@
 """What takes long is told of, once, on standard error; what doesn't is not."""
 
-import io
 import logging
 import subprocess
 import sys
@@ -13,7 +12,7 @@ import pytest
 
 from vehiclemor import progress
 from vehiclemor.codegen.cache import fetched
-from vehiclemor.progress import StandardError, first_use, making
+from vehiclemor.progress import first_use, making
 
 LOOP = """
 import logging
@@ -44,20 +43,6 @@ def test_what_takes_long_is_told_of_and_its_end_if_it_has_one(monkeypatch, caplo
     assert "a model: compiled in" in ended
 
 
-def test_own_lines_stand_back_behind_an_applications_handlers(monkeypatch):
-    printed = io.StringIO()
-    monkeypatch.setattr(sys, "stderr", printed)
-    record = logging.LogRecord("vehiclemor", logging.INFO, "", 0, "a line", (), None)
-    root = logging.getLogger()
-    # Here these are pytest's.
-    assert root.handlers
-    StandardError().emit(record)
-    assert not printed.getvalue()
-    monkeypatch.setattr(root, "handlers", [])
-    StandardError().emit(record)
-    assert printed.getvalue() == "a line\n"
-
-
 def test_a_process_tells_of_what_it_compiles_and_nothing_when_it_is_there(tmp_path: Path):
     def told(before: str, cache: Path) -> list[str]:
         command = [sys.executable, "-c", LOOP.format(before=before)]
@@ -71,6 +56,10 @@ def test_a_process_tells_of_what_it_compiles_and_nothing_when_it_is_there(tmp_pa
     assert told("", tmp_path / "1") == []
     silent = "logging.getLogger('vehiclemor').setLevel(logging.WARNING)"
     assert told(silent, tmp_path / "2") == []
+    # An application's own handlers print them, and nothing else does.
+    began, ended = told("logging.basicConfig(format='mine: %(message)s')", tmp_path / "3")
+    assert began.startswith("mine: first use of path_loops")
+    assert ended.startswith("mine: path_loops: compiled in ")
 
 
 @pytest.fixture
