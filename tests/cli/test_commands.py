@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 import xarray as xr
 
 import vehiclemor as vm
@@ -71,19 +70,3 @@ def test_a_result_draws_itself(tmp_path):
     write_dataset(dataset, tmp_path / "run.nc")
     vm.plot(tmp_path / "run.nc", path=tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("result", "words"),
-    [
-        (3, "result is 3"),
-        (xr.Dataset({"a": 1.0}), "neither a run nor a study"),
-        ("figure-99", "unknown study"),
-        ("figure-11", "vehiclemor run figure-11"),
-        ("paper", "is a collection"),
-        ("none.nc", "no such result"),
-    ],
-)
-def test_what_can_not_be_drawn_is_one_line(tmp_path, result, words):
-    with pytest.raises(vm.VehiclemorError, match=words):
-        vm.plot(result, results=tmp_path)

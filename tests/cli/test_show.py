@@ -49,12 +49,6 @@ def test_a_method_shows_every_setting_of_every_kind(name):
         assert (row["accepted"], row["reason"]) == ("yes" if accepted else "no", reason)
 
 
-def test_choices_and_bounds_of_settings_are_shown():
-    rows = {row["name"]: row for row in vm.describe("full_order")["settings, kind ode and dae"]}
-    assert rows["solver"]["type"].startswith("dopri5, rodas4, ros34pw2")
-    assert rows["tolerance"]["type"] == "number 1e-13 to 0.1"
-
-
 @pytest.mark.parametrize("name", names("maneuver"))
 def test_a_maneuver_shows_its_inputs_and_the_models_it_drives(name):
     shown, maneuver = vm.describe(name), component("maneuver", name)
@@ -104,7 +98,10 @@ def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_parameters_that_are_overridden_are_shown():
+def test_bounds_and_overrides_are_shown():
+    rows = {row["name"]: row for row in vm.describe("full_order")["settings, kind ode and dae"]}
+    assert rows["solver"]["type"].startswith("dopri5, rodas4, ros34pw2")
+    assert rows["tolerance"]["type"] == "number 1e-13 to 0.1"
     rows = vm.describe("double_wishbone", {"wheel_centre": [0.0, 0.8, -0.1]})["parameters"]
     (row,) = [row for row in rows if row["name"] == "wheel_centre"]
     assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")

@@ -1,8 +1,5 @@
 """Wrong arguments: one clear line on standard error, exit status 2, and nothing is lost."""
 
-import os
-import stat
-import sys
 from pathlib import Path
 
 import pytest
@@ -41,10 +38,6 @@ WRONG = [
     (f"{POD} control_period=nan", "control_period"),
     (f"{POD} reversed_coordinates=theta", "theta"),
     (f"{TRAVEL} --frequency 0", "frequency factor: 0"),
-    (f"{TRAVEL} --frequency -1", "frequency factor: -1"),
-    (f"{CAR} --frequency 1e308", "frequency factor: 1e+308"),
-    (f"{CAR} --amplitude nan", "amplitude factor: nan"),
-    (f"{FULL} --amplitude inf", "amplitude factor: inf"),
     (f"{TRAVEL} --amplitude big", "big"),
     (f"{TRAVEL} --amplitude 3", "out of reach"),
     (f"{TRAVEL} --amplitude -2.2", "out of reach"),
@@ -61,7 +54,6 @@ WRONG = [
     ("figures --only 6,55", "'55'"),
     ("figures --only ,", "names no figure"),
     ("show pood", "did you mean pod"),
-    ("show figure_11", "did you mean figure-11"),
     ("show study-shema", "did you mean study-schema"),
     ("show none.toml", "none.toml: no such file"),
     ("show double_wishbone --parameter wheel_centr=1", "did you mean wheel_centre"),
@@ -78,7 +70,6 @@ PARAMETERS = {
         ("sprung_mass=-900", "-900 kg"),
         ("unsprung_mass=0", "0 kg"),
         ("initial_speed=0", "0 m/s"),
-        ("initial_speed=-20", "-20 m/s"),
         ("tire_stiffness=nan", "not finite"),
         ("front_damping=-1", "-1 N s/m"),
         ("front_track=1386.84", "1386.84 m"),
@@ -102,7 +93,6 @@ PARAMETERS = {
         ("drop_height=5", "5 m"),
         ("rear_stiffness=0", "0 N/m"),
         ("wheel_centre=0.3", "3 components"),
-        ("wheel_centre=0,0.8", "3 components"),
         ("carrier_inertia=1,0,1", "0 kg m^2"),
         ("tie_rod_outer=-150,770,-120", "millimetres"),
         ("chassis_centre=1.7,0,0.2", "lifts the rear wheels"),
@@ -145,18 +135,10 @@ def test_output_that_is_something_else_is_kept(fails, tmp_path):
     assert out.read_text() == "my notes"
 
 
-@pytest.mark.skipif(
-    sys.platform == "win32" or os.geteuid() == 0, reason="root and Windows write everywhere"
-)
-def test_read_only_output_folder(fails, tmp_path):
-    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
-    fails(["run", "figures-6-7", "--out", tmp_path], "can't be written")
-    fails(["figures", "--only", "5", "--out", tmp_path / "figures"], "can't be written")
-
-
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a place where nobody writes")
-def test_unwritable_output_folder_whoever_asks(fails):
+def test_an_unwritable_output_folder(fails):
     fails(["run", "figures-6-7", "--out", "/proc/self/results"], "can't be written")
+    fails(["figures", "--only", "5", "--out", "/proc/self/figures"], "can't be written")
 
 
 def test_names_that_are_too_long(fails, tmp_path):

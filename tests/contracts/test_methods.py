@@ -226,10 +226,8 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
     tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
     reduced = replace(pair.fit(), **tight)
     count, dt = 8, 0.13
-    times, inputs = (
-        2.0 * dt * np.arange(count + 1),
-        pair.maneuver.at(np.linspace(0.0, 3.0, count + 1)),
-    )
+    times = 2.0 * dt * np.arange(count + 1)
+    inputs = pair.maneuver.at(np.linspace(0.0, 3.0, count + 1))
     hold, names = "zero" if zero else "linear", pair.maneuver.inputs
     maneuver = Signal.from_samples(times, inputs, hold, inputs=names, output_step=dt)
     # A guarded model steps its fast one, which hands over whole runs that are steered like this.

@@ -4,6 +4,7 @@ import datetime
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.errors import VehiclemorError
@@ -109,6 +110,12 @@ def trained(points):
         (lambda v: vm.figures(["5"], jobs=v), NO_JOBS[:4], "jobs is"),
         (lambda v: vm.model(SUSPENSION).simulate(v), [None, "x"], "maneuver"),
         (lambda v: vm.model(SUSPENSION).simulate(solver=v, maneuver=TRAVEL), WRONG, "solver"),
+        (vm.plot, [3], "result is 3"),
+        (vm.plot, [xr.Dataset({"a": 1.0})], "neither a run nor a study"),
+        (vm.plot, ["figure-99"], "unknown study"),
+        (vm.plot, ["figure-11"], "vehiclemor run figure-11"),
+        (vm.plot, ["paper"], "is a collection"),
+        (vm.plot, ["none.nc"], "no such result"),
         (vm.rom, [[], {}, *WRONG], "unknown model with a reduced one"),
         (lambda v: vm.rom(CAR).rhs(vm.rom(CAR).state(), v), [1e308], "is not finite"),
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], v), ["cubics", *WRONG], "unknown hold"),

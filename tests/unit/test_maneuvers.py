@@ -138,48 +138,32 @@ def test_rack_speed_and_acceleration_are_derivatives_of_its_place(
 
 @settings(max_examples=30)
 @given(frequency=factors, amplitude=amplitudes)
-def test_the_rack_pulse_is_as_high_and_as_long_as_described(
+def test_the_rack_pulse_is_as_described_and_has_no_corner(
     frequency: float, amplitude: float
 ) -> None:
     pulse = rack_pulse(frequency, amplitude)
+    assert (pulse.duration, len(pulse.times), pulse.inputs) == (10.0, 501, ("s", "s_dot", "s_ddot"))
     assert pulse.break_points == (1.0, pytest.approx(1.0 + 2.5 / frequency))
     begin, end = pulse.break_points
-    times = np.linspace(begin, end, 3001)
-    place = pulse.at(times)[:, 0]
-    # sin x - sin(2 x) / 2 = sin x (1 - cos x) is largest at a third of the turn.
+    place = pulse.at(np.linspace(begin, end, 3001))[:, 0]
+    # sin x - sin(2 x) / 2 = sin x (1 - cos x) is largest at a third of the turn.  A positive
+    # displacement steers to the right: the lane change to the left begins negative.
     highest = 0.0046903 * 0.75 * np.sqrt(3.0)
     assert place[1000] == pytest.approx(-amplitude * highest, abs=1e-15)
     assert np.abs(place).max() == pytest.approx(abs(amplitude) * highest, abs=1e-15)
     # To the one side and then to the other, by the same amount.
     np.testing.assert_allclose(place[::-1], -place, rtol=0, atol=1e-15)
-
-
-@settings(max_examples=30)
-@given(frequency=factors)
-def test_the_rack_pulse_has_no_corner_in_its_acceleration(frequency: float) -> None:
-    pulse = rack_pulse(frequency)
-    rate = 2.0 * np.pi * frequency / 2.5
     step = 1e-7
-    for corner, inside in zip(pulse.break_points, (1.0, -1.0), strict=True):
-        at_corner, outside = pulse.at(corner - inside * np.array([0.0, step]))
-        np.testing.assert_allclose(at_corner, 0.0, atol=1e-13)
-        np.testing.assert_array_equal(outside, 0.0)
-        # Inside it grows with the third power of time: its third derivative alone jumps.
-        third = -0.0046903 * 3.0 * rate**3
-        near = pulse.at(np.array([corner + inside * step]))[0]
-        expected = third * np.array([inside * step**3 / 6.0, step**2 / 2.0, inside * step])
-        # The corner's time is rounded, and so is the pulse itself where it is next to nothing.
-        assert np.abs(near - expected)[0] < 1e-17
-        assert near[1:] == pytest.approx(expected[1:], rel=1e-5, abs=1e-12)
-
-
-def test_the_rack_rests_before_and_after_its_pulse() -> None:
-    pulse = rack_pulse()
-    assert (pulse.duration, len(pulse.times), pulse.inputs) == (10.0, 501, ("s", "s_dot", "s_ddot"))
-    times = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(3.5, 10.0, 50)])
-    np.testing.assert_array_equal(pulse.at(times), 0.0)
-    # A positive displacement steers to the right: the lane change to the left begins negative.
-    assert pulse.at(np.array([1.5]))[0, 0] < 0.0
+    rest = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(end + step, end + 9.0, 50)])
+    np.testing.assert_array_equal(pulse.at(rest), 0.0)
+    # Inside the place grows with the third power of time: its third derivative alone jumps.
+    third = 0.0046903 * 3.0 * (2.0 * np.pi * frequency / 2.5) ** 3
+    near = pulse.at(np.array([begin + step, end - step]))
+    powers = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0]]) * [step**3 / 6.0, step**2 / 2.0, step]
+    # The corner's time is rounded, and so is the pulse itself where it is next to nothing.
+    expected = -amplitude * third * powers
+    np.testing.assert_allclose(near[:, 1:], expected[:, 1:], rtol=1e-5, atol=3e-12)
+    np.testing.assert_allclose(near[:, 0], expected[:, 0], rtol=0, atol=3e-17)
 
 
 def test_a_rack_that_is_held_does_not_move() -> None:

@@ -49,22 +49,15 @@ def load(tmp_path):
     return load
 
 
-def test_values_come_in_declared_order_and_shape(load):
-    parameters = load()
+def test_values_come_in_declared_order_and_an_override_says_so(load):
+    parameters, changed = load(), load(overrides={"pivot": (7, 8, np.float64(9)), "speed": 10})
     assert list(parameters.values()) == list(EXPECTED)
-    np.testing.assert_array_equal(parameters.flat(), [2, 20, 0, 4, 5, 6])
-    assert parameters["mass"].shape == ()
-    assert parameters["pivot"].shape == (3,)
-    assert parameters.entries["pivot"].status == "published"
-
-
-def test_an_override_replaces_a_value_and_says_so(load):
-    parameters = load(overrides={"pivot": (7, 8, np.float64(9)), "speed": 10})
-    np.testing.assert_array_equal(parameters.flat(), [2, 10, 0, 7, 8, 9])
-    assert parameters.entries["pivot"].source == "override"
-    assert parameters.entries["pivot"].status == "assumed"
-    assert parameters.entries["mass"].source == "book"
-    np.testing.assert_array_equal(load().flat(), [2, 20, 0, 4, 5, 6])
+    assert (parameters["mass"].shape, parameters["pivot"].shape) == ((), (3,))
+    for found, wanted in ((changed, [2, 10, 0, 7, 8, 9]), (load(), [2, 20, 0, 4, 5, 6])):
+        np.testing.assert_array_equal(found.flat(), wanted)
+    for found, told in ((parameters, ("published", "book")), (changed, ("assumed", "override"))):
+        assert (found.entries["pivot"].status, found.entries["pivot"].source) == told
+    assert changed.entries["mass"].source == "book"
 
 
 @pytest.mark.parametrize(
@@ -77,9 +70,7 @@ def test_an_override_replaces_a_value_and_says_so(load):
         ('unit = "kg"', 'unit = "t"', "parameters.mass.unit: 't'"),
         ('source = "book"', 'source = "blog"', "parameters.pivot.source: 'blog'"),
         ("[4, 5.0, 6.0]", "[4.0, 5.0]", "parameters.pivot: a point has 3 components"),
-        ("[4, 5.0, 6.0]", "4.0", "parameters.pivot: a point has 3 components"),
         ("[4, 5.0, 6.0]", "[4.0, 5.0, nan]", "parameters.pivot.value: .* is not finite"),
-        ("[4, 5.0, 6.0]", "[4.0, 5.0, -inf]", "parameters.pivot.value: .* is not finite"),
         ("[4, 5.0, 6.0]", "[4.0, 500.0, 6.0]", "parameters.pivot: 500.0 m .* millimetres"),
         ("[4, 5.0, 6.0]", '["4", 5.0, 6.0]', "parameters.pivot.value"),
         ("value = 20.0", "value = 5.0", "parameters.speed: 5 m/s"),
@@ -125,7 +116,6 @@ def test_files_that_are_none_or_of_another_model(tmp_path: Path):
         ("mass", 0, "0 kg is not above 0"),
         ("mass", np.inf, "inf is not finite"),
         ("mass", [2.0], "a number is needed"),
-        ("mass", [1.0, 2.0, 3.0], "a number is needed"),
         ("mass", 10**400, "is not a number"),
         ("speed", 5, "smallest allowed 10 m/s"),
         ("speed", 60.5, "largest allowed 50 m/s"),
