@@ -1,9 +1,10 @@
-"""What `show` and `list` print is what was declared, and no name is unknown to them."""
+"""What is shown is what was declared, and fits into 80 columns, whatever is registered."""
 
 import pytest
 
 import vehiclemor as vm
 from vehiclemor.cli import main
+from vehiclemor.cli.app import COMMANDS
 from vehiclemor.cli.key_values import parsed
 from vehiclemor.codegen import cache, derivation
 from vehiclemor.parameters import load_parameters
@@ -118,3 +119,40 @@ def test_the_handbook_is_where_the_help_says(capsys):
     assert (handbook_folder() / "add-a-model-or-method.md").is_file()
     assert main(["--help"]) == 0
     assert str(handbook_folder())[:20] in capsys.readouterr().out.replace("\n", "")
+
+
+@pytest.fixture
+def printed(capsys, monkeypatch):
+    """Run the command line where no terminal says how wide it is; its output, which fits."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+    def run(*arguments):
+        assert main([str(argument) for argument in arguments]) == 0
+        text = capsys.readouterr().out
+        # A word that is longer than a line, such as a path, can't be broken.
+        assert not [s for s in text.splitlines() if len(s) > 80 and " " in s.strip()]
+        return text
+
+    return run
+
+
+def test_lists_and_whatever_can_be_shown(printed):
+    listed = [name for kind in ("model", "method", "maneuver") for name in names(kind)]
+    listed += data_names("studies")
+    text = printed("list")
+    for name in listed:
+        assert f"  {name}" in text
+    for name in [*listed, *SCHEMAS]:
+        printed("show", name)
+
+
+def test_simulations_and_studies(printed, tmp_path):
+    for model in names("model"):
+        for arguments in ([], ["--method", "pod", "--all-outputs"]):
+            assert "nan" not in printed("simulate", model, *arguments)
+    printed("run", "figures-6-7", "--out", tmp_path)
+
+
+def test_help(printed):
+    for command in ([], *([command] for command in COMMANDS)):
+        printed(*command, "--help")

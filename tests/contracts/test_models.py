@@ -8,12 +8,8 @@ from vehiclemor.registry import component, names
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 
-SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N m", "1", "kg", "kg m^2"} | {
-    "N/m",
-    "N/rad",
-    "1/s",
-    "N s/m",
-}
+OF_FORCES = {"N", "N m", "N/m", "N/rad", "N s/m", "kg", "kg m^2"}
+SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "1", "1/s", *OF_FORCES}
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 

@@ -1,6 +1,7 @@
 """Wrong input from Python: one clear line that names it, never a traceback, never nonsense."""
 
 import datetime
+from functools import cache
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def refused(call, *words):
         assert word in text, text
 
 
-@pytest.fixture(scope="module")
+@cache
 def car():
     return vm.model(CAR)
 
@@ -123,6 +124,19 @@ def trained(points):
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], name=v), [None], "name is None"),
         (lambda v: STEER.perturbed(amplitude=v), WRONG, "amplitude factor"),
         (lambda v: STEER.perturbed(frequency=v), [0.0, *WRONG], "frequency factor"),
+        (lambda v: car().simulate(STEER, solver=v), [{}, "", 0, *WRONG], "unknown solver"),
+        (lambda v: car().simulate(STEER, tolerance=v), WRONG, "tolerance is"),
+        (lambda v: car().simulate(STEER, begin=v), [*NONE, *WRONG], "begin: "),
+        (lambda v: vm.export(car(), v), WRONG, "unknown target"),
+        (lambda v: vm.export(car(), "c", "none/c", step=v), [1e5, 1e-300, *WRONG], "step"),
+        (lambda v: vm.simulate_many(car(), [STEER], outputs=v), [{}, *WRONG], "output"),
+        (lambda v: vm.simulate_many(car(), [STEER], v), [np.array(1.0), 10**400], "start"),
+        (lambda v: vm.simulate_many(car(), [STEER], jobs=v), NO_JOBS, "jobs is"),
+        (lambda v: car().derivative(v, 0.0), [np.zeros(27)], "x has shape (27,)"),
+        (lambda v: car().derivative(v, 0.0), [np.full(28, np.nan)], "x[0] is not finite"),
+        (lambda v: car().derivative(np.zeros(28), v), [[0.0, 0.0]], "u has shape (2,)"),
+        (lambda v: car().derivative(np.zeros(28), v), [np.inf], "u[0] is not finite"),
+        (lambda v: car().derivative(np.zeros(28), v), [None, *NO_NUMBERS[:-2]], "u is"),
     ],
 )
 def test_functions(call, values, word, tmp_path, monkeypatch):
@@ -132,42 +146,19 @@ def test_functions(call, values, word, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("call", "values", "word"),
-    [
-        (lambda car, v: car.simulate(STEER, solver=v), [{}, "", 0, *WRONG], "unknown solver"),
-        (lambda car, v: car.simulate(STEER, tolerance=v), WRONG, "tolerance is"),
-        (lambda car, v: car.simulate(STEER, begin=v), [*NONE, *WRONG], "begin: "),
-        (vm.export, WRONG, "unknown target"),
-        (lambda car, v: vm.export(car, "c", "none/c", step=v), [1e5, 1e-300, *WRONG], "step"),
-        (lambda car, v: vm.simulate_many(car, [STEER], outputs=v), [{}, *WRONG], "output"),
-        (lambda car, v: vm.simulate_many(car, [STEER], v), [np.array(1.0), 10**400], "start"),
-        (lambda car, v: vm.simulate_many(car, [STEER], jobs=v), NO_JOBS, "jobs is"),
-        (lambda car, v: car.derivative(v, 0.0), [np.zeros(27)], "x has shape (27,)"),
-        (lambda car, v: car.derivative(v, 0.0), [np.full(28, np.nan)], "x[0] is not finite"),
-        (lambda car, v: car.derivative(np.zeros(28), v), [[0.0, 0.0]], "u has shape (2,)"),
-        (lambda car, v: car.derivative(np.zeros(28), v), [np.inf], "u[0] is not finite"),
-        (lambda car, v: car.derivative(np.zeros(28), v), [None, *NO_NUMBERS[:-2]], "u is"),
-    ],
-)
-def test_functions_of_a_car(car, call, values, word):
-    for value in values:
-        refused(lambda value=value: call(car, value), word)
-
-
-def test_states_that_are_none(car):
-    none = ([1.0, [2.0]], {}, ["0.0"] * 28, car.start() + 0j, MASKED)
+def test_states_that_are_none():
+    none = ([1.0, [2.0]], {}, ["0.0"] * 28, car().start() + 0j, MASKED)
     for state in (*none, [1.0, 2.0], 3, "nothing", np.full(28, np.nan)):
-        refused(lambda state=state: car.start(state), "start")
-        refused(lambda state=state: vm.simulate(car, start=state), "start")
+        refused(lambda state=state: car().start(state), "start")
+        refused(lambda state=state: vm.simulate(car(), start=state), "start")
 
 
-def test_a_start_may_be_a_state(car):
-    dropped = vm.simulate(car, start="dropped")
-    for state in (car.start("dropped"), car.start("dropped").tolist()):
-        own = vm.simulate(car, start=state)
+def test_a_start_may_be_a_state():
+    dropped = vm.simulate(car(), start="dropped")
+    for state in (car().start("dropped"), car().start("dropped").tolist()):
+        own = vm.simulate(car(), start=state)
         np.testing.assert_array_equal(own["outputs"], dropped["outputs"])
-    assert not np.array_equal(vm.simulate(car)["outputs"], dropped["outputs"])
+    assert not np.array_equal(vm.simulate(car())["outputs"], dropped["outputs"])
 
 
 def maneuver(name, value):
@@ -219,22 +210,22 @@ def test_maneuvers_that_are_none(name, values, word):
         ("inputs", ("rudder",), "gives inputs rudder"),
     ],
 )
-def test_maneuvers_that_break_when_they_are_used(car, name, value, word):
+def test_maneuvers_that_break_when_they_are_used(name, value, word):
     broken = maneuver(name, value)
-    refused(lambda: vm.simulate(car, maneuver=broken), word)
-    refused(lambda: car.simulate(broken), word)
+    refused(lambda: vm.simulate(car(), maneuver=broken), word)
+    refused(lambda: car().simulate(broken), word)
 
 
-def test_steering_beyond_that_of_the_car(car):
+def test_steering_beyond_that_of_the_car():
     lane_change = component("maneuver", "lane_change")
     for call in (
-        lambda: vm.simulate(car, amplitude=100.0),
-        lambda: vm.simulate(car, "replay", amplitude=100.0),
-        lambda: car.simulate(lane_change.perturbed(1.0, 100.0)),
+        lambda: vm.simulate(car(), amplitude=100.0),
+        lambda: vm.simulate(car(), "replay", amplitude=100.0),
+        lambda: car().simulate(lane_change.perturbed(1.0, 100.0)),
     ):
         refused(call, "delta", "rad at t =", "holds from -1.066 to 1.066 rad")
     largest = np.abs(lane_change.at(lane_change.times)).max()
-    vm.simulate(car, amplitude=1.066 / largest * 0.999)
+    vm.simulate(car(), amplitude=1.066 / largest * 0.999)
 
 
 def test_inputs_that_output_times_show_are_run():
