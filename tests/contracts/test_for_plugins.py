@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ from vehiclemor import contracts
 from vehiclemor.errors import InputError
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.multibody.report import ModelReport, TimingCase
+from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, names
 from vehiclemor.study.method_settings import complete_settings
 
@@ -71,23 +73,19 @@ def instead(monkeypatch: pytest.MonkeyPatch):
     return found
 
 
-class Altered:
+def altered(alter) -> Method:
     """The method `replay` whose trajectories are altered, each in another way."""
+    method, runs = component("method", "replay"), count(1)
 
-    def __init__(self, alter) -> None:
-        self._method, self._alter, self._runs = component("method", "replay"), alter, 0
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._method, name)
-
-    def fit(self, *arguments: object) -> SimpleNamespace:
-        reduced = self._method.fit(*arguments)
+    def fit(*arguments: object) -> SimpleNamespace:
+        reduced = method.fit(*arguments)
 
         def simulate(*arguments: object):
-            self._runs += 1
-            return self._alter(reduced.simulate(*arguments), self._runs)
+            return alter(reduced.simulate(*arguments), next(runs))
 
         return SimpleNamespace(simulate=simulate, effective_rank=0, offline=reduced.offline)
+
+    return replace(method, fit=fit)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +100,7 @@ class Altered:
     ],
 )
 def test_broken_method_is_named(instead, alter, message: str) -> None:
-    instead("method", Altered(alter))
+    instead("method", altered(alter))
     with pytest.raises(AssertionError, match=message):
         contracts.check_method("replay", KINEMATIC[0])
 

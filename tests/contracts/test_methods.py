@@ -20,6 +20,7 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.signals import Signal
@@ -81,6 +82,12 @@ class Pair:
         reduced = self.method.fit(self.model, runs, settings)
         assert settings == before
         return reduced
+
+    def space(self) -> StateSpace:
+        """How it is stepped; a test is skipped if it is not."""
+        if not hasattr(self.fit(), "state_space"):
+            pytest.skip(f"{self.name} gives whole runs alone")
+        return self.fit().state_space
 
     def run(self, reduced: ReducedModel, maneuver: Maneuver | None = None) -> Trajectory:
         return reduced.simulate(maneuver or self.maneuver, self.model.starts[0])
@@ -220,8 +227,7 @@ def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
 
 @pytest.mark.parametrize("zero", [True, False], ids=["held", "linear"])
 def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
-    if not hasattr(pair.fit(), "state_space"):
-        pytest.skip(f"{pair.name} gives whole runs alone")
+    pair.space()
     # So that what is left is no error of the integration.
     tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
     reduced = replace(pair.fit(), **tight)
@@ -252,9 +258,7 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
 
 
 def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
-    fit = pair.fit()
-    if not hasattr(fit, "state_space"):
-        pytest.skip(f"{pair.name} gives whole runs alone")
+    fit, _ = pair.fit(), pair.space()
     rom, run = ReducedOrderModel(pair.model, pair.name, {}, (), fit), pair.run(fit)
     for start in pair.model.starts[::-1]:
         state = rom.state(start, run.inputs[0])
@@ -269,10 +273,10 @@ def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
 
 
 def test_rates_are_those_of_the_steps(pair: Pair) -> None:
-    reduced = pair.fit()
-    if pair.model.kind == "ae" or not hasattr(reduced, "state_space"):
+    pair.space()
+    if pair.model.kind == "ae":
         pytest.skip("there are no rates")
-    space, time, dt = replace(reduced, tolerance=1e-11).state_space, 1.63, 1e-5
+    space, time, dt = replace(pair.fit(), tolerance=1e-11).state_space, 1.63, 1e-5
     u = pair.maneuver.at(np.array([time]))[0]
     state = space.step(space.begin(pair.model.starts[0], u), u, None, 0.1, time - 0.1)
     later = space.step(state, u, None, dt, time)
@@ -292,9 +296,7 @@ def test_jacobians_are_the_slopes_of_rates_and_outputs(
 ) -> None:
     if pair.model.kind == "dae" and pair.name in LONG_TO_COMPILE:
         monkeypatch.setattr(Tangent, "_products", run_as_text)
-    space = getattr(pair.fit(), "state_space", None)
-    if space is None:
-        pytest.skip(f"{pair.name} gives whole runs alone")
+    space = pair.space()
     rom, time = ReducedOrderModel(pair.model, pair.name, {}, (), pair.fit()), 1.63
     u = pair.maneuver.at(np.array([time]))[0]
     state = rom.state(inputs=u)

@@ -63,11 +63,6 @@ def test_the_page_of_schemas_is_current():
     assert schemas.PAGE.read_text(encoding="utf-8") == schemas.page(), "run paper/schemas.py"
 
 
-def test_the_first_two_blocks_are_the_two_commands():
-    shell = [b.content for b in blocks(README) if b.language in ("sh", "shell", "bash", "console")]
-    assert shell[:2] == ["sh .ci/tox -e bench\n", "sh .ci/tox -e tests\n"]
-
-
 # Parsed and not run, here: what takes long.  Their options are checked, and the names of studies.
 @PAGES
 def test_commands_can_be_parsed(path):

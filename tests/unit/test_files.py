@@ -7,15 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vehiclemor.errors import FileError, MachineError
-from vehiclemor.files import (
-    TEMPORARY,
-    make_folder,
-    remove_leftovers,
-    temporary_path,
-    write_text,
-    write_whole,
-)
+from vehiclemor.errors import MachineError
+from vehiclemor.files import TEMPORARY, remove_leftovers, temporary_path, write_text, write_whole
 
 # Above any process number of the kernel.
 NO_PROCESS = 2**30
@@ -51,12 +44,6 @@ def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
     line = r"file\.txt: can't be written \(No space left on device\)"
     with pytest.raises(MachineError, match=line):
         write_whole(tmp_path / "file.txt", full)
-
-
-def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
-    path = write_text(tmp_path / "file", "")
-    with pytest.raises(FileError, match="not a folder"):
-        make_folder(path / "below")
 
 
 def test_leftovers_of_dead_processes_alone_are_removed(tmp_path: Path) -> None:

@@ -6,10 +6,31 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import component
+from vehiclemor.registry import component, names
 from vehiclemor.simulation.maneuver_checks import check_resolved
 
 factors, amplitudes = st.floats(0.1, 4.0), st.floats(-3.0, 3.0)
+
+
+@pytest.mark.parametrize("name", names("maneuver"))
+def test_every_maneuver_is_finite_scales_and_breaks_inside_its_run(name: str) -> None:
+    maneuver = component("maneuver", name)
+    assert maneuver == maneuver.perturbed(np.float32(1.0), np.int64(1))
+    assert (maneuver.name, maneuver.linear_in_amplitude) == (name, True)
+    for frequency in (1.0, 0.8, 2.0):
+        perturbed = maneuver.perturbed(frequency)
+        times, points = perturbed.times, perturbed.break_points
+        assert (times[0], times[-1], len(times)) == (0.0, maneuver.duration, maneuver.samples)
+        inputs = perturbed.at(times)
+        assert inputs.shape == (len(times), len(maneuver.inputs))
+        assert np.isfinite(inputs).all()
+        # A value depends on its time alone.
+        np.testing.assert_array_equal(perturbed.at(times[7:9]), inputs[7:9])
+        scaled = maneuver.perturbed(frequency, -1.5).at(times)
+        np.testing.assert_allclose(scaled, -1.5 * inputs, rtol=1e-14, atol=1e-16)
+        assert not maneuver.perturbed(frequency, 0.0).at(times).any()
+        assert list(points) == sorted(points)
+        assert all(0.0 < point < maneuver.duration for point in points)
 
 
 def test_sine_travel_is_the_papers_input(nominal: Maneuver) -> None:
@@ -88,19 +109,6 @@ def test_travel_and_rack_take_every_side_of_each_other_and_never_repeat() -> Non
     sines = component("maneuver", "travel_and_rack").at(np.linspace(0.0, 1000.0, 100001)[:-1])
     lines = np.abs(np.fft.rfft(sines, axis=0)).argmax(axis=0) / 1000.0
     assert lines == pytest.approx([0.1, 0.1618], abs=1e-3)
-
-
-def test_numpy_numbers_are_numbers(nominal: Maneuver) -> None:
-    assert nominal.perturbed(np.float32(2.0), np.int64(1)) == nominal.perturbed(2.0, 1.0)
-
-
-def test_break_points_follow_the_frequency() -> None:
-    def corners(frequency: float) -> tuple[float, ...]:
-        return 1.0 / frequency, 2.0 / frequency
-
-    pulse = Maneuver("pulse", "", lambda t, *_: t[:, None], ("z",), 4.0, 5, corners)
-    assert pulse.break_points == (1.0, 2.0)
-    assert pulse.perturbed(frequency=2.0).break_points == (0.5, 1.0)
 
 
 # Pulses of the steering rack
