@@ -45,13 +45,14 @@ def test_plug_ins_register_as_built_ins_do_and_take_no_name_of_theirs(monkeypatc
     of_others = [EntryPoint("mine", "vehiclemor.reduction.methods.replay:METHOD", group)]
     of_others += [EntryPoint("pod", "thief:METHOD", group)]
     found = [*registry.entry_points(group=group), *of_others]
-    with monkeypatch.context() as patch:
-        patch.setattr(registry, "entry_points", lambda **_: found)
-        registry._entries.cache_clear()
+    monkeypatch.setattr(registry, "entry_points", lambda **_: found)
+    registry._entries.cache_clear()
+    try:
         assert names("method") == sorted({entry.name for entry in found})
         assert component("method", "mine") is replay.METHOD
         assert component("method", "pod") is pod.METHOD
-    registry._entries.cache_clear()
+    finally:
+        registry._entries.cache_clear()
 
 
 @pytest.fixture

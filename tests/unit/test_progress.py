@@ -1,6 +1,7 @@
 """What takes long is told of, once, on standard error; what doesn't is not."""
 
 import logging
+import os
 import subprocess
 import sys
 import threading
@@ -16,6 +17,7 @@ from vehiclemor.progress import first_use, making
 
 LOOP = """
 import logging
+import os
 from vehiclemor import progress
 progress.QUIET = 0.0
 from vehiclemor.codegen.loops import loops
@@ -46,7 +48,7 @@ def test_what_takes_long_is_told_of_and_its_end_if_it_has_one(monkeypatch, caplo
 def test_a_process_tells_of_what_it_compiles_and_nothing_when_it_is_there(tmp_path: Path):
     def told(before: str, cache: Path) -> list[str]:
         command = [sys.executable, "-c", LOOP.format(before=before)]
-        own = {"VEHICLEMOR_CACHE": str(cache)}
+        own = {**os.environ, "VEHICLEMOR_CACHE": str(cache)}
         done = subprocess.run(command, env=own, capture_output=True, text=True, check=True)
         return done.stderr.splitlines()
 
