@@ -17,7 +17,6 @@ from vehiclemor.progress import first_use, making
 
 LOOP = """
 import logging
-import os
 from vehiclemor import progress
 progress.QUIET = 0.0
 from vehiclemor.codegen.loops import loops
