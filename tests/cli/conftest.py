@@ -1,11 +1,8 @@
 """How wrong input must fail on the command line."""
 
-import re
-
 import pytest
 
 from vehiclemor.cli import main
-from vehiclemor.resources import data_folder
 
 
 @pytest.fixture
@@ -22,20 +19,3 @@ def fails(capsys):
             assert word in captured.err, captured.err
 
     return run
-
-
-@pytest.fixture
-def parameter_file(tmp_path):
-    """Write the parameter file of a model with some values replaced."""
-
-    def write(model, values):
-        text = (data_folder() / "parameters" / f"{model}.toml").read_text()
-        for name, value in values.items():
-            entry = rf"(\[parameters\.{name}\]\n(?:(?!\[).*\n)*?value = ).*\n"
-            text, replaced = re.subn(entry, rf"\g<1>{value}\n", text)
-            assert replaced == 1
-        path = tmp_path / "vehicle.toml"
-        path.write_text(text)
-        return path
-
-    return write

@@ -1,46 +1,90 @@
 """The contracts that authors of plug-ins call: they pass what works and name what is broken."""
 
+import re
 from dataclasses import replace
+from itertools import count
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import vehiclemor as vm
+from tests.plugin.installation import installed
 from vehiclemor import contracts
+from vehiclemor.errors import InputError
 from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, names
+from vehiclemor.study.method_settings import complete_settings
 
+PAGE = Path(__file__).parents[2] / "paper" / "handbook" / "add-a-model-or-method.md"
+PROJECT = """
+[project]
+name = "handbook"
+version = "1"
+[project.entry-points."vehiclemor.methods"]
+interpolation = "handbook_method:METHOD"
+"""
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
-@pytest.mark.parametrize("name", KINEMATIC)
-def test_registered_models_pass(name: str) -> None:
-    contracts.check_model(name)
-
-
-@pytest.mark.parametrize("model", KINEMATIC)
+@pytest.mark.usefixtures("plug_in_package")
+@pytest.mark.parametrize("model", [*KINEMATIC, "quarter_car"])
 @pytest.mark.parametrize("name", names("method"))
-def test_registered_methods_pass(model: str, name: str) -> None:
+def test_registered_methods_pass_also_on_a_small_model(model: str, name: str) -> None:
     contracts.check_method(name, model)
 
 
-class Altered:
+@pytest.mark.usefixtures("plug_in_package")
+@pytest.mark.parametrize("method", ["pod", "fixed_basis"])
+def test_a_preset_lowers_its_rank_to_the_number_of_coordinates(method: str) -> None:
+    car = vm.model("quarter_car")
+    for preset in component("method", method).presets_of("ode"):
+        assert complete_settings(car, method, {}, preset)["rank"] == len(car.coordinates) == 2
+        # One that is given is never changed.
+        with pytest.raises(InputError, match="rank 3 is above the 2 coordinates"):
+            vm.simulate(car, method, preset=preset, rank=3, formulation="coordinates")
+    assert complete_settings(vm.model("double_wishbone"), method, {})["rank"] == 3
+
+
+def test_the_method_that_the_handbook_shows_works_as_it_stands(tmp_path: Path) -> None:
+    method, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (tmp_path / "handbook_method.py").write_text(method)
+    (tmp_path / "pyproject.toml").write_text(PROJECT)
+    with installed(tmp_path):
+        contracts.check_method("interpolation", "double_wishbone")
+        arguments = {"frequency": 1.4, "training": "nominal"}
+        data = vm.simulate("double_wishbone", "interpolation", **arguments)
+    # The mechanism's path is a curve: wheel travel alone determines all coordinates.
+    assert float(data["rms_error"].sel(output="second_euler_angle")) < 1e-7
+
+
+@pytest.fixture
+def instead(monkeypatch: pytest.MonkeyPatch):
+    """Let the contracts find this component in the place of any other of its kind."""
+
+    def found(kind: str, this: object) -> None:
+        monkeypatch.setattr(
+            contracts, "component", lambda k, n: this if k == kind else component(k, n)
+        )
+
+    return found
+
+
+def altered(alter) -> Method:
     """The method `replay` whose trajectories are altered, each in another way."""
+    method, runs = component("method", "replay"), count(1)
 
-    def __init__(self, alter) -> None:
-        self._method, self._alter, self._runs = component("method", "replay"), alter, 0
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._method, name)
-
-    def fit(self, *arguments: object) -> SimpleNamespace:
-        reduced = self._method.fit(*arguments)
+    def fit(*arguments: object) -> SimpleNamespace:
+        reduced = method.fit(*arguments)
 
         def simulate(*arguments: object):
-            self._runs += 1
-            return self._alter(reduced.simulate(*arguments), self._runs)
+            return alter(reduced.simulate(*arguments), next(runs))
 
         return SimpleNamespace(simulate=simulate, effective_rank=0, offline=reduced.offline)
+
+    return replace(method, fit=fit)
 
 
 @pytest.mark.parametrize(
@@ -54,14 +98,16 @@ class Altered:
         (lambda run, _: replace(run, status="fine"), "status 'fine'"),
     ],
 )
-def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message: str) -> None:
-    monkeypatch.setattr(
-        contracts,
-        "component",
-        lambda kind, name: Altered(alter) if kind == "method" else component(kind, name),
-    )
+def test_broken_method_is_named(instead, alter, message: str) -> None:
+    instead("method", altered(alter))
     with pytest.raises(AssertionError, match=message):
         contracts.check_method("replay", KINEMATIC[0])
+
+
+UNKNOWN = (
+    TimingCase("baseline", "a", "full_order"),
+    TimingCase("strongest", "b", "no_such_method"),
+)
 
 
 @pytest.mark.parametrize(
@@ -72,12 +118,7 @@ def test_broken_method_is_named(monkeypatch: pytest.MonkeyPatch, alter, message:
         ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
     ],
 )
-def test_broken_declaration_is_named(monkeypatch: pytest.MonkeyPatch, change, message: str) -> None:
-    broken = replace(component("model", KINEMATIC[0]), **change)
-    monkeypatch.setattr(
-        contracts,
-        "component",
-        lambda kind, name: broken if kind == "model" else component(kind, name),
-    )
+def test_broken_declaration_is_named(instead, change, message: str) -> None:
+    instead("model", replace(component("model", KINEMATIC[0]), **change))
     with pytest.raises(AssertionError, match=message):
         contracts.check_model(KINEMATIC[0])

@@ -20,8 +20,10 @@ from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
+from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory
@@ -38,11 +40,7 @@ def _declares(method: str, model: str) -> bool:
 
 PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(method, m)]
 # What they leave out or linearise shows in a lane change: findings, no defects.
-ROUGH = (
-    "fixed_basis",
-    "linear_single_track",
-    "modal_truncation",
-)
+ROUGH = ("fixed_basis", "linear_single_track", "modal_truncation")
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
 TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = dict.fromkeys(
     ("slow_manifold", "two_track", "guarded"),
@@ -85,6 +83,12 @@ class Pair:
         assert settings == before
         return reduced
 
+    def space(self) -> StateSpace:
+        """How it is stepped; a test is skipped if it is not."""
+        if not hasattr(self.fit(), "state_space"):
+            pytest.skip(f"{self.name} gives whole runs alone")
+        return self.fit().state_space
+
     def run(self, reduced: ReducedModel, maneuver: Maneuver | None = None) -> Trajectory:
         return reduced.simulate(maneuver or self.maneuver, self.model.starts[0])
 
@@ -101,59 +105,34 @@ def pair(request: pytest.FixtureRequest) -> Pair:
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_method_describes_itself(name: str) -> None:
+def test_a_method_describes_itself_and_its_settings(name: str) -> None:
     method: Method = component("method", name)
-    assert method.name == name
-    assert method.summary
-    assert "\n" not in method.summary
-    assert isinstance(method.reference, str)
+    assert (method.name, bool(method.summary)) == (name, True)
     assert method.settings
     assert set(method.presets) <= set(method.settings) <= set(KINDS)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", METHODS)
-def test_kinds_without_settings_are_refused(name: str, kind: str) -> None:
-    method: Method = component("method", name)
-    if kind in method.settings:
-        pytest.skip(f"{name} reduces models of kind {kind}")
-    accepted, reason = method.accepts(SimpleNamespace(name="box", kind=kind))
-    assert not accepted
-    assert reason.endswith(f"box is of kind {kind}")
-    assert "\n" not in reason
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", METHODS)
-def test_settings_are_documented_and_their_defaults_allowed(name: str, kind: str) -> None:
-    method: Method = component("method", name)
-    if kind not in method.settings:
+    for kind in set(KINDS) - set(method.settings):
         assert method.names_of(kind) == ()
-        pytest.skip(f"{name} reduces no model of kind {kind}")
-    declared = method.settings[kind]
-    assert issubclass(declared, Settings)
-    for key, field in declared.model_fields.items():
-        assert key.isidentifier()
-        assert field.description
-        assert "\n" not in field.description
-    defaults = {key: field.default for key, field in declared.model_fields.items()}
-    assert validated(method, kind, {}).model_dump() == defaults
-    # What cells store is what they are made of again.
-    assert validated(method, kind, defaults).model_dump() == defaults
-
-
-def test_presets_are_valid(pair: Pair) -> None:
-    presets = pair.method.presets_of(pair.model.kind)
-    assert "recommended" in presets
-    for preset, values in presets.items():
-        complete = validated(pair.method, pair.model.kind, {}, preset).model_dump()
-        assert set(complete) == set(pair.method.names_of(pair.model.kind))
-        assert {name: complete[name] for name in values} == values
-
-
-def test_unknown_setting_is_refused(pair: Pair) -> None:
-    with pytest.raises(InputError, match="unknown setting"):
-        validated(pair.method, pair.model.kind, {"no_such_setting": 1})
+        accepted, reason = method.accepts(SimpleNamespace(name="box", kind=kind))
+        assert not accepted
+        assert reason.endswith(f"box is of kind {kind}")
+    for kind, declared in method.settings.items():
+        assert issubclass(declared, Settings)
+        fields = declared.model_fields
+        for text in (method.summary, *(field.description for field in fields.values())):
+            assert text
+            assert "\n" not in text
+        defaults = {key: field.default for key, field in fields.items()}
+        # What cells store is what they are made of again.
+        for values in ({}, defaults):
+            assert validated(method, kind, values).model_dump() == defaults
+        with pytest.raises(InputError, match="unknown setting"):
+            validated(method, kind, {"no_such_setting": 1})
+        presets = method.presets_of(kind)
+        assert "recommended" in presets
+        for preset, values in presets.items():
+            complete = validated(method, kind, {}, preset).model_dump()
+            assert set(complete) == set(method.names_of(kind))
+            assert {key: complete[key] for key in values} == values
 
 
 def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
@@ -161,10 +140,9 @@ def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
     for preset in pair.method.presets_of(pair.model.kind):
         run = pair.run(pair.fit(preset))
         assert (run.status, run.message) == ("ok", "")
-        samples = pair.maneuver.samples
-        assert run.coordinates.shape == (samples, len(pair.model.coordinates))
-        assert run.speeds.shape == (samples, len(pair.model.speeds))
-        assert run.outputs.shape == (samples, len(pair.model.outputs))
+        for name in ("coordinates", "speeds", "outputs"):
+            shape = pair.maneuver.samples, len(getattr(pair.model, name))
+            assert getattr(run, name).shape == shape
         np.testing.assert_array_equal(run.time, pair.maneuver.times)
         np.testing.assert_array_equal(run.inputs, pair.maneuver.at(pair.maneuver.times))
         assert np.isfinite(run.states).all()
@@ -202,44 +180,35 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
     assert np.all(error[chosen] < bound * size[chosen])
 
 
-def test_it_is_exported_or_refused(pair: Pair) -> None:
-    fitted = pair.fit()
+def test_it_is_exported_or_refused_and_its_runs_are_labelled(pair: Pair) -> None:
+    fitted, model = pair.fit(), pair.model
     with suppress(InputError):
         assert exported_system(fitted, "car").name == "car"
-
-
-def test_runs_are_labelled(pair: Pair) -> None:
-    dataset = trajectory_dataset(pair.model, pair.run(pair.fit()))
-    assert tuple(dataset["coordinate"].values) == pair.model.coordinates
-    assert tuple(dataset["output"].values) == pair.model.outputs
-    assert tuple(dataset["input"].values) == pair.model.inputs
+    dataset = trajectory_dataset(model, pair.run(fitted))
+    for name in ("coordinate", "output", "input"):
+        assert tuple(dataset[name].values) == getattr(model, f"{name}s")
+    with pytest.raises(InputError, match="unknown start"):
+        fitted.simulate(pair.maneuver, "upside_down")
 
 
 def test_results_are_deterministic(pair: Pair) -> None:
     reduced = pair.fit()
     other = pair.maneuver.perturbed(0.9, 0.8)
-    first, _, again, refitted = (
-        pair.run(reduced),
-        pair.run(reduced, other),
-        pair.run(reduced),
-        pair.run(pair.fresh_fit()),
-    )
-    for run in (again, refitted):
+    first, _, again = (pair.run(reduced, maneuver) for maneuver in (None, other, None))
+    for run in (again, pair.run(pair.fresh_fit())):
         np.testing.assert_array_equal(run.states, first.states)
         np.testing.assert_array_equal(run.outputs, first.outputs)
         assert (run.counts, run.status, run.message) == (first.counts, first.status, first.message)
 
 
-@pytest.mark.parametrize("factors", [(1.2, 1.0), (1.0, 1.2), (2.0, 0.5)])
-def test_untrained_inputs_give_a_result_or_say_why_not(
-    pair: Pair, factors: tuple[float, float]
-) -> None:
-    perturbed = pair.maneuver.perturbed(*factors)
-    run = pair.run(pair.fit(), perturbed)
-    assert run.status in STATUSES
-    assert np.isfinite(run.outputs).all() == run.finished
-    assert bool(run.message) == (run.status != "ok")
-    np.testing.assert_allclose(run.inputs, perturbed.at(perturbed.times), rtol=1e-15)
+def test_untrained_inputs_give_a_result_or_say_why_not(pair: Pair) -> None:
+    for factors in ((1.2, 1.0), (1.0, 1.2), (2.0, 0.5)):
+        perturbed = pair.maneuver.perturbed(*factors)
+        run = pair.run(pair.fit(), perturbed)
+        assert run.status in STATUSES
+        assert np.isfinite(run.outputs).all() == run.finished
+        assert bool(run.message) == (run.status != "ok")
+        np.testing.assert_allclose(run.inputs, perturbed.at(perturbed.times), rtol=1e-15)
 
 
 def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
@@ -256,44 +225,29 @@ def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
         np.testing.assert_allclose(again, best, rtol=0, atol=1e-12)
 
 
-def held(maneuver: Maneuver, count: int, hold: float, zero: bool) -> Maneuver:
-    """A maneuver's inputs at `count` times, held until the next one, or straight lines to it."""
-    ends = hold * np.arange(count + 1)
-    table = maneuver.at(np.linspace(0.0, 3.0, count + 1))
-
-    def signal(times: np.ndarray, _: float, __: float) -> np.ndarray:
-        first = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, count - 1)
-        part = 0.0 if zero else (times / hold - first)[:, None]
-        return table[first] + part * (table[first + 1] - table[first])
-
-    inner = tuple(ends[1:-1].tolist())
-    name, samples = f"{maneuver.name} held {zero}", 2 * count + 1
-    return Maneuver(name, "", signal, maneuver.inputs, ends[-1], samples, lambda _: inner)
-
-
 @pytest.mark.parametrize("zero", [True, False], ids=["held", "linear"])
 def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
-    if not hasattr(pair.fit(), "state_space"):
-        pytest.skip(f"{pair.name} gives whole runs alone")
+    pair.space()
     # So that what is left is no error of the integration.
     tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
     reduced = replace(pair.fit(), **tight)
     count, dt = 8, 0.13
-    maneuver = held(pair.maneuver, count, 2.0 * dt, zero)
+    times = 2.0 * dt * np.arange(count + 1)
+    inputs = pair.maneuver.at(np.linspace(0.0, 3.0, count + 1))
+    hold, names = "zero" if zero else "linear", pair.maneuver.inputs
+    maneuver = Signal.from_samples(times, inputs, hold, inputs=names, output_step=dt)
     # A guarded model steps its fast one, which hands over whole runs that are steered like this.
     run = pair.run(getattr(reduced, "ahead", reduced), maneuver)
     assert run.finished
-    space, inputs = reduced.state_space, maneuver.at(2.0 * dt * np.arange(count + 1))
+    space = reduced.state_space
     state = space.begin(pair.model.starts[0], inputs[0])
     assert len(space.states) == len(state)
     dynamic = pair.model.kind != "ae"
     scale = pair.model.error_scale if dynamic else 1.0
     for sample in range(1, 2 * count + 1):
         k, half = divmod(sample - 1, 2)
-        at_ends = [
-            inputs[k] + part * (inputs[k + 1] - inputs[k]) for part in (half / 2, (half + 1) / 2)
-        ]
-        u, ends = (inputs[k], None) if zero else at_ends
+        rise = 0.0 if zero else 0.5 * (inputs[k + 1] - inputs[k])
+        u, ends = inputs[k] + half * rise, None if zero else inputs[k] + (half + 1) * rise
         state = space.step(state, u, ends, dt, (sample - 1) * dt)
         now = u if ends is None else ends
         if zero and half:
@@ -304,9 +258,7 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
 
 
 def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
-    fit = pair.fit()
-    if not hasattr(fit, "state_space"):
-        pytest.skip(f"{pair.name} gives whole runs alone")
+    fit, _ = pair.fit(), pair.space()
     rom, run = ReducedOrderModel(pair.model, pair.name, {}, (), fit), pair.run(fit)
     for start in pair.model.starts[::-1]:
         state = rom.state(start, run.inputs[0])
@@ -321,10 +273,10 @@ def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
 
 
 def test_rates_are_those_of_the_steps(pair: Pair) -> None:
-    reduced = pair.fit()
-    if pair.model.kind == "ae" or not hasattr(reduced, "state_space"):
+    pair.space()
+    if pair.model.kind == "ae":
         pytest.skip("there are no rates")
-    space, time, dt = replace(reduced, tolerance=1e-11).state_space, 1.63, 1e-5
+    space, time, dt = replace(pair.fit(), tolerance=1e-11).state_space, 1.63, 1e-5
     u = pair.maneuver.at(np.array([time]))[0]
     state = space.step(space.begin(pair.model.starts[0], u), u, None, 0.1, time - 0.1)
     later = space.step(state, u, None, dt, time)
@@ -344,9 +296,7 @@ def test_jacobians_are_the_slopes_of_rates_and_outputs(
 ) -> None:
     if pair.model.kind == "dae" and pair.name in LONG_TO_COMPILE:
         monkeypatch.setattr(Tangent, "_products", run_as_text)
-    space = getattr(pair.fit(), "state_space", None)
-    if space is None:
-        pytest.skip(f"{pair.name} gives whole runs alone")
+    space = pair.space()
     rom, time = ReducedOrderModel(pair.model, pair.name, {}, (), pair.fit()), 1.63
     u = pair.maneuver.at(np.array([time]))[0]
     state = rom.state(inputs=u)
@@ -409,13 +359,5 @@ def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> Non
         steps = [rom.step(rom.state(inputs=inputs), inputs, 1e-2) for rom in (made, again)]
         np.testing.assert_array_equal(steps[1], steps[0])
         if pair.model.kind != "ae":
-            first, second = (
-                rom.jacobian(step, inputs, of="outputs")
-                for rom, step in zip((made, again), steps, strict=True)
-            )
-            np.testing.assert_array_equal(second, first)
-
-
-def test_unknown_start_is_refused(pair: Pair) -> None:
-    with pytest.raises(InputError, match="unknown start"):
-        pair.fit().simulate(pair.maneuver, "upside_down")
+            slopes = [rom.jacobian(steps[0], inputs, of="outputs") for rom in (made, again)]
+            np.testing.assert_array_equal(slopes[1], slopes[0])

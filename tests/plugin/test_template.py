@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.resources import data_folder
 
@@ -41,29 +42,26 @@ def test_a_name_stands_wherever_the_template_has_its_own(here, capsys):
         tomllib.loads(text) if path.suffix == ".toml" else compile(text, path, "exec")
     project = tomllib.loads((here / "my_car_plugin" / "pyproject.toml").read_text())["project"]
     assert project["name"] == "vehiclemor-my-car"
-    groups = project["entry-points"].items()
-    assert {group.removeprefix("vehiclemor."): list(entries) for group, entries in groups} == {
-        "models": ["my_car"],
-        "maneuvers": ["my_car_road"],
-        "methods": ["my_car_modes"],
-    }
+    assert project["entry-points"].keys() == {f"vehiclemor.{kind}s" for kind in registry.GROUPS}
+    named = {name for entries in project["entry-points"].values() for name in entries}
+    assert named == {"my_car", "my_car_road", "my_car_modes"}
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["My-Car"], "'My-Car' can't name a Python package: .*; what about my_car?"),
+        (["My-Car"], "what about my_car?"),
+        (["../car"], "what about car?"),
         (["class"], "'class' can't name"),
         (["3"], "'3' can't name"),
-        (["a" * 41], "at most 40"),
         ([""], "'' can't name"),
-        (["../car"], "what about car?"),
-        (["pod"], "pod: there is a method pod already"),
-        (["double_wishbone"], "there is a model double_wishbone already"),
-        (["lane_change"], "there is a maneuver lane_change already"),
-        (["paper"], "there is a study paper already"),
-        (["json"], "there is a Python package json already"),
-        (["quarter_car"], "there is a model quarter_car already"),
+        (["a" * 41], "at most 40"),
+        (["pod"], "there is a method pod"),
+        (["double_wishbone"], "there is a model double_wishbone"),
+        (["quarter_car"], "there is a model quarter_car"),
+        (["lane_change"], "there is a maneuver lane_change"),
+        (["paper"], "there is a study paper"),
+        (["json"], "there is a Python package json"),
         (["my_car", "--out", "there"], "there exists: it is not replaced"),
         (["my_car", "--out", "file"], "file exists: it is not replaced"),
         (["my_car", "--out", "no/where"], "no/where: the folder no does not exist"),
@@ -75,10 +73,8 @@ def test_what_cannot_be_made_is_one_line(plug_in_package, here, capsys, argument
     (here / "there").mkdir()
     (here / "file").write_text("mine")
     assert main(["new-plugin", *arguments]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 1
-    for part in words.split(".*"):
-        assert part in lines[0]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
     assert sorted(path.name for path in here.iterdir()) == ["file", "there"]
     assert not list((here / "there").iterdir())
 

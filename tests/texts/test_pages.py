@@ -17,11 +17,10 @@ from vehiclemor.report.figures import saving
 from vehiclemor.report.published import load_published
 from vehiclemor.study.plans.study_file import study_path
 
-README = ROOT / "README.md"
+README, HANDBOOK = ROOT / "README.md", ROOT / "paper" / "handbook"
+FIRST_STEPS, PLUG_IN = HANDBOOK / "first-steps.md", HANDBOOK / "my-plug-in.md"
+STUDY_FILES = HANDBOOK / "study-files.md"
 PAGES = pytest.mark.parametrize("path", TEXTS, ids=NAMES)
-FIRST_STEPS = ROOT / "paper" / "handbook" / "first-steps.md"
-PLUG_IN = ROOT / "paper" / "handbook" / "my-plug-in.md"
-STUDY_FILES = ROOT / "paper" / "handbook" / "study-files.md"
 
 
 @PAGES
@@ -41,37 +40,27 @@ def _anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@PAGES
-def test_paths_in_code_exist(path):
-    text = path.read_text(encoding="utf-8")
-    folders = "src|tests|data|paper|benchmarks|examples"
-    for name in re.findall(rf"`((?:{folders})/[\w/.-]+)`", text):
-        assert (ROOT / name).exists(), name
-
-
-@PAGES
-def test_quoted_files_are_those_of_the_project(path):
-    for block in blocks(path):
-        quoted = re.fullmatch(r"`([\w/.-]+)`:", block.above)
-        if quoted:
-            assert block.content == (ROOT / quoted[1]).read_text(encoding="utf-8"), quoted[1]
+def test_files_scripts_and_environments_that_a_page_names_are_there():
+    tox, folders = ConfigParser(), "src|tests|data|paper|benchmarks|examples"
+    tox.read(ROOT / "tox.ini")
+    for path in TEXTS:
+        text = path.read_text(encoding="utf-8")
+        for name in re.findall(rf"`((?:{folders})/[\w/.-]+)`", text):
+            assert (ROOT / name).exists(), name
+        for name in re.findall(r"tox -e (\w+)", text):
+            assert f"testenv:{name}" in tox, name
+        for script in re.findall(r"python (paper/\w+\.py)", text):
+            assert f"Usage: python {script}" in (ROOT / script).read_text(encoding="utf-8")
+        for block in blocks(path):
+            if quoted := re.fullmatch(r"`([\w/.-]+)`:", block.above):
+                content = (ROOT / quoted[1]).read_text(encoding="utf-8")
+                assert block.content == content, quoted[1]
+            if block.language == "toml":
+                tomllib.loads(block.content)
 
 
 def test_the_page_of_schemas_is_current():
     assert schemas.PAGE.read_text(encoding="utf-8") == schemas.page(), "run paper/schemas.py"
-
-
-def test_the_first_two_blocks_are_the_two_commands():
-    shell = [b.content for b in blocks(README) if b.language in ("sh", "shell", "bash", "console")]
-    assert shell[:2] == ["sh .ci/tox -e bench\n", "sh .ci/tox -e tests\n"]
-
-
-@PAGES
-def test_environments_of_tox_exist(path):
-    tox = ConfigParser()
-    tox.read(ROOT / "tox.ini")
-    for name in re.findall(r"tox -e (\w+)", path.read_text(encoding="utf-8")):
-        assert f"testenv:{name}" in tox, name
 
 
 # Parsed and not run, here: what takes long.  Their options are checked, and the names of studies.
@@ -146,31 +135,24 @@ def test_a_plug_in_is_made_step_by_step(here, capsys, monkeypatch):
     assert list((here / "results" / "figures").glob("*.png"))
 
 
-PAGES_WITH_CODE = (
-    "export",
-    "keep-a-model",
-    "my-loop",
-    "my-signal",
-    "predictive-control",
-    "ten-thousand-maneuvers",
+@pytest.mark.parametrize(
+    "name",
+    [
+        "export",
+        "keep-a-model",
+        "my-loop",
+        "my-signal",
+        "predictive-control",
+        "ten-thousand-maneuvers",
+    ],
 )
-
-
-@pytest.mark.parametrize("name", PAGES_WITH_CODE)
 def test_the_code_of_a_page_runs(name, here, capsys):
-    page = ROOT / "paper" / "handbook" / f"{name}.md"
+    page = HANDBOOK / f"{name}.md"
     # Files that are quoted have tests of their own.
     own = [b.content for b in blocks(page) if b.language == "python" and b.above[:1] != "`"]
     (here / "page.py").write_text("\n".join(own).replace("10_000", "100"))
     runpy.run_path("page.py")
     assert capsys.readouterr().out
-
-
-@PAGES
-def test_toml_blocks_are_toml(path):
-    for block in blocks(path):
-        if block.language == "toml":
-            tomllib.loads(block.content)
 
 
 def test_citation_names_this_version_and_the_published_paper():
@@ -182,9 +164,3 @@ def test_citation_names_this_version_and_the_published_paper():
         assert value in citation
     assert paper.doi in README.read_text(encoding="utf-8")
     assert paper.doi in citations()
-
-
-def test_scripts_of_the_paper_explain_themselves():
-    for path in TEXTS:
-        for script in re.findall(r"python (paper/\w+\.py)", path.read_text(encoding="utf-8")):
-            assert f"Usage: python {script}" in (ROOT / script).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Tasks beside other tools: the scripts run, and the table tells how long they are."""
+"""Scripts of tasks and of the design example run, and do what the pages say."""
 
 import re
 import runpy
@@ -28,3 +28,16 @@ def test_a_task_runs(name, monkeypatch):
     found = runpy.run_path(str(FOLDER / f"{name}.py"))
     result = found["run"].outputs if "run" in found else found["state"]
     assert np.isfinite(result).all()
+
+
+def test_hard_points_of_the_design_are_an_optimum_within_bounds_that_the_path_map_finds():
+    design = runpy.run_path(str(ROOT / "examples" / "design.py"))
+    full = design["Designer"]("full_order", 2)
+    found = {way: design["hard_points"](way, 2) for way in ("full_order", "path_map")}
+    np.testing.assert_allclose(found["path_map"], found["full_order"], atol=1e-7)
+    place = found["full_order"]
+    slope = full.off(place) @ full.slopes(place)
+    at = np.sign(place) * (np.abs(place) > design["LARGEST"] * (1.0 - 1e-4))
+    assert 0 < np.count_nonzero(at) < len(at)
+    assert np.abs(slope[at == 0]).max() < 1e-4 * np.abs(slope).max()
+    assert (slope[at != 0] * at[at != 0] < 0.0).all()

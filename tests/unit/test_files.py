@@ -2,19 +2,13 @@
 
 import itertools
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from vehiclemor.errors import FileError, MachineError
-from vehiclemor.files import (
-    TEMPORARY,
-    make_folder,
-    remove_leftovers,
-    temporary_path,
-    write_text,
-    write_whole,
-)
+from vehiclemor.errors import MachineError
+from vehiclemor.files import TEMPORARY, remove_leftovers, temporary_path, write_text, write_whole
 
 # Above any process number of the kernel.
 NO_PROCESS = 2**30
@@ -24,31 +18,23 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_write_that_breaks_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+def test_a_write_leaves_the_old_file_until_the_new_one_is_complete(tmp_path: Path) -> None:
     path = write_text(tmp_path / "file.txt", "old")
-
-    def broken(temporary: Path) -> None:
-        temporary.write_text("half of the n")
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_whole(path, broken)
-    assert path.read_text() == "old"
-    assert names_in(tmp_path) == ["file.txt"]
-
-
-def test_the_old_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> None:
-    path = write_text(tmp_path / "file.txt", "old")
-    seen = []
 
     def write(temporary: Path) -> None:
-        temporary.write_text("new")
-        seen.append(path.read_text())
         assert temporary.suffix == ".txt"
+        temporary.write_text("new")
+        assert path.read_text() == "old"
 
-    write_whole(path, write)
-    assert seen == ["old"]
-    assert path.read_text() == "new"
+    def broken(temporary: Path) -> None:
+        write(temporary)
+        raise KeyboardInterrupt
+
+    for writer, content in ((broken, "old"), (write, "new")):
+        with suppress(KeyboardInterrupt):
+            write_whole(path, writer)
+        assert path.read_text() == content
+        assert names_in(tmp_path) == ["file.txt"]
 
 
 def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
@@ -58,12 +44,6 @@ def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
     line = r"file\.txt: can't be written \(No space left on device\)"
     with pytest.raises(MachineError, match=line):
         write_whole(tmp_path / "file.txt", full)
-
-
-def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
-    path = write_text(tmp_path / "file", "")
-    with pytest.raises(FileError, match="not a folder"):
-        make_folder(path / "below")
 
 
 def test_leftovers_of_dead_processes_alone_are_removed(tmp_path: Path) -> None:

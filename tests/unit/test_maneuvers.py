@@ -5,12 +5,32 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
-from vehiclemor.registry import component
+from vehiclemor.registry import component, names
 from vehiclemor.simulation.maneuver_checks import check_resolved
 
-factors = st.floats(0.1, 4.0)
+factors, amplitudes = st.floats(0.1, 4.0), st.floats(-3.0, 3.0)
+
+
+@pytest.mark.parametrize("name", names("maneuver"))
+def test_every_maneuver_is_finite_scales_and_breaks_inside_its_run(name: str) -> None:
+    maneuver = component("maneuver", name)
+    assert maneuver == maneuver.perturbed(np.float32(1.0), np.int64(1))
+    assert (maneuver.name, maneuver.linear_in_amplitude) == (name, True)
+    for frequency in (1.0, 0.8, 2.0):
+        perturbed = maneuver.perturbed(frequency)
+        times, points = perturbed.times, perturbed.break_points
+        assert (times[0], times[-1], len(times)) == (0.0, maneuver.duration, maneuver.samples)
+        inputs = perturbed.at(times)
+        assert inputs.shape == (len(times), len(maneuver.inputs))
+        assert np.isfinite(inputs).all()
+        # A value depends on its time alone.
+        np.testing.assert_array_equal(perturbed.at(times[7:9]), inputs[7:9])
+        scaled = maneuver.perturbed(frequency, -1.5).at(times)
+        np.testing.assert_allclose(scaled, -1.5 * inputs, rtol=1e-14, atol=1e-16)
+        assert not maneuver.perturbed(frequency, 0.0).at(times).any()
+        assert list(points) == sorted(points)
+        assert all(0.0 < point < maneuver.duration for point in points)
 
 
 def test_sine_travel_is_the_papers_input(nominal: Maneuver) -> None:
@@ -22,39 +42,43 @@ def test_sine_travel_is_the_papers_input(nominal: Maneuver) -> None:
     assert nominal.inputs == ("z", "s0")
 
 
-@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
-def test_factors_scale_frequency_and_amplitude(
-    nominal: Maneuver, frequency: float, amplitude: float
-) -> None:
-    perturbed = nominal.perturbed(frequency, amplitude)
-    times = nominal.times
-    expected = amplitude * nominal.at(frequency * times)[:, 0]
-    assert perturbed.at(times)[:, 0] == pytest.approx(expected, abs=1e-14)
+@settings(max_examples=30)
+@given(frequency=factors, amplitude=amplitudes)
+@pytest.mark.parametrize("name", ["sine_travel", "travel_and_rack", "travel_and_rack_multisine"])
+def test_factors_scale_time_and_values_and_do_not_pile_up(name, frequency, amplitude):
+    nominal = component("maneuver", name)
+    perturbed, times = nominal.perturbed(3.0, 3.0).perturbed(frequency, amplitude), nominal.times
+    assert perturbed == nominal.perturbed(frequency, amplitude)
+    assert perturbed.perturbed() == nominal
+    expected = amplitude * nominal.at(frequency * times)
+    np.testing.assert_allclose(perturbed.at(times), expected, rtol=0, atol=1e-14)
     # The run's length and its output times stay.
     np.testing.assert_array_equal(perturbed.times, times)
 
 
-@given(frequency=factors, amplitude=st.floats(0.1, 3.0))
-def test_factors_are_set_and_do_not_pile_up(
-    nominal: Maneuver, frequency: float, amplitude: float
-) -> None:
-    twice = nominal.perturbed(3.0, 3.0).perturbed(frequency, amplitude)
-    assert twice == nominal.perturbed(frequency, amplitude)
-    assert nominal.perturbed(frequency, amplitude).perturbed() == nominal.perturbed()
-    assert (nominal.frequency_factor, nominal.amplitude_factor) == (1.0, 1.0)
+def crossings(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Times at which a signal changes its sign, its ends apart."""
+    return times[np.flatnonzero(np.diff(np.sign(values[1:-1])))]
 
 
-def test_chirp_sweeps_from_its_first_to_its_last_frequency() -> None:
-    chirp = component("maneuver", "chirp_travel")
-    times = np.linspace(0.0, chirp.duration, 100001)
-    travel = chirp.at(times)[:, 0]
-    assert np.abs(travel).max() == pytest.approx(0.1, rel=1e-6)
-    # 0.25 Hz on average for 10 s: five half waves, each shorter than the one before.
-    crossings = times[np.flatnonzero(np.diff(np.sign(travel[1:-1])))]
-    assert len(crossings) == 4
-    assert np.all(np.diff(crossings, 2) < 0.0)
-    slopes = np.abs(np.gradient(travel, times)[[0, -1]])
-    assert slopes == pytest.approx(0.1 * 2 * np.pi * np.array([0.1, 0.4]), rel=1e-3)
+def test_sweeps_go_from_their_first_to_their_last_frequency() -> None:
+    chirp, sweep = (component("maneuver", n) for n in ("chirp_travel", "travel_and_rack_sweep"))
+    times = np.linspace(0.0, 10.0, 100001)
+    # Hz, first and last, and zeros at each half turn of their mean over 10 s.
+    for travel, largest, first, last, zeros in (
+        (chirp.at(times)[:, 0], 0.1, 0.1, 0.4, 4),
+        (sweep.at(times)[:, 0], 0.1, 0.1, 0.4, 4),
+        (sweep.at(times)[:, 1], 0.03, 0.5, 0.1618034, 6),
+    ):
+        assert np.abs(travel).max() == pytest.approx(largest, rel=1e-6)
+        found = crossings(times, travel)
+        assert len(found) == zeros
+        assert np.all(np.diff(found, 2) * (last - first) < 0.0)
+        rate = 2.0 * np.pi * largest * first
+        assert np.gradient(travel, times)[0] == pytest.approx(rate, rel=1e-3)
+    assert abs(np.gradient(chirp.at(times)[:, 0], times)[-1]) == pytest.approx(
+        2.0 * np.pi * 0.1 * 0.4, rel=1e-3
+    )
 
 
 # Travel with a rack that moves
@@ -74,69 +98,17 @@ def test_travel_and_rack_stay_within_their_rectangle(
     check_resolved(maneuver)
 
 
-@pytest.mark.parametrize("name", TWO_WAY)
-def test_travel_and_rack_take_every_side_of_each_other(name: str) -> None:
-    inputs = component("maneuver", name).at(np.linspace(0.0, 10.0, 1001))
-    sides = {tuple(row) for row in np.sign(inputs[np.all(inputs != 0.0, axis=1)]).tolist()}
-    assert len(sides) == 4
-    # Not along a line.
-    assert abs(np.corrcoef(inputs.T)[0, 1]) < 0.4
-
-
-@pytest.mark.parametrize("name", ["travel_and_rack", "travel_and_rack_multisine"])
-def test_frequency_of_travel_and_rack_scales_time(name: str) -> None:
-    maneuver, times = component("maneuver", name), np.linspace(0.0, 5.0, 51)
-    faster = maneuver.perturbed(frequency=1.7).at(times)
-    np.testing.assert_allclose(faster, maneuver.at(1.7 * times), rtol=0, atol=1e-15)
-
-
-def test_travel_and_rack_never_repeat() -> None:
+def test_travel_and_rack_take_every_side_of_each_other_and_never_repeat() -> None:
+    for name in TWO_WAY:
+        inputs = component("maneuver", name).at(np.linspace(0.0, 10.0, 1001))
+        sides = {tuple(row) for row in np.sign(inputs[np.all(inputs != 0.0, axis=1)]).tolist()}
+        assert len(sides) == 4
+        # Not along a line.
+        assert abs(np.corrcoef(inputs.T)[0, 1]) < 0.4
     # Spectral lines in the golden ratio: no common period.
-    maneuver = component("maneuver", "travel_and_rack")
-    times = np.linspace(0.0, 1000.0, 100001)
-    lines = np.abs(np.fft.rfft(maneuver.at(times)[:-1], axis=0)).argmax(axis=0) / 1000.0
+    sines = component("maneuver", "travel_and_rack").at(np.linspace(0.0, 1000.0, 100001)[:-1])
+    lines = np.abs(np.fft.rfft(sines, axis=0)).argmax(axis=0) / 1000.0
     assert lines == pytest.approx([0.1, 0.1618], abs=1e-3)
-
-
-def test_the_sweeps_of_travel_and_rack_cross() -> None:
-    sweep = component("maneuver", "travel_and_rack_sweep")
-    times = np.linspace(0.0, 10.0, 100001)
-    inputs = sweep.at(times)
-    # The area of sin is zero at each whole turn: 0.25 and 0.33 Hz on average, so 2.5 and 3.3 turns.
-    crossings = [times[np.flatnonzero(np.diff(np.sign(column[1:-1])))] for column in inputs.T]
-    assert [len(found) for found in crossings] == [4, 6]
-    assert np.all(np.diff(crossings[0], 2) < 0.0)
-    assert np.all(np.diff(crossings[1], 2) > 0.0)
-
-
-@pytest.mark.parametrize(
-    ("given_factors", "message"),
-    [
-        ({"frequency": 0.0}, "frequency factor: 0 is not positive"),
-        ({"frequency": -1.0}, "frequency factor: -1 is not positive"),
-        ({"frequency": float("nan")}, "frequency factor: nan is not finite"),
-        ({"amplitude": float("inf")}, "amplitude factor: inf is not finite"),
-        ({"amplitude": "1.2"}, "amplitude factor: '1.2' is not a number"),
-        ({"frequency": True}, "frequency factor: True is not a number"),
-        ({"amplitude": None}, "amplitude factor: None is not a number"),
-    ],
-)
-def test_wrong_factor_is_one_line(nominal: Maneuver, given_factors: dict, message: str) -> None:
-    with pytest.raises(InputError) as error:
-        nominal.perturbed(**given_factors)
-    assert str(error.value) == message
-
-
-def test_numpy_numbers_are_numbers(nominal: Maneuver) -> None:
-    assert nominal.perturbed(np.float32(2.0), np.int64(1)) == nominal.perturbed(2.0, 1.0)
-
-
-def test_break_points_follow_the_frequency() -> None:
-    corners = Maneuver(
-        "pulse", "", lambda t, *_: t[:, None], ("z",), 4.0, 5, lambda f: (1.0 / f, 2.0 / f)
-    )
-    assert corners.break_points == (1.0, 2.0)
-    assert corners.perturbed(frequency=2.0).break_points == (0.5, 1.0)
 
 
 # Pulses of the steering rack
@@ -154,7 +126,7 @@ def spectral_derivative(values: np.ndarray, period: float) -> np.ndarray:
 
 
 @settings(max_examples=30)
-@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
+@given(frequency=factors, amplitude=amplitudes)
 def test_rack_speed_and_acceleration_are_derivatives_of_its_place(
     frequency: float, amplitude: float
 ) -> None:
@@ -173,57 +145,36 @@ def test_rack_speed_and_acceleration_are_derivatives_of_its_place(
 
 
 @settings(max_examples=30)
-@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
-def test_the_rack_pulse_is_as_high_and_as_long_as_described(
+@given(frequency=factors, amplitude=amplitudes)
+def test_the_rack_pulse_is_as_described_and_has_no_corner(
     frequency: float, amplitude: float
 ) -> None:
     pulse = rack_pulse(frequency, amplitude)
+    assert (pulse.duration, len(pulse.times), pulse.inputs) == (10.0, 501, ("s", "s_dot", "s_ddot"))
     assert pulse.break_points == (1.0, pytest.approx(1.0 + 2.5 / frequency))
     begin, end = pulse.break_points
-    times = np.linspace(begin, end, 3001)
-    place = pulse.at(times)[:, 0]
-    # sin x - sin(2 x) / 2 = sin x (1 - cos x) is largest at a third of the turn.
+    place = pulse.at(np.linspace(begin, end, 3001))[:, 0]
+    # sin x - sin(2 x) / 2 = sin x (1 - cos x) is largest at a third of the turn.  A positive
+    # displacement steers to the right: the lane change to the left begins negative.
     highest = 0.0046903 * 0.75 * np.sqrt(3.0)
     assert place[1000] == pytest.approx(-amplitude * highest, abs=1e-15)
     assert np.abs(place).max() == pytest.approx(abs(amplitude) * highest, abs=1e-15)
     # To the one side and then to the other, by the same amount.
     np.testing.assert_allclose(place[::-1], -place, rtol=0, atol=1e-15)
-
-
-@settings(max_examples=30)
-@given(frequency=factors)
-def test_the_rack_pulse_has_no_corner_in_its_acceleration(frequency: float) -> None:
-    pulse = rack_pulse(frequency)
-    rate = 2.0 * np.pi * frequency / 2.5
     step = 1e-7
-    for corner, inside in zip(pulse.break_points, (1.0, -1.0), strict=True):
-        at_corner, outside = pulse.at(corner - inside * np.array([0.0, step]))
-        np.testing.assert_allclose(at_corner, 0.0, atol=1e-13)
-        np.testing.assert_array_equal(outside, 0.0)
-        # Inside it grows with the third power of time: its third derivative alone jumps.
-        third = -0.0046903 * 3.0 * rate**3
-        near = pulse.at(np.array([corner + inside * step]))[0]
-        expected = third * np.array([inside * step**3 / 6.0, step**2 / 2.0, inside * step])
-        # The corner's time is rounded, and so is the pulse itself where it is next to nothing.
-        assert np.abs(near - expected)[0] < 1e-17
-        assert near[1:] == pytest.approx(expected[1:], rel=1e-5, abs=1e-12)
+    rest = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(end + step, end + 9.0, 50)])
+    np.testing.assert_array_equal(pulse.at(rest), 0.0)
+    # Inside the place grows with the third power of time: its third derivative alone jumps.
+    third = 0.0046903 * 3.0 * (2.0 * np.pi * frequency / 2.5) ** 3
+    near = pulse.at(np.array([begin + step, end - step]))
+    powers = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0]]) * [step**3 / 6.0, step**2 / 2.0, step]
+    # The corner's time is rounded, and so is the pulse itself where it is next to nothing.
+    expected = -amplitude * third * powers
+    np.testing.assert_allclose(near[:, 1:], expected[:, 1:], rtol=1e-5, atol=3e-12)
+    np.testing.assert_allclose(near[:, 0], expected[:, 0], rtol=0, atol=3e-17)
 
 
-def test_the_rack_rests_before_and_after_its_pulse() -> None:
-    pulse = rack_pulse()
-    assert (pulse.duration, len(pulse.times), pulse.inputs) == (10.0, 501, ("s", "s_dot", "s_ddot"))
-    times = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(3.5, 10.0, 50)])
-    np.testing.assert_array_equal(pulse.at(times), 0.0)
-    # A positive displacement steers to the right: the lane change to the left begins negative.
-    assert pulse.at(np.array([1.5]))[0, 0] < 0.0
-
-
-@settings(max_examples=30)
-@given(frequency=factors, amplitude=st.floats(-3.0, 3.0))
-def test_a_rack_that_is_held_does_not_move(frequency: float, amplitude: float) -> None:
-    held = component("maneuver", "rack_straight_ahead").perturbed(frequency, amplitude)
-    assert held.inputs == rack_pulse().inputs
-    assert held.break_points == ()
-    inputs = held.at(held.times)
-    assert inputs.shape == (501, 3)
-    assert not inputs.any()
+def test_a_rack_that_is_held_does_not_move() -> None:
+    held = component("maneuver", "rack_straight_ahead").perturbed(2.0, 3.0)
+    assert (held.inputs, held.break_points) == (rack_pulse().inputs, ())
+    np.testing.assert_array_equal(held.at(held.times), np.zeros((501, 3)))

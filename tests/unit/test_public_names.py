@@ -1,14 +1,16 @@
-"""The names of the package stay what they are, whatever was imported and used before."""
+"""Public names stay what they are whatever was used before; objects show themselves in a line."""
 
-import pkgutil
 import subprocess
 import sys
 
 import pytest
 
 import vehiclemor as vm
+from vehiclemor import registry
 
-# Everything that a session may have imported and used before a name is asked for.
+LONGEST = 500
+# Everything that a session may have imported and used before a name is asked for: Python puts a
+# module in the place of a name as soon as anything imports it.
 USED = """
 import importlib, pkgutil
 import vehiclemor as vm
@@ -31,14 +33,34 @@ def test_public_names_after_everything_was_used():
     assert done.returncode == 0, done.stderr
 
 
-def test_a_module_with_the_name_of_a_public_function_is_that_function():
-    # Python puts the module in its place as soon as anything imports it.
-    modules = {module.name for module in pkgutil.iter_modules(vm.__path__)}
-    assert modules & set(vm.__all__) == {"maneuver"}
+def test_public_names_are_documented_and_one_is_a_module_too():
+    for name in vm.__all__:
+        assert getattr(vm, name).__doc__
     assert vm.maneuver is sys.modules["vehiclemor.maneuver"]
     assert vm.maneuver("sine_travel").name == "sine_travel"
 
 
-@pytest.mark.parametrize("name", vm.__all__)
-def test_public_names_are_documented(name):
-    assert getattr(vm, name).__doc__
+@pytest.mark.parametrize("name", ["double_wishbone", "independent_suspension_vehicle"])
+def test_objects_of_a_simulation_show_themselves_in_one_line(name):
+    model, definition = vm.model(name), registry.component("model", name)
+    maneuver = vm.maneuver(definition.maneuver)
+    rom, full = vm.reduce(name, "pod", training=[maneuver]), model.simulate(maneuver)
+    for shown in (model, definition, maneuver, rom, rom.reduced, full):
+        text = repr(shown)
+        assert len(text) < LONGEST
+        assert "\n" not in text
+    assert name in repr(model)
+    assert model.coordinates[0] in repr(model)
+    assert name in repr(rom)
+    assert f"time=ndarray({maneuver.samples},)" in repr(full)
+    assert "status='ok'" in repr(full)
+    for further in (model.parameters, model.equations, definition.report):
+        assert len(repr(further)) < 2 * LONGEST
+
+
+def test_every_registered_component_shows_its_name():
+    for kind in registry.GROUPS:
+        for name in registry.names(kind):
+            text = repr(registry.component(kind, name))
+            assert name in text
+            assert len(text) < LONGEST
