@@ -40,7 +40,7 @@ def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: T
         assert dataset[name].attrs["units"]
 
 
-def test_a_plot_shows_the_unit_where_there_is_one(model: AlgebraicModel, full: Trajectory) -> None:
+def test_there_is_a_unit_where_all_have_it(model: AlgebraicModel, full: Trajectory) -> None:
     further = {"error": ("output", np.arange(6.0), {"units": "see output_unit"})}
     dataset = trajectory_dataset(model, full, further)
     assert dataset["inputs"].attrs["units"] == "m"
@@ -52,19 +52,7 @@ def test_a_plot_shows_the_unit_where_there_is_one(model: AlgebraicModel, full: T
     }.items():
         assert "units" not in dataset[name].attrs
         assert set(dataset[name][unit].values) == {"m", "rad"}
-    axis = dataset["outputs"].sel(output="toe").plot()[0].axes
-    assert axis.get_ylabel() == "outputs"
-    axis.figure.clear()
-
-
-def test_further_variables_are_added(model: AlgebraicModel, full: Trajectory) -> None:
-    dataset = trajectory_dataset(model, full, {"extra": ("output", np.arange(6.0), {"units": "1"})})
-    assert list(dataset["extra"].values) == [0, 1, 2, 3, 4, 5]
-
-
-def test_states_of_a_kinematic_model_are_its_coordinates(full: Trajectory) -> None:
-    assert full.speeds.shape == (1001, 0)
-    np.testing.assert_array_equal(full.states, full.coordinates)
+    np.testing.assert_array_equal(dataset["error"], np.arange(6.0))
 
 
 class Declared(SimpleNamespace):
