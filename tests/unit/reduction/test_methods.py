@@ -69,17 +69,6 @@ def test_full_rank_equals_full_order(
     )
 
 
-def test_pod_of_a_rich_maneuver_is_exact_at_rank_eight(model: AlgebraicModel) -> None:
-    maneuver = two_way_travel()
-    reduced = fitted(model, maneuver, "pod", rank=8, snapshots=40)
-    # Two degrees of freedom, but a curved surface: it fills all eight coordinates.
-    assert reduced.effective_rank == 8
-    run = reduced.simulate(maneuver, model.starts[0])
-    np.testing.assert_allclose(
-        run.coordinates, model.simulate(maneuver).coordinates, rtol=0, atol=1e-10
-    )
-
-
 def test_snapshots_are_hit_where_they_span_the_subspace(
     model: AlgebraicModel, nominal: Maneuver
 ) -> None:

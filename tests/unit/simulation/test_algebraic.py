@@ -14,11 +14,8 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 
 
-def test_reach_is_that_of_the_specification(model: AlgebraicModel) -> None:
+def test_reach_is_that_of_the_specification_and_can_be_reached(model: AlgebraicModel) -> None:
     assert model.reach() == pytest.approx((-0.2145, 0.2965), abs=1e-3)
-
-
-def test_limits_of_reach_can_be_reached(model: AlgebraicModel) -> None:
     for limit in model.reach():
         q = model.solve([limit, 0.0])
         assert np.abs(model.residual(q, [limit, 0.0])).max() < 1e-12

@@ -115,27 +115,6 @@ def test_a_body_on_an_arm_on_a_slide_moves_as_its_position_changes(rng):
         assert_moves(found, rate(place)(0), second(place), first, accelerations)
 
 
-def test_a_prescribed_slide_adds_to_velocity_and_acceleration_alone(rng):
-    """Rack: its motion is no speed of its own, it is in value and bias."""
-    tape, (angle, speed, moved, accelerated) = Tape(), real("angle speed moved accelerated")
-    lever = g.rotate_about_axis(tape, exact([0.2, 0.7, -0.1]), exact(Z), angle)
-    base = m.Motion(g.vector((0, moved, 0)), {}, g.vector((0, accelerated, 0)))
-    motion = carried(tape, base, along(free_rate(3, speed), exact(Z)), lever)
-    assert set(motion.columns) == {3}
-    turn, rack = history(rng), history(rng)
-    at, first, accelerations = at_zero([turn, rack])
-    value, columns, bias = moving(tape, [angle, speed, moved, accelerated], motion, 4)(
-        at[0], first[0], first[1], accelerations[1]
-    )
-
-    def place(t):
-        return column([0, rack(t), 0]) + turned(Z, turn(t)) * column([0.2, 0.7, -0.1])
-
-    np.testing.assert_allclose(value, floats(rate(place)(0)), atol=1e-14)
-    reached = columns[:, 3] * accelerations[0] + bias
-    np.testing.assert_allclose(reached, floats(second(place)), atol=1e-13)
-
-
 # Angles that follow from two other coordinates.
 s, r = real("s r")
 BOUND = (0.7 * sp.sin(1.3 * s) * r, s**2 - 0.4 * s + r**3, sp.cos(r - s) + sp.exp(s / 3))
