@@ -117,12 +117,12 @@ def test_exponential_at_all_sizes_and_beyond_the_range_of_floats(rng):
             assert exponential.exp(number) == pytest.approx(result[0], rel=5e-16)
 
 
-def test_arctangent_and_sine_alone_are_those_of_the_batches(rng):
+def test_arctangent_and_sine_alone_at_all_sizes(rng):
     lines = "    s, c = sincos_one(_x[0])\n" + "".join(
         f"    _result[{k}] = {value}\n" for k, value in enumerate(("s", "c", "atan(_x[0])"))
     )
     kernel, result = compiled(f"def alone(_x, _result):\n{lines}"), np.empty(3)
-    for x in (*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), -0.0, 5e-324):
+    for x in (*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), -0.0, 5e-324, math.nan):
         kernel(np.array([x]), result)
         expected = [math.sin(x), math.cos(x), math.atan(x)]
         np.testing.assert_allclose(result, expected, rtol=5e-16, atol=1e-15)

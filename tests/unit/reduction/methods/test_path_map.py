@@ -16,9 +16,7 @@ START = "equilibrium"
 
 
 def mapped(model: AlgebraicModel, maneuver: Maneuver, **settings: object) -> PathMapModel:
-    reduced = fitted(model, maneuver, "path_map", **settings)
-    assert isinstance(reduced, PathMapModel)
-    return reduced
+    return fitted(model, maneuver, "path_map", **settings)
 
 
 def travelling(signal, maneuver: Maneuver) -> Maneuver:
@@ -147,7 +145,6 @@ def test_leaving_the_training_is_said_with_time_and_place(
     outside = np.abs(run.inputs[:, column]) > 1.01 * [0.12, 0.036][column]
     first = int(np.flatnonzero(outside)[0])
     assert run.status == "untrusted"
-    assert run.trust is not None
     assert run.trust.until == run.time[first]
     assert run.trust.indicator == pytest.approx(1.25 / 1.01, rel=1e-4)
     name = "z" if column == 0 else "s0"
@@ -171,7 +168,6 @@ def test_the_edge_of_training_is_known_and_beyond_it_nothing(
 ) -> None:
     reduced = mapped(model, nominal)
     run = reduced.simulate(nominal, START)
-    assert run.trust is not None
     assert run.trust.indicator == pytest.approx(1.0 / 1.01, abs=1e-5)
     assert (run.trust.until, run.trust.reason) == (np.inf, "")
     assert reduced.simulate(nominal.perturbed(1.0, 1.01 - 1e-6), START).status == "ok"
@@ -182,7 +178,6 @@ def test_the_edge_of_training_is_known_and_beyond_it_nothing(
     moved = reduced.simulate(aside, START)
     assert moved.status == "untrusted"
     assert "s0 1e-06 m" in moved.message
-    assert moved.trust is not None
     assert moved.trust.until == 5.0
 
 
