@@ -104,12 +104,6 @@ def test_broken_method_is_named(instead, alter, message: str) -> None:
         contracts.check_method("replay", KINEMATIC[0])
 
 
-UNKNOWN = (
-    TimingCase("baseline", "a", "full_order"),
-    TimingCase("strongest", "b", "no_such_method"),
-)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

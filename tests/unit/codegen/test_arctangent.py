@@ -4,7 +4,6 @@ import math
 
 import mpmath as mp
 import numpy as np
-import pytest
 
 from vehiclemor.codegen.arctangent import TAN_3_PI_8, atan
 
@@ -33,13 +32,10 @@ def test_arctangent_is_as_accurate_as_it_says(rng):
     assert max(errors) < 2.3e-16
 
 
-@pytest.mark.parametrize("x", [0.0, math.inf, -math.inf, 1e308, -1e308, 5e-324])
-def test_arctangent_of_special_values(x):
+def test_arctangent_of_special_values():
     with np.errstate(all="ignore"):
-        assert float(atan(np.float64(x))) == math.atan(x)
-
-
-def test_arctangent_of_no_number_is_none():
+        for x in (0.0, math.inf, -math.inf, 1e308, -1e308, 5e-324):
+            assert float(atan(np.float64(x))) == math.atan(x)
     assert math.isnan(atan(math.nan))
 
 

@@ -31,7 +31,7 @@ from vehiclemor.simulation.paths import PATH_LOOPS
 PACKAGE = Path(cache.__file__).parents[1]
 FLIPS = 200
 NAME = "kernels/some-0123.o"
-OTHERS = "other users can write it, see chmod go-w"
+OTHERS = "other users can write it"
 
 
 @pytest.fixture
@@ -76,41 +76,22 @@ def test_what_is_whole_is_made_once(folder, fetch, made, caplog):
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
-def test_every_single_flipped_bit_is_named_and_repaired(folder, fetch, made, caplog):
+def test_every_single_flipped_bit_and_every_other_length_is_repaired(folder, fetch, made, caplog):
     fetch()
     path = folder / NAME
     whole = path.read_bytes()
-    for bit in range(8 * len(whole)):
-        path.write_bytes(flipped(whole, bit))
+    hashed, content = whole[:64], whole[65:]
+    others = [b"", whole[: len(whole) // 2], hashed, whole[:-1], whole + b" ", content]
+    damaged = [*others, *(flipped(whole, bit) for bit in range(8 * len(whole)))]
+    for damage in damaged:
+        path.write_bytes(damage)
         assert fetch() == b"some content"
         assert path.read_bytes() == whole
         (record,) = caplog.records
-        assert record.getMessage() == f"{path} is made again: the file is damaged"
+        assert str(path) in record.getMessage()
         assert record.levelno == logging.WARNING
         caplog.clear()
-    assert len(made) == 1 + 8 * len(whole)
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda _: b"",
-        lambda whole: whole[: len(whole) // 2],
-        lambda whole: whole[:64],
-        lambda whole: whole[:-1],
-        lambda whole: whole + b" ",
-        lambda whole: whole.split(b"\n", 1)[1],
-    ],
-    ids=["empty", "half", "hash alone", "last byte gone", "one byte more", "no hash"],
-)
-def test_a_file_of_another_length_is_made_again(folder, fetch, made, caplog, damage):
-    fetch()
-    path = folder / NAME
-    whole = path.read_bytes()
-    path.write_bytes(damage(whole))
-    assert fetch() == b"some content"
-    assert (len(made), path.read_bytes()) == (2, whole)
-    assert len(caplog.records) == 1
+    assert len(made) == 1 + len(damaged)
 
 
 def test_a_whole_file_under_another_name_is_refused(folder, fetch, made):
@@ -120,50 +101,47 @@ def test_a_whole_file_under_another_name_is_refused(folder, fetch, made):
     assert len(made) == 2
 
 
-@pytest.mark.parametrize("mode", [0o666, 0o620, 0o602])
-def test_a_file_that_others_can_write_is_refused(folder, fetch, made, caplog, mode):
-    fetch()
-    path = folder / NAME
-    path.chmod(mode)
-    assert fetch() == b"some content"
-    assert len(made) == 2
-    assert caplog.messages == [f"{path} is made again: {OTHERS}"]
-    assert stat.S_IMODE(path.stat().st_mode) == 0o600
-    fetch()
-    assert len(made) == 2
-
-
 needs_root = pytest.mark.skipif(
     not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away"
 )
 
 
-@needs_root
-def test_a_file_of_another_user_is_refused(folder, fetch, made, caplog):
+def opened(mode: int) -> Callable[[Path], None]:
+    return lambda path: path.chmod(mode)
+
+
+def given_away(path: Path) -> None:
+    os.chown(path, 12345, -1)
+
+
+WRITABLE = [(opened(mode), OTHERS) for mode in (0o666, 0o620, 0o602)]
+FOREIGN = pytest.param(given_away, "it belongs to another user", marks=needs_root)
+
+
+@pytest.mark.parametrize(("change", "reason"), [*WRITABLE, FOREIGN])
+def test_a_file_that_others_can_write_is_made_again(folder, fetch, made, caplog, change, reason):
     fetch()
-    os.chown(folder / NAME, 12345, -1)
+    path = folder / NAME
+    change(path)
     assert fetch() == b"some content"
+    (message,) = caplog.messages
+    assert str(path) in message
+    assert reason in message
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert path.stat().st_uid == os.geteuid()
+    fetch()
     assert len(made) == 2
-    assert caplog.messages == [f"{folder / NAME} is made again: it belongs to another user"]
-    assert (folder / NAME).stat().st_uid == os.geteuid()
 
 
-@needs_root
-def test_a_folder_of_another_user_is_refused(folder, caplog):
+@pytest.mark.parametrize(("change", "reason"), [*WRITABLE, FOREIGN])
+def test_a_folder_that_others_can_write_is_not_used(folder, fetch, caplog, change, reason):
     folder.mkdir()
-    os.chown(folder, 12345, -1)
-    assert cache_folder() != folder
-    assert "(it belongs to another user): every process compiles for itself" in caplog.text
-
-
-@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
-def test_a_folder_that_others_can_write_is_refused(folder, fetch, caplog, mode):
-    folder.mkdir()
-    folder.chmod(mode)
+    change(folder)
+    folder.chmod(folder.stat().st_mode | 0o700)
     assert fetch() == b"some content"
-    assert caplog.messages == [
-        f"cache {folder} is not used ({OTHERS}): every process compiles for itself"
-    ]
+    (message,) = caplog.messages
+    assert str(folder) in message
+    assert reason in message
     assert not list(folder.iterdir())
     # What stands in for it is this user's alone, the same for all of the process.
     instead = cache_folder()
@@ -194,18 +172,16 @@ def folder_of_all(folder: Path, fetch: Callable[..., bytes]) -> None:
 
 
 def folder_of_another(folder: Path, fetch: Callable[..., bytes]) -> None:
-    os.chown(other_files(folder, fetch).rename(folder / "kernels"), 12345, -1)
+    given_away(other_files(folder, fetch).rename(folder / "kernels"))
 
 
 @pytest.mark.parametrize(
     ("plant", "told"),
     [
-        (linked_file, f"{NAME} is made again: it is a link"),
-        (linked_folder, "kernels is not used (it is a link): every process compiles for itself"),
-        (folder_of_all, f"kernels is not used ({OTHERS}): every process compiles for itself"),
-        pytest.param(
-            folder_of_another, "kernels is not used (it belongs to another user)", marks=needs_root
-        ),
+        (linked_file, "it is a link"),
+        (linked_folder, "it is a link"),
+        (folder_of_all, OTHERS),
+        pytest.param(folder_of_another, "it belongs to another user", marks=needs_root),
     ],
 )
 def test_what_others_may_have_planted_on_the_way_is_not_read(
@@ -267,8 +243,7 @@ def test_without_space_a_temporary_folder_keeps_what_is_made(
         assert fetch("kernels/other-0.o") == b"some content"
     assert len(made) == 2
     (message,) = caplog.messages
-    assert message.startswith("what is compiled is kept until this process ends: ")
-    assert message.endswith("can't be written (No space left on device)")
+    assert "No space left on device" in message
     assert len(list(tmp_path.glob("vehiclemor-*/kernels/*.o"))) == 2
 
 
@@ -288,8 +263,7 @@ def test_a_process_that_goes_elsewhere_keeps_its_cache(tmp_path, monkeypatch, fe
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("VEHICLEMOR_CACHE", "relative")
     fetch()
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path / "elsewhere")
+    monkeypatch.chdir(tmp_path.parent)
     fetch()
     assert len(made) == 1
     assert cache_folder() == tmp_path / "relative"
@@ -357,7 +331,7 @@ def test_flipped_bits_in_cached_code_give_no_wrong_number(
         for result, wanted in zip(found, expected[:-1], strict=True):
             np.testing.assert_array_equal(result, wanted)
         assert derived == expected[-1]
-        assert caplog.messages == [f"{path} is made again: the file is damaged"]
+        assert [str(path) in message for message in caplog.messages] == [True]
         assert path.read_bytes() == contents[path]
         caplog.clear()
 
@@ -379,9 +353,7 @@ def test_planted_files_are_refused(folder, caplog):
     digest, content = path.read_bytes().split(b"\n", 1)
     path.write_bytes(digest + b"\n" + content.replace(b"_result[0]", b"_result[1]"))
     assert derivation.derivation("standard_problems", standard_problems.derive) == standard
-    assert [message.rpartition(": ")[2] for message in caplog.messages] == [
-        "the file is damaged"
-    ] * 2
+    assert len(caplog.messages) == 2
 
 
 def test_nothing_is_read_that_could_run_code():

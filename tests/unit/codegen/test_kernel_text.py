@@ -1,8 +1,5 @@
 """Generated sources compute what the expressions say, in exactly the counted operations."""
 
-import math
-from typing import ClassVar
-
 import mpmath as mp
 import numpy as np
 import pytest
@@ -87,72 +84,6 @@ def test_operation_counts_of_expressions_counted_by_hand(
 ) -> None:
     counts = operation_counts(reference_source(program_of(expression)))["f"]
     assert counts == dict.fromkeys(OPERATIONS, 0) | expected | {"total": sum(expected.values())}
-
-
-class Counted:
-    """A number that counts the operations done with it."""
-
-    tally: ClassVar[dict[str, int]] = {}
-
-    def __init__(self, value: float) -> None:
-        self.value = value
-
-    @classmethod
-    def count(cls, kind: str, value: float) -> "Counted":
-        cls.tally[kind] = cls.tally.get(kind, 0) + 1
-        return cls(value)
-
-    def __add__(self, other: object) -> "Counted":
-        return self.count("add", self.value + getattr(other, "value", other))
-
-    def __sub__(self, other: object) -> "Counted":
-        return self.count("add", self.value - getattr(other, "value", other))
-
-    def __rsub__(self, other: float) -> "Counted":
-        return self.count("add", other - self.value)
-
-    def __mul__(self, other: object) -> "Counted":
-        return self.count("multiply", self.value * getattr(other, "value", other))
-
-    def __truediv__(self, other: "Counted") -> "Counted":
-        return self.count("divide", self.value / other.value)
-
-    def __rtruediv__(self, other: float) -> "Counted":
-        return self.count("divide", other / self.value)
-
-    def __neg__(self) -> "Counted":
-        return self.count("negate", -self.value)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-
-class CountingMath:
-    """Stands for the module `math`."""
-
-    def __getattr__(self, name: str):
-        kind = "sqrt" if name == "sqrt" else "trigonometric"
-        return lambda *a: Counted.count(kind, getattr(math, name)(*(v.value for v in a)))
-
-
-@pytest.mark.parametrize(
-    "name", ["constants", "residual", "residual_jacobian", "newton_step", "outputs"]
-)
-def test_operation_counts_of_the_model_are_those_of_a_run(
-    model: AlgebraicModel, program: Program, name: str
-) -> None:
-    namespace: dict = {}
-    exec(reference_source(program), namespace)  # noqa: S102 - our own source
-    namespace["math"] = CountingMath()
-    constants, parameters = (
-        [Counted(v) for v in values] for values in (model.constants, model.parameters.flat())
-    )
-    q, u = [Counted(v) for v in model.design + 0.1], [Counted(0.05), Counted(0.01)]
-    arguments = (parameters,) if name == "constants" else (q, u, constants)
-    Counted.tally = {}
-    namespace[name](*arguments, None, {})
-    counts = model.operation_counts[name]
-    assert {kind: n for kind, n in counts.items() if n and kind != "total"} == Counted.tally
-    assert counts["total"] == sum(Counted.tally.values())
 
 
 def test_each_angle_of_the_model_is_evaluated_once(model: AlgebraicModel) -> None:

@@ -8,12 +8,11 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from llvmlite import ir
-from numba import njit
 
 from tests.unit.programs import run
-from vehiclemor.codegen import arctangent, exponential, sincos
+from vehiclemor.codegen import exponential
 from vehiclemor.codegen.kernel_statements import KernelText
-from vehiclemor.codegen.kernel_text import kernel_source, reference_source
+from vehiclemor.codegen.kernel_text import kernel_source
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.weighted_sums import padded
@@ -106,30 +105,27 @@ def test_batches_with_and_without_padding(count, function):
     np.testing.assert_allclose(result_of(program, values), expected, rtol=1e-13, atol=1e-15)
 
 
-@pytest.mark.parametrize("function", ["exp", "atan", "sincos"])
-def test_elementary_functions_at_all_sizes(function, rng):
-    call = {"exp": "math.exp(_x[0])", "atan": "atan(_x[0])", "sincos": "a"}[function]
-    first = "    a, b = sincos_one(_x[0])\n" if function == "sincos" else ""
-    kernel = compiled(f"def {function}_one(_x, _result):\n{first}    _result[0] = {call}\n")
-    plain = {"exp": math.exp, "atan": math.atan, "sincos": math.sin}[function]
-    text = {"exp": exponential.exp, "atan": arctangent.atan, "sincos": sincos.sincos}[function]
-    numbers = [*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), 0.0, -0.0, 5e-324]
-    result = np.empty(1)
-    for number in numbers:
-        kernel(np.array([number]), result)
-        assert result[0] == pytest.approx(plain(number), rel=5e-16, abs=1e-15)
-        assert result[0] == pytest.approx(np.ravel(text(number))[0], rel=5e-16, abs=1e-15)
-    kernel(np.array([np.nan]), result)
-    assert np.isnan(result[0])
-
-
-def test_exponential_beyond_the_range_of_floats():
+def test_exponential_at_all_sizes_and_beyond_the_range_of_floats(rng):
     kernel = compiled("def edge(_x, _result):\n    _result[0] = math.exp(_x[0])\n")
-    result = np.empty(1)
-    for number in (-np.inf, -1e300, -746.0, -740.0, -708.5, 709.7, 711.0, 1e300, np.inf):
+    result, numbers = np.empty(1), [*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), 0.0]
+    numbers += [-np.inf, -1e300, -746.0, -740.0, -708.5, 709.7, 711.0, 1e300, np.inf, np.nan]
+    for number in numbers:
         kernel(np.array([number]), result)
         with np.errstate(all="ignore"):
             np.testing.assert_allclose(result[0], np.exp(number), rtol=1e-15, atol=5e-324)
+        if abs(number) <= 700.0:
+            assert exponential.exp(number) == pytest.approx(result[0], rel=5e-16)
+
+
+def test_arctangent_and_sine_alone_at_all_sizes(rng):
+    lines = "    s, c = sincos_one(_x[0])\n" + "".join(
+        f"    _result[{k}] = {value}\n" for k, value in enumerate(("s", "c", "atan(_x[0])"))
+    )
+    kernel, result = compiled(f"def alone(_x, _result):\n{lines}"), np.empty(3)
+    for x in (*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), -0.0, 5e-324, math.nan):
+        kernel(np.array([x]), result)
+        expected = [math.sin(x), math.cos(x), math.atan(x)]
+        np.testing.assert_allclose(result, expected, rtol=5e-16, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -174,20 +170,6 @@ def test_arrays_of_another_kind_are_refused():
     for wrong in (np.empty((1, 1)), np.empty(0), result):
         with pytest.raises(TypeError, match="first: result must be a C-contiguous"):
             kernel(np.zeros(2), wrong)
-
-
-def test_equal_to_what_the_compiler_makes_of_the_text():
-    results = [sp.sin(x) * y / x + p, sp.cos(x) - sp.atan(y) * sp.sin(y), sp.atan(x), x - y * p]
-    program = assemble(Tape(), {"q": [x, y]}, [p], {"f": (results, (4,))})
-    namespace: dict = {"math": math}
-    exec(reference_source(program), namespace)  # noqa: S102 - the package's own source
-    constants, result = np.empty(len(program.constant_symbols)), np.empty(len(results))
-    nothing = np.zeros(0)
-    njit(namespace["constants"])(np.array([0.6]), nothing, constants)
-    njit(namespace["f"])(np.array([1.7, 2.3]), constants, nothing, result)
-    np.testing.assert_allclose(
-        result_of(program, {x: 1.7, y: 2.3, p: 0.6}), result, rtol=1e-14, atol=1e-15
-    )
 
 
 @pytest.mark.parametrize("targets", [1, 4, 5, 11])

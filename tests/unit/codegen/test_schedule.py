@@ -67,9 +67,6 @@ def test_independent_calls_share_one_batch():
     assert batches == [Batch("atan", tuple(x))]
 
 
-# Arctangent
-
-
 def test_the_same_quantity_of_all_wheels_stands_side_by_side():
     a, b, slips, angles, assignments = *sp.symbols("a b"), [], [], []
     for wheel in range(4):

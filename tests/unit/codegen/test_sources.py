@@ -8,8 +8,24 @@ from types import SimpleNamespace
 import pytest
 
 from vehiclemor.codegen.cache import source_digest
+from vehiclemor.codegen.derivation import derivation
 
 EQUATIONS = "def derive():\n    return {}\n"
+PLUG_IN = """
+import sympy as sp
+
+from vehiclemor.symbolic.program import assemble
+from vehiclemor.symbolic.tape import Tape
+
+calls = 0
+
+def derive():
+    global calls
+    calls += 1
+    x, p = sp.symbols("x p", real=True)
+    results = {{"derivative": ([{} * p * x], (1,))}}
+    return assemble(Tape(), {{"x": [x]}}, [p], results)
+"""
 
 
 @pytest.fixture
@@ -63,3 +79,15 @@ def test_an_object_counts_by_the_source_of_its_functions(fresh):
         return SimpleNamespace(derive=module.derive)
 
     assert digest(component(1)) != digest(component(22))
+
+
+def test_a_plug_in_whose_source_has_changed_is_derived_again(fresh, tmp_path, monkeypatch):
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path / "cache"))
+    sources = {}
+    # Source of equal length written within a second would be taken from Python's own cache.
+    for factor in (3, 71, 3):
+        module = fresh("tiny_plug_in", {"tiny_plug_in.py": PLUG_IN.format(factor)})
+        found = derivation("tiny", module.derive).source
+        assert module.calls == (0 if factor in sources else 1)
+        assert sources.setdefault(factor, found) == found
+    assert sources[3] != sources[71]

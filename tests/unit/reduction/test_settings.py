@@ -50,36 +50,36 @@ def test_a_default_is_at_most_the_number_of_coordinates_where_it_says_so() -> No
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "message"),
+    ("name", "value", "words"),
     [
-        ("rank", 0, "m: rank is 0; it must be at least 1"),
-        ("rank", 2.5, "m: rank is 2.5, not an integer"),
-        ("rank", "3", "m: rank is '3', not an integer"),
-        ("rank", True, "m: rank is True, not an integer"),
-        ("rank", None, "m: rank is None, not an integer"),
-        ("rank", float("nan"), "m: rank is nan, not finite"),
-        ("period", 0.0, "m: period is 0; it must be above 0"),
-        ("period", -1, "m: period is -1; it must be above 0"),
-        ("period", float("inf"), "m: period is inf, not finite"),
-        ("period", "long", "m: period is 'long', not a number"),
-        ("mode", "quick", "m: mode is 'quick'; allowed: fast, slow"),
-        ("mode", 1, "m: mode is 1; allowed: fast, slow"),
-        ("label", 1, "m: label is 1; allowed: text"),
-        ("order", "{left}", "m: order is '{left}'; allowed: up, down"),
-        ("share", 2, "m: share is 2; it must be at most 1"),
-        ("rang", 3, "unknown setting of m 'rang'; did you mean rank?"),
+        ("rank", 0, "rank is 0.*at least 1"),
+        ("rank", 2.5, "rank is 2.5, not an integer"),
+        ("rank", "3", "rank is '3', not an integer"),
+        ("rank", True, "rank is True, not an integer"),
+        ("rank", None, "rank is None, not an integer"),
+        ("rank", float("nan"), "rank is nan, not finite"),
+        ("rank", -(10**400), "rank"),
+        ("period", 0.0, "period is 0.*above 0"),
+        ("period", -1, "period is -1.*above 0"),
+        ("period", float("inf"), "period is inf, not finite"),
+        ("period", "long", "period is 'long', not a number"),
+        ("mode", "quick", "mode is 'quick'.*fast, slow"),
+        ("mode", 1, "mode is 1.*fast, slow"),
+        ("label", 1, "label is 1.*text"),
+        ("order", "{left}", "order is '{left}'.*up, down"),
+        ("share", 2, "share is 2.*at most 1"),
+        ("rang", 3, "'rang'.*did you mean rank"),
     ],
 )
-def test_wrong_setting_is_one_line(name: str, value: object, message: str) -> None:
-    with pytest.raises(InputError) as error:
+def test_wrong_setting_is_named_with_what_is_allowed(name: str, value: object, words: str) -> None:
+    with pytest.raises(InputError, match=words):
         validated(declared(), "ode", {name: value})
-    assert str(error.value) == message
 
 
 def test_wrong_preset_is_caught_too() -> None:
     with pytest.raises(InputError, match="rank is 0"):
         validated(declared(mine={"rank": 0}), "ode", {}, "mine")
-    with pytest.raises(InputError, match="unknown preset of m 'mime'; did you mean mine"):
+    with pytest.raises(InputError, match="'mime'; did you mean mine"):
         validated(declared(mine={}), "ode", {}, "mime")
 
 
@@ -91,12 +91,4 @@ def test_allowed_numbers_pass_with_their_declared_type(rank: int, period: float)
     assert settings.period == period
     assert type(settings.period) is float
     assert type(validated(declared(), "ode", {"period": 2}).period) is float
-
-
-def test_integer_beyond_all_floats_is_one_line() -> None:
-    with pytest.raises(InputError):
-        validated(declared(), "ode", {"rank": -(10**400)})
-
-
-def test_numpy_integers_are_integers() -> None:
-    assert validated(declared(), "ode", {"rank": np.int64(4)}).rank == 4
+    assert validated(declared(), "ode", {"rank": np.int64(rank)}).rank == rank

@@ -42,19 +42,14 @@ def test_a_run_has_the_histories_of_its_trajectory(
     for name in ("time", "inputs", "states", "outputs"):
         np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
     assert run.outputs is run.outputs
-    with pytest.raises(AttributeError, match="a training run has no rank"):
+    with pytest.raises(AttributeError, match="rank"):
         _ = run.rank
 
 
-@pytest.mark.parametrize(
-    ("policy", "message"),
-    [("set", "needs training_set"), ("nomnal", "unknown training .* did you mean nominal")],
-)
-def test_wrong_policy_is_one_line(
-    model: AlgebraicModel, nominal: Maneuver, policy: str, message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        training_runs(model, nominal, policy)
+def test_wrong_policy_is_named(model: AlgebraicModel, nominal: Maneuver) -> None:
+    for policy, words in (("set", "training_set"), ("nomnal", "did you mean nominal")):
+        with pytest.raises(InputError, match=words):
+            training_runs(model, nominal, policy)
 
 
 def test_snapshots_of_several_runs_are_put_side_by_side(

@@ -14,11 +14,8 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 
 
-def test_reach_is_that_of_the_specification(model: AlgebraicModel) -> None:
+def test_reach_is_that_of_the_specification_and_can_be_reached(model: AlgebraicModel) -> None:
     assert model.reach() == pytest.approx((-0.2145, 0.2965), abs=1e-3)
-
-
-def test_limits_of_reach_can_be_reached(model: AlgebraicModel) -> None:
     for limit in model.reach():
         q = model.solve([limit, 0.0])
         assert np.abs(model.residual(q, [limit, 0.0])).max() < 1e-12
@@ -26,17 +23,9 @@ def test_limits_of_reach_can_be_reached(model: AlgebraicModel) -> None:
 
 @pytest.mark.parametrize("height", [-0.2147, 0.2967, -3.0, 1e9])
 def test_height_out_of_reach_names_both_limits(model: AlgebraicModel, height: float) -> None:
-    with pytest.raises(UnreachableError) as error:
+    with pytest.raises(UnreachableError, match=r"-0\.2146 to 0\.2966 m") as error:
         model.solve([height, 0.0])
-    message = str(error.value)
-    assert "\n" not in message
-    assert f"height {height:.5g} m" in message
-    assert "-0.2146 to 0.2966 m" in message
-
-
-def test_time_of_an_unreachable_height_is_named(model: AlgebraicModel, nominal: Maneuver) -> None:
-    with pytest.raises(UnreachableError, match=r"at t = 7\.\d+ s"):
-        model.simulate(nominal.perturbed(amplitude=2.2))
+    assert f"{height:.5g} m" in str(error.value)
 
 
 def test_reach_depends_on_the_rack(model: AlgebraicModel) -> None:
@@ -47,9 +36,6 @@ def test_reach_depends_on_the_rack(model: AlgebraicModel) -> None:
     model.solve([between, 0.0])
     with pytest.raises(UnreachableError, match=r"rack at -0\.05 m"):
         model.solve([between, -0.05])
-
-
-def test_rack_out_of_reach_is_unreachable(model: AlgebraicModel) -> None:
     with pytest.raises(UnreachableError):
         model.solve([0.0, 0.5])
 
@@ -119,8 +105,9 @@ def test_lanes_that_fail_are_solved_sample_by_sample(
     )
     np.testing.assert_array_equal(lanes.coordinates, newton.coordinates)
     assert lanes.counts == newton.counts
-    with pytest.raises(UnreachableError, match=r"at t = 7\.\d+ s"):
-        model.simulate(nominal.perturbed(amplitude=2.2), solver="newton_lanes")
+    for solver in ("newton", "newton_lanes"):
+        with pytest.raises(UnreachableError, match=r"at t = 7\.\d+ s"):
+            model.simulate(nominal.perturbed(amplitude=2.2), solver=solver)
     # A stop is not gone beyond, though there are solutions.
     times = np.linspace(0.0, 10.0, 1001)
     low, _ = model.reach(0.05)
@@ -144,12 +131,6 @@ def test_a_run_that_diverges_tells_its_counts(
     assert (diverged.status, diverged.counts) == (run.status, run.counts)
 
 
-def test_coordinates_are_no_start(model: AlgebraicModel, nominal: Maneuver) -> None:
-    for start in (np.zeros(8), model.design, [0.0] * 8):
-        with pytest.raises(InputError, match="starts from 'equilibrium' alone"):
-            model.simulate(nominal, start=start)
-
-
 def test_runs_are_bitwise_repeatable(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory
 ) -> None:
@@ -159,61 +140,39 @@ def test_runs_are_bitwise_repeatable(
     assert again.counts == full.counts
 
 
-def test_input_that_is_not_finite_is_named(model: AlgebraicModel) -> None:
-    inputs = np.array([[0.0, 0.0], [0.1, np.nan]])
-    with pytest.raises(InputError, match=r"input s0 is not finite at t = 0\.5 s"):
-        model.solve_path(np.array([0.0, 0.5]), inputs)
+def test_wrong_inputs_of_a_path_are_named(model: AlgebraicModel) -> None:
+    times = np.array([0.0, 0.5])
+    with pytest.raises(InputError, match=r"s0 .* t = 0\.5 s"):
+        model.solve_path(times, np.array([[0.0, 0.0], [0.1, np.nan]]))
+    for shape in ((2,), (2, 1), (2, 3), (5, 2), (0, 2)):
+        with pytest.raises(InputError, match="inputs"):
+            model.solve_path(times, np.zeros(shape))
+    for wrong in ([[0.0, 1.0]], [0.0, np.nan], "abc", None):
+        with pytest.raises(InputError, match="times"):
+            model.solve_path(wrong, np.zeros((2, 2)))
 
 
 @pytest.mark.parametrize(
-    ("q", "u", "message"),
+    ("q", "u", "named"),
     [
-        (np.zeros(7), np.zeros(2), r"q has shape \(7,\), double_wishbone needs \(8,\)"),
-        (np.zeros(8), np.zeros(3), r"u has shape \(3,\), double_wishbone needs \(2,\)"),
-        (np.full(8, np.inf), np.zeros(2), r"q\[0\] is not finite"),
-        (np.zeros(8), np.array([0.0, np.nan]), r"u\[1\] is not finite"),
+        (np.zeros(7), np.zeros(2), r"\bq\b.*\(8,\)"),
+        (np.zeros(8), np.zeros(3), r"\bu\b.*\(2,\)"),
+        (np.full(8, np.inf), np.zeros(2), r"q\[0\]"),
+        (np.zeros(8), np.array([0.0, np.nan]), r"u\[1\]"),
     ],
 )
-def test_wrong_arguments_are_one_line(
-    model: AlgebraicModel, q: np.ndarray, u: np.ndarray, message: str
+def test_wrong_arguments_are_named(
+    model: AlgebraicModel, q: np.ndarray, u: np.ndarray, named: str
 ) -> None:
     for function in (model.residual, model.jacobian, model.newton_step):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError, match=named):
             function(q, u)
 
 
-@pytest.mark.parametrize(
-    "times",
-    [[], [0.0, 2.0, 1.0], [0.0, 11.0], [-1.0, 0.0], [0.0, np.nan], 1.0, [[0.0, 1.0]], "abc"],
-)
-def test_wrong_output_times_are_one_line(model: AlgebraicModel, nominal: Maneuver, times) -> None:
-    with pytest.raises(InputError, match="output times"):
-        model.simulate(nominal, times=times)
-
-
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x"])
-def test_a_tolerance_that_means_nothing_is_one_line(model, nominal, tolerance) -> None:
+def test_a_tolerance_that_means_nothing_is_refused(model, nominal, tolerance) -> None:
     with pytest.raises(InputError, match="tolerance"):
         model.simulate(nominal, tolerance=tolerance)
-
-
-@pytest.mark.parametrize("shape", [(2,), (2, 1), (2, 3), (5, 2), (0, 2)])
-def test_inputs_of_another_shape_are_one_line(model: AlgebraicModel, shape) -> None:
-    with pytest.raises(InputError, match="inputs have shape"):
-        model.solve_path(np.zeros(2), np.zeros(shape))
-
-
-@pytest.mark.parametrize("times", [[[0.0, 1.0]], [0.0, np.nan], "abc", None])
-def test_times_that_are_none_are_one_line(model: AlgebraicModel, times) -> None:
-    with pytest.raises(InputError, match="times"):
-        model.solve_path(times, np.zeros((2, 2)))
-
-
-@pytest.mark.parametrize("path", [None, 1.0, "abc", np.zeros(8), np.zeros((2, 3))])
-def test_a_path_of_another_shape_is_one_line(model: AlgebraicModel, path) -> None:
-    for function in (model.outputs_at, model.residual_at):
-        with pytest.raises(InputError, match="states"):
-            function(path, np.zeros((2, 2)))
 
 
 def test_strided_arguments_are_read_rightly(
@@ -226,25 +185,13 @@ def test_strided_arguments_are_read_rightly(
     np.testing.assert_array_equal(model.residual(list(column), u), model.residual(column, u))
 
 
-def test_unknown_solver_and_start_name_the_known_ones(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
-    with pytest.raises(
-        InputError, match=r"unknown solver 'newtno'; did you mean newton or newton_lanes\?"
-    ):
+def test_what_is_of_no_mechanism_is_refused(model: AlgebraicModel, nominal: Maneuver) -> None:
+    with pytest.raises(InputError, match="'newtno'"):
         model.simulate(nominal, solver="newtno")
-    with pytest.raises(InputError, match="unknown start 'dropped'; double_wishbone has"):
-        model.start("dropped")
-
-
-def test_maneuver_for_other_inputs_is_refused(model: AlgebraicModel) -> None:
-    steering = Maneuver(
-        "steer", "", lambda t, *_: np.zeros((len(t), 1)), ("delta",), 1.0, 11, lambda _: ()
-    )
-    with pytest.raises(InputError, match="gives inputs delta, double_wishbone needs z, s0"):
-        model.simulate(steering)
-
-
-def test_changing_a_start_does_not_change_the_model(model: AlgebraicModel) -> None:
-    model.start(model.starts[0])[:] = 99.0
-    assert np.abs(model.design).max() < 1.0
+    with pytest.raises(InputError, match="'dropped'"):
+        model.simulate(nominal, "dropped")
+    for start in (np.zeros(8), model.design, [0.0] * 8):
+        with pytest.raises(InputError, match="start"):
+            model.simulate(nominal, start=start)
+    with pytest.raises(InputError, match="delta"):
+        model.simulate(component("maneuver", "lane_change"))

@@ -100,31 +100,22 @@ def test_compiled_loops_read_the_polynomials(solver):
     np.testing.assert_allclose(inputs, man.at(times), rtol=0, atol=1e-10)
 
 
-def test_a_jump_has_both_its_values_at_its_time():
-    step = steered(lambda t: np.where(t < 4.0, 0.0, 0.02 + 0.01 * t), corners=(4.0,))
-    signal = signal_of(step)
-    assert value(signal, 4.0, segment=0) == pytest.approx([0.0], abs=1e-15)
-    assert value(signal, 4.0, segment=1) == pytest.approx([0.06], abs=1e-11)
-    assert value(signal, np.nextafter(4.0, 0.0)) == pytest.approx([0.0], abs=1e-15)
-
-
 @pytest.mark.parametrize("at_jump", [0.0, 0.5, 1.0])
-def test_the_value_at_the_very_time_of_a_jump_means_nothing(at_jump):
-    step = steered(lambda t: np.where(t == 4.0, at_jump, np.where(t < 4.0, 0.0, 1.0)), (4.0,))
+def test_a_jump_has_both_its_values_and_that_at_its_very_time_means_nothing(at_jump):
+    step = steered(lambda t: np.where(t == 4.0, at_jump, np.where(t < 4.0, 0.0, 0.02 * t)), (4.0,))
     signal = signal_of(step)
     assert value(signal, 4.0, segment=0) == pytest.approx([0.0], abs=1e-12)
-    assert value(signal, 4.0, segment=1) == pytest.approx([1.0], abs=1e-12)
+    assert value(signal, 4.0, segment=1) == pytest.approx([0.08], abs=1e-11)
+    assert value(signal, np.nextafter(4.0, 0.0)) == pytest.approx([0.0], abs=1e-12)
 
 
 @pytest.mark.parametrize(
     "corner",
-    [
-        pytest.param(lambda t: np.where(t < 4.1, 0.0, 0.02), id="jump"),
-        pytest.param(lambda t: 0.02 * np.abs(t - 4.1), id="corner"),
-    ],
+    [lambda t: np.where(t < 4.1, 0.0, 0.02), lambda t: 0.02 * np.abs(t - 4.1)],
+    ids=["jump", "corner"],
 )
 def test_a_corner_that_has_no_name_is_refused(corner):
-    with pytest.raises(InputError, match=r"'mine' is not smooth between t = 0 and 10 s; .*break"):
+    with pytest.raises(InputError, match=r"'mine' is not smooth"):
         signal_of(steered(corner))
     assert len(signal_of(steered(corner, corners=(4.1,))).edges) == 3
 
@@ -173,15 +164,11 @@ def test_break_points_may_lie_close_together():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_value_that_is_no_number_is_refused_with_its_time(bad):
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError, match=r"delta .* t = 7 s"):
         signal_of(steered(lambda t: np.where(t >= 7.0, bad, 0.0)))
-    assert str(error.value) == "input delta is not finite at t = 7 s"
-
-
-def test_a_single_value_that_is_no_number_is_found_between_the_probes():
     # Not at one of the thousand equidistant times, but where the polynomials are made.
     with pytest.raises(InputError, match="not finite"):
-        signal_of(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), np.nan, np.cos(t))))
+        signal_of(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), bad, np.cos(t))))
 
 
 def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():

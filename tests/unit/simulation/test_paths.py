@@ -1,5 +1,7 @@
 """What is handed to compiled loops along a path is checked, for every model and every method."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def each_model(request: pytest.FixtureRequest) -> Model:
 
 
 @pytest.mark.parametrize("function", ["outputs_at", "residual_at", "derivatives_at"])
-def test_paths_of_another_shape_or_not_finite_are_one_line(each_model, function) -> None:
+def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function) -> None:
     call = getattr(each_model, function, None)
     if call is None:
         assert (function == "residual_at") == (each_model.kind != "ae")
@@ -42,59 +44,47 @@ def test_paths_of_another_shape_or_not_finite_are_one_line(each_model, function)
         (states, np.full((5, m), np.inf)),
     ]
     for path in wrong:
-        with pytest.raises(InputError, match=r"states|inputs") as error:
+        with pytest.raises(InputError, match=r"states|inputs"):
             call(*path)
-        assert "\n" not in str(error.value)
     with pytest.raises(InputError, match=r"states\[3, 1\] is not finite"):
         call(bad, inputs)
 
 
 @pytest.mark.parametrize(
-    "times", [[], [0.0, 2.0, 1.0], [-1.0, 0.0], [0.0, np.nan], [[0.0, 1.0]], 1.0, "abc"]
+    "times",
+    [[], [0.0, 2.0, 1.0], [0.0, 1e3], [-1.0, 0.0], [0.0, np.nan], [[0.0, 1.0]], 1.0, "abc"],
 )
-def test_times_that_are_none_are_one_line(each_model, times) -> None:
+def test_times_that_are_none_are_refused(each_model, times) -> None:
     maneuver = component("maneuver", each_model.definition.maneuver)
     with pytest.raises(InputError, match="output times"):
         each_model.simulate(maneuver, times=times)
 
 
 @pytest.mark.parametrize("start", [np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0])
-def test_a_start_that_is_none_is_one_line(each_model, start) -> None:
+def test_a_start_that_is_none_is_refused(each_model, start) -> None:
     maneuver = component("maneuver", each_model.definition.maneuver)
     with pytest.raises(InputError, match="start"):
         each_model.simulate(maneuver, start=start)
 
 
-@pytest.mark.parametrize(
-    ("method", "settings"),
-    [("pod", {"rank": 3}), ("path_map", {}), ("full_order", {})],
-)
+@pytest.mark.parametrize("method", ["pod", "path_map", "full_order"])
 def test_reduced_mechanisms_check_their_inputs(
-    model: AlgebraicModel, nominal: Maneuver, method: str, settings: dict
+    model: AlgebraicModel, nominal: Maneuver, method: str
 ) -> None:
-    reduced = fitted(model, nominal, method, **settings)
-    steering = Maneuver(
-        "steer", "", lambda t, *_: np.zeros((len(t), 1)), ("delta",), 1.0, 11, lambda _: ()
-    )
-    for maneuver in (steering, Maneuver(**(vars(nominal) | {"signal": steering.signal}))):
-        with pytest.raises(InputError, match=r"gives (inputs delta|an array of shape)"):
+    reduced = fitted(model, nominal, method)
+    steering = component("maneuver", "lane_change")
+    for maneuver in (steering, replace(nominal, signal=lambda t, *_: np.zeros((len(t), 1)))):
+        with pytest.raises(InputError, match=r"delta|shape"):
             reduced.simulate(maneuver, "equilibrium")
 
 
-@pytest.mark.parametrize(
-    ("method", "settings"),
-    [
-        ("pod", {"rank": 3}),
-    ],
-)
-def test_reduced_mechanisms_that_diverge_tell_their_counts(
-    model: AlgebraicModel, nominal: Maneuver, method: str, settings: dict
+def test_a_reduced_mechanism_that_diverges_tells_its_counts(
+    model: AlgebraicModel, nominal: Maneuver
 ) -> None:
-    reduced = fitted(model, nominal, method, **settings)
+    reduced = fitted(model, nominal, "pod", rank=3)
     run = reduced.simulate(nominal.perturbed(amplitude=4.0), "equilibrium")
     assert run.status == "diverged"
     solved = int(np.isfinite(run.coordinates[:, 0]).sum())
     assert solved > 100
     assert run.counts["iterations"] >= solved + 50
-    fresh = method == "pod" or settings.get("solver") == "newton"
-    assert run.counts["jacobian_evaluations"] == fresh * run.counts["iterations"]
+    assert run.counts["jacobian_evaluations"] == run.counts["iterations"]

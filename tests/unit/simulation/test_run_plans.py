@@ -10,7 +10,6 @@ import pytest
 from vehiclemor.codegen.loops import cache_lines
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Observer
 from vehiclemor.simulation.paths import path_loops
 from vehiclemor.simulation.projection_windows import whole_space
@@ -69,7 +68,6 @@ def test_threads_do_not_share_what_they_write(name):
 
 def test_a_run_keeps_its_path_until_it_gives_it_back():
     model = build("independent_suspension_vehicle")
-    assert isinstance(model, DynamicModel)
     maneuver, space = component("maneuver", "lane_change"), whole_space(28)
     own = Solver("ros34pw2", 1e-3)
 

@@ -2,11 +2,7 @@
 
 import time
 
-import pytest
-
-from vehiclemor.maneuver import sine_travel
 from vehiclemor.simulation import run_timer
-from vehiclemor.simulation.build import build
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 from vehiclemor.study.variables import variables
@@ -21,13 +17,8 @@ def test_the_clock_is_read_around_a_run(monkeypatch):
     assert timed(lambda: "done") == ("done", 5.0)
 
 
-@pytest.mark.parametrize("name", ["seconds", "seconds_median", "seconds_lower"])
-def test_stored_seconds_name_their_clock(name):
-    assert variables({name: 1.0})[name][2]["clock"] == run_timer.CLOCK
+def test_stored_seconds_name_their_clock(model, full):
+    for name in ("seconds", "seconds_median", "seconds_lower"):
+        assert variables({name: 1.0})[name][2]["clock"] == run_timer.CLOCK
     assert variables({"offline_seconds": 1.0})["offline_seconds"][2]["clock"] != run_timer.CLOCK
-
-
-def test_seconds_of_a_simulation_name_their_clock():
-    model = build("double_wishbone")
-    dataset = trajectory_dataset(model, model.simulate(sine_travel))
-    assert dataset["seconds"].attrs["clock"] == run_timer.CLOCK
+    assert trajectory_dataset(model, full)["seconds"].attrs["clock"] == run_timer.CLOCK

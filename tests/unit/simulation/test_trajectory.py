@@ -1,20 +1,18 @@
 """Trajectories become labelled datasets with units, and errors are measured as named."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from vehiclemor.metrics import max_abs, rms, signal_range
-from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import (
     ALGEBRAIC_COUNTS,
     DYNAMIC_COUNTS,
     Trajectory,
 )
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+from vehiclemor.steering_maneuvers import lane_change
 
 
 def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: Trajectory) -> None:
@@ -40,7 +38,7 @@ def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: T
         assert dataset[name].attrs["units"]
 
 
-def test_a_plot_shows_the_unit_where_there_is_one(model: AlgebraicModel, full: Trajectory) -> None:
+def test_there_is_a_unit_where_all_have_it(model: AlgebraicModel, full: Trajectory) -> None:
     further = {"error": ("output", np.arange(6.0), {"units": "see output_unit"})}
     dataset = trajectory_dataset(model, full, further)
     assert dataset["inputs"].attrs["units"] == "m"
@@ -52,45 +50,18 @@ def test_a_plot_shows_the_unit_where_there_is_one(model: AlgebraicModel, full: T
     }.items():
         assert "units" not in dataset[name].attrs
         assert set(dataset[name][unit].values) == {"m", "rad"}
-    axis = dataset["outputs"].sel(output="toe").plot()[0].axes
-    assert axis.get_ylabel() == "outputs"
-    axis.figure.clear()
+    np.testing.assert_array_equal(dataset["error"], np.arange(6.0))
 
 
-def test_further_variables_are_added(model: AlgebraicModel, full: Trajectory) -> None:
-    dataset = trajectory_dataset(model, full, {"extra": ("output", np.arange(6.0), {"units": "1"})})
-    assert list(dataset["extra"].values) == [0, 1, 2, 3, 4, 5]
-
-
-def test_states_of_a_kinematic_model_are_its_coordinates(full: Trajectory) -> None:
-    assert full.speeds.shape == (1001, 0)
-    np.testing.assert_array_equal(full.states, full.coordinates)
-
-
-class Declared(SimpleNamespace):
-    """Stands for a model's definition, by which labels are kept."""
-
-    __hash__ = object.__hash__
-
-
-def test_speeds_and_counts_of_a_dynamic_model_are_written(
-    model: AlgebraicModel, full: Trajectory
-) -> None:
-    definition = Declared(
-        coordinates=model.definition.coordinates,
-        speeds=(Quantity("forward", "m/s", "speed to the front"),),
-        inputs=model.definition.inputs,
-        outputs=model.definition.outputs,
-    )
-    speeds = np.linspace(0.0, 1.0, 1001)[:, None]
-    run = replace(full, speeds=speeds, counts=dict.fromkeys(DYNAMIC_COUNTS, 7))
-    np.testing.assert_array_equal(run.states, np.hstack((full.coordinates, speeds)))
-    dynamic = SimpleNamespace(definition=definition, counts=DYNAMIC_COUNTS)
-    dataset = trajectory_dataset(dynamic, run)
-    forward = dataset["speeds"].sel(speed="forward")
-    np.testing.assert_array_equal(forward, speeds[:, 0])
-    assert str(forward["speed_unit"].item()) == "m/s"
-    assert int(dataset["rhs_calls"]) == 7
+def test_speeds_and_counts_of_a_dynamic_model_are_written() -> None:
+    vehicle = build("independent_suspension_vehicle")
+    run = vehicle.simulate(lane_change, times=[0.0, 0.5, 2.0])
+    dataset, name = trajectory_dataset(vehicle, run), vehicle.speeds[2]
+    speed = dataset["speeds"].sel(speed=name)
+    np.testing.assert_array_equal(speed, run.speeds[:, 2])
+    np.testing.assert_array_equal(run.states, np.hstack((run.coordinates, run.speeds)))
+    assert str(speed["speed_unit"].item()) == "m/s"
+    assert {count: int(dataset[count]) for count in DYNAMIC_COUNTS} == run.counts
     assert not set(dataset.variables) & (set(ALGEBRAIC_COUNTS) - set(DYNAMIC_COUNTS))
 
 

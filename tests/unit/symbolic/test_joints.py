@@ -30,7 +30,7 @@ from tests.unit.motions import (
 )
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
-from vehiclemor.symbolic.joints import STILL, Rate, along, carried, free_rate, successive
+from vehiclemor.symbolic.joints import Rate, along, carried, free_rate, successive
 from vehiclemor.symbolic.tape import Tape
 
 
@@ -41,37 +41,6 @@ def _many_digits():
 
 
 # Joints
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_a_slide_moves_along_its_direction(seed):
-    rng = np.random.default_rng(seed)
-    direction, slid = unit(rng), history(rng)
-    _, rates, accelerations = at_zero([slid])
-    speed = real("speed")
-    motion = along(free_rate(0, speed), exact(direction))
-    found = moving(Tape(), [speed], motion, 1)(*rates)
-
-    def place(t):
-        return slid(t) * column(direction)
-
-    assert_moves(found, rate(place)(0), second(place), rates, accelerations)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_a_turning_arm_carries_its_points_on_circles(seed):
-    rng = np.random.default_rng(seed)
-    axis, lever, angle = unit(rng), rng.uniform(-1.0, 1.0, 3), history(rng)
-    q, rates, accelerations = at_zero([angle])
-    tape, (theta, theta_dot) = Tape(), real("theta theta_dot")
-    now = g.rotate_about_axis(tape, exact(lever), exact(axis), theta)
-    motion = carried(tape, STILL, along(free_rate(0, theta_dot), exact(axis)), now)
-    found = moving(tape, [theta, theta_dot], motion, 1)(*q, *rates)
-
-    def place(t):
-        return turned(axis, angle(t)) * column(lever)
-
-    assert_moves(found, rate(place)(0), second(place), rates, accelerations)
 
 
 def carried_axes(tape: Tape, axes: Sequence, q: Sequence[sp.Symbol]) -> list[g.Vector]:
@@ -144,27 +113,6 @@ def test_a_body_on_an_arm_on_a_slide_moves_as_its_position_changes(rng):
 
         found = function(*at, *first)
         assert_moves(found, rate(place)(0), second(place), first, accelerations)
-
-
-def test_a_prescribed_slide_adds_to_velocity_and_acceleration_alone(rng):
-    """Rack: its motion is no speed of its own, it is in value and bias."""
-    tape, (angle, speed, moved, accelerated) = Tape(), real("angle speed moved accelerated")
-    lever = g.rotate_about_axis(tape, exact([0.2, 0.7, -0.1]), exact(Z), angle)
-    base = m.Motion(g.vector((0, moved, 0)), {}, g.vector((0, accelerated, 0)))
-    motion = carried(tape, base, along(free_rate(3, speed), exact(Z)), lever)
-    assert set(motion.columns) == {3}
-    turn, rack = history(rng), history(rng)
-    at, first, accelerations = at_zero([turn, rack])
-    value, columns, bias = moving(tape, [angle, speed, moved, accelerated], motion, 4)(
-        at[0], first[0], first[1], accelerations[1]
-    )
-
-    def place(t):
-        return column([0, rack(t), 0]) + turned(Z, turn(t)) * column([0.2, 0.7, -0.1])
-
-    np.testing.assert_allclose(value, floats(rate(place)(0)), atol=1e-14)
-    reached = columns[:, 3] * accelerations[0] + bias
-    np.testing.assert_allclose(reached, floats(second(place)), atol=1e-13)
 
 
 # Angles that follow from two other coordinates.
@@ -261,21 +209,13 @@ def motions(tape: Tape, travel: Travel, acceleration: g.Vector | None = None):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_point_that_moves_in_a_moving_frame_has_coriolis_acceleration(seed):
+@pytest.mark.parametrize("in_space", [False, True])
+def test_a_point_that_moves_in_a_moving_frame_has_coriolis_acceleration(seed, in_space):
+    """Of velocities in space, the frame can count gravity as acceleration."""
     travel, tape = Travel(np.random.default_rng(seed)), Tape()
-    _, point, _ = motions(tape, travel)
-    at, nu, change = travel.speeds()
-    found = moving(tape, [*JOINTS, *NU], point, 8)(*at, *nu)
-    velocity, acceleration = travel.seen(rate(travel.point)(0)), travel.seen(second(travel.point))
-    assert_moves(found, velocity, acceleration, nu, change)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_a_frame_of_velocities_in_space_can_count_gravity_as_acceleration(seed):
-    travel, tape = Travel(np.random.default_rng(seed)), Tape()
-    upwards = travel.seen(column([0, 0, mp.mpf("9.81")]))
-    _, point, _ = motions(tape, travel, exact(upwards))
-    at, nu, change = travel.speeds(in_space=True)
+    upwards = travel.seen(column([0, 0, mp.mpf("9.81") if in_space else 0]))
+    _, point, _ = motions(tape, travel, exact(upwards) if in_space else None)
+    at, nu, change = travel.speeds(in_space)
     found = moving(tape, [*JOINTS, *NU], point, 8)(*at, *nu)
     velocity = travel.seen(rate(travel.point)(0))
     acceleration = travel.seen(second(travel.point)) + upwards
@@ -297,16 +237,6 @@ def test_a_point_at_rest_in_the_frame_needs_no_relative_motion(rng):
     for motion in (still, plain):
         found = moving(tape, NU[:6], motion, 6)(*nu[:6])
         assert_moves(found, velocity, acceleration, nu[:6], change[:6])
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_a_body_that_turns_in_a_turning_frame(seed):
-    travel, tape = Travel(np.random.default_rng(seed)), Tape()
-    frame, _, turn = motions(tape, travel)
-    at, nu, change = travel.speeds()
-    found = moving(tape, [*JOINTS, *NU], frame.turning(tape, turn), 8)(*at, *nu)
-    spin = spin_of(lambda t: travel.frame(t) * travel.arm(t))
-    assert_moves(found, travel.seen(spin(0)), travel.seen(rate(spin)(0)), nu, change)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -35,7 +35,7 @@ def test_every_name_is_defined_by_earlier_ones() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_derivatives_equal_those_of_sympy_and_finite_differences(seed: int) -> None:
+def test_derivatives_equal_those_of_sympy(seed: int) -> None:
     variables = (x, y, z)
     tape, results = random_program(seed, variables)
     direct = [inlined(result, tape) for result in results]
@@ -43,26 +43,8 @@ def test_derivatives_equal_those_of_sympy_and_finite_differences(seed: int) -> N
     entries = [inlined(entry, tape) for row in jacobian for entry in row]
     at = dict(zip(variables, np.random.default_rng(seed).uniform(-1.5, 1.5, 3), strict=True))
     found = precise(entries, at).reshape(3, 3)
-
     exact = precise([e.diff(v) for e in direct for v in variables], at).reshape(3, 3)
     np.testing.assert_allclose(found, exact, rtol=1e-14, atol=1e-15)
-
-    step = 1e-5
-    for column, variable in enumerate(variables):
-        above = precise(direct, at | {variable: at[variable] + step})
-        below = precise(direct, at | {variable: at[variable] - step})
-        difference = (above - below) / (2.0 * step)
-        np.testing.assert_allclose(found[:, column], difference, rtol=1e-8, atol=1e-8)
-
-
-def test_derivative_goes_through_all_paths_of_the_chain() -> None:
-    tape = Tape()
-    a = tape.let(x * y)
-    b = tape.let(sp.sin(a))
-    [[by_x, by_y, by_z]] = tape.jacobian([a * b + x], (x, y, z))
-    assert sp.simplify(inlined(by_x, tape) - sp.diff(x * y * sp.sin(x * y) + x, x)) == 0
-    assert sp.simplify(inlined(by_y, tape) - sp.diff(x * y * sp.sin(x * y), y)) == 0
-    assert by_z == 0
 
 
 def test_derivative_expressions_do_not_grow_along_a_chain() -> None:

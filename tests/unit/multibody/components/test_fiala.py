@@ -82,24 +82,9 @@ def test_forces_are_those_of_the_cases(rng):
 @settings(max_examples=25)
 @given(kappa=slips, t=slips)
 def test_an_unloaded_tire_has_no_force(kappa, t):
-    assert tire(0.0, kappa, t) == [0.0, 0.0, 0.0]
     # No load, and no slip in one or both directions: nothing is divided by zero.
-    for still in ((0.0, 0.0), (kappa, 0.0), (0.0, t)):
-        assert tire(0.0, *still) == [0.0, 0.0, 0.0]
-
-
-@settings(max_examples=25)
-@given(load=loads)
-def test_a_tire_without_slip_carries_its_load_alone(load):
-    assert tire(load, 0.0, 0.0) == [0.0, 0.0, 0.0]
-
-
-@settings(max_examples=25)
-@given(kappa=slips, t=slips)
-def test_forces_vanish_with_the_load_without_a_jump(kappa, t):
-    fx, fy, mz = tire(1e-9, kappa, t)
-    assert max(abs(fx), abs(fy)) <= MOST * 1e-9
-    assert abs(mz) <= MOST * WIDTH * 1e-9
+    for slip in ((kappa, t), (0.0, 0.0), (kappa, 0.0), (0.0, t)):
+        assert tire(0.0, *slip) == [0.0, 0.0, 0.0]
 
 
 @settings(max_examples=25)
@@ -111,7 +96,7 @@ def test_forces_are_odd_in_their_own_slip_and_even_in_the_other(load, kappa, t):
 
 
 @settings(max_examples=25)
-@given(load=loads, kappa=slips, t=slips)
+@given(load=st.one_of(loads, st.just(1e-9)), kappa=slips, t=slips)
 def test_forces_act_against_the_sliding_and_within_friction(load, kappa, t):
     fx, fy, mz = tire(load, kappa, t)
     grip = friction(kappa, t) * load
@@ -137,70 +122,6 @@ def test_stiffnesses_are_the_slopes_without_slip(load):
     assert mz / -fy == pytest.approx(WIDTH / 3, rel=1e-7)
 
 
-@settings(max_examples=25)
-@given(load=loads, beyond=st.floats(1.0, 5.0), angle=st.floats(0.1, 1.5))
-def test_a_tire_that_slides_has_the_smallest_friction(load, beyond, angle):
-    kappa, t = beyond * np.cos(angle), beyond * np.sin(angle)
-    fx, fy, mz = tire(load, kappa, t)
-    grip = LEAST * load
-    # The longitudinal force comes near it, the lateral one reaches it.
-    assert fx == pytest.approx(grip * (1 - grip / (4 * ALONG * kappa)), rel=1e-12)
-    assert ACROSS * t > 3 * grip
-    assert fy == pytest.approx(-grip, rel=1e-13)
-    assert mz == pytest.approx(0.0, abs=1e-13 * grip)
-
-
-def crossing(f: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function that falls from positive values vanishes."""
-    assert f(low) > 0.0 > f(high)
-    for _ in range(80):
-        middle = (low + high) / 2
-        low, high = (middle, high) if f(middle) > 0.0 else (low, middle)
-    return low
-
-
-def assert_smooth(f: Callable[[float], np.ndarray], at: float, scale: float, h: float) -> None:
-    """Neither the values nor their slopes jump."""
-    left, middle, right = f(at - h), f(at), f(at + h)
-    np.testing.assert_allclose(left, middle, rtol=0, atol=20 * h * scale)
-    np.testing.assert_allclose(right, middle, rtol=0, atol=20 * h * scale)
-    # One-sided slopes to second order.
-    before = (3 * middle - 4 * left + f(at - 2 * h)) / (2 * h)
-    after = (4 * right - 3 * middle - f(at + 2 * h)) / (2 * h)
-    np.testing.assert_allclose(before, after, rtol=0, atol=2e-4 * scale)
-
-
-@settings(max_examples=25)
-@given(load=st.floats(100.0, 9000.0), t=st.floats(0.01, 0.5))
-def test_the_longitudinal_force_is_smooth_where_sliding_begins(load, t):
-    def left(kappa: float) -> float:
-        return friction(kappa, t) * load / (2 * ALONG) - kappa
-
-    at = crossing(left, 0.0, 1.0)
-    assert_smooth(
-        lambda kappa: np.array(tire(load, kappa, t)[:1]) / load, at, ALONG / load, 1e-3 * at
-    )
-
-
-@settings(max_examples=25)
-@given(load=st.floats(100.0, 9000.0), kappa=st.floats(0.01, 0.5))
-def test_lateral_force_and_moment_are_smooth_where_sliding_begins(load, kappa):
-    def left(t: float) -> float:
-        return 3 * friction(kappa, t) * load - ACROSS * t
-
-    at = crossing(left, 0.0, 1.0)
-    assert_smooth(lambda t: np.array(tire(load, kappa, t)[1:]) / load, at, ACROSS / load, 1e-4 * at)
-
-
-@settings(max_examples=25)
-@given(load=loads, angle=st.floats(0.0, 1.57))
-def test_forces_do_not_jump_where_friction_stops_falling(load, angle):
-    near, far = (
-        np.array(tire(load, s * np.cos(angle), s * np.sin(angle))) for s in (1 - 1e-9, 1 + 1e-9)
-    )
-    np.testing.assert_allclose(near, far, rtol=0, atol=1e-7 * load)
-
-
 two = sp.symbols("a b", real=True)
 tape = Tape()
 extremes = function_of(tape, two, [tires.maximum(tape, *two), tires.minimum(tape, *two)], "math")
@@ -209,16 +130,9 @@ extremes = function_of(tape, two, [tires.maximum(tape, *two), tires.minimum(tape
 @settings(max_examples=25)
 @given(a=st.floats(-1e6, 1e6), b=st.floats(-1e6, 1e6))
 def test_maximum_and_minimum_without_a_branch(a, b):
-    large, small = extremes(a, b)
     rounding = 1e-15 * max(abs(a), abs(b)) + 1e-300
-    assert large == pytest.approx(max(a, b), abs=rounding)
-    assert small == pytest.approx(min(a, b), abs=rounding)
-
-
-@settings(max_examples=25)
-@given(a=st.floats(-1e6, 1e6))
-def test_the_larger_and_the_smaller_of_equals(a):
-    assert extremes(a, a) == pytest.approx([a, a], rel=1e-15, abs=1e-300)
+    for other in (a, b):
+        assert extremes(a, other) == pytest.approx([max(a, other), min(a, other)], abs=rounding)
 
 
 # Tilted wheels

@@ -99,16 +99,9 @@ def test_the_design_position_is_that_of_the_hard_points(points, side):
     found = SIDE[side](p, design(points, side))
     for name in CARRIED:
         np.testing.assert_allclose(found[name], p[name], rtol=0, atol=1e-15)
-    same = {
-        "upper_arm_ball": "upper_ball_joint",
-        "lower_arm_ball": "lower_ball_joint",
-        "lower_arm_rear": "lower_arm_rear_pivot",
-        "lower_arm_front": "lower_arm_front_pivot",
-        "rack_end": "tie_rod_inner",
-        "rod_end": "tie_rod_outer",
-    }
-    for name, expected in same.items():
-        np.testing.assert_allclose(found[name], p[expected], rtol=0, atol=2e-16 + 1e-15)
+    # The rest follows: closed corners of rigid bodies, whose tie rod ends where it did.
+    for name, expected in (("rack_end", "tie_rod_inner"), ("rod_end", "tie_rod_outer")):
+        np.testing.assert_allclose(found[name], p[expected], rtol=0, atol=1.2e-15)
     np.testing.assert_allclose(found["gaps"], 0.0, atol=1e-15)
 
 
@@ -240,16 +233,6 @@ def dependent_blocks(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> np.nd
     return np.delete(corner_blocks(model, x, u), LOWER_ARM, axis=2)
 
 
-def growth(matrix: np.ndarray, pivots) -> float:
-    """Largest entry that elimination makes, beside the largest of the matrix."""
-    work, rows, largest = matrix.copy(), list(range(len(matrix))), np.abs(matrix).max()
-    for row, column in pivots:
-        rows.remove(row)
-        for other in rows:
-            work[other] -= work[other, column] / work[row, column] * work[row]
-    return float(np.abs(work).max() / largest)
-
-
 def test_the_reachable_range_is_that_of_a_road_car(vehicle, reached):
     heights = [
         SIDE[1](of_side(vehicle.parameters.values(), 1), x[CORNER[0]])["wheel_centre"][2]
@@ -262,17 +245,15 @@ def test_the_reachable_range_is_that_of_a_road_car(vehicle, reached):
 
 def test_pivots_of_the_vehicle_stay_away_from_zero(vehicle, reached):
     rng = np.random.default_rng(5)
-    shares, growths, smallest = [], [], []
+    shares, smallest = [], []
     for x, u in reached:
         # A stabilised corner is closed up to a millirad.
         for state in (x, x + np.concatenate([rng.uniform(-1e-3, 1e-3, 26), np.zeros(26)])):
             for block in dependent_blocks(vehicle, state, u):
                 shares.append(min(pivot_shares(block, PIVOTS)))
-                growths.append(growth(block, PIVOTS))
                 smallest.append(np.linalg.svd(block, compute_uv=False)[-1])
     # Every pivot is all but the largest of its column: no digit is lost.
     assert min(shares) > 0.9
-    assert max(growths) < 1.2
     assert min(smallest) > 0.07
 
 

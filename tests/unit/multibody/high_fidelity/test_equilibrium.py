@@ -154,64 +154,29 @@ def test_the_dropped_start_is_lifted_and_pitched(given_values):
 # Vehicles that can't stand
 
 
-def moved(name: str, *shift: float):
-    return lambda p: {name: p[name] + np.array(shift)}
-
-
 def at_another_place(**places: str):
     return lambda p: {name: p[place] for name, place in places.items()}
 
 
+def fixed(**values: object):
+    return lambda _: values
+
+
 IMPOSSIBLE = {
-    "centre of mass ahead of the front axle": (
-        moved("chassis_centre", 1.7, 0.0, 0.0),
-        "its weight lifts the rear wheels off the ground",
-    ),
-    "centre of mass behind the rear axle": (
-        moved("chassis_centre", -1.7, 0.0, 0.0),
-        "its weight lifts the front wheels off the ground",
-    ),
-    "tires pressed flat": (
-        lambda _: {"tire_stiffness": 11e3},
-        "its weight presses the front tires flat",
-    ),
-    "rear tires pressed flat": (
-        lambda _: {"tire_stiffness": 15e3, "chassis_centre": np.array([-0.9, 0.0, 0.2277])},
-        "its weight presses the rear tires flat",
-    ),
+    "front tires pressed flat": (fixed(tire_stiffness=11e3), "front tires"),
     "front spring without length": (
         at_another_place(front_spring_chassis_point="front_spring_arm_point"),
-        "the front spring has length 0",
+        "front spring",
     ),
     "rear spring without length": (
         at_another_place(rear_spring_arm_point="rear_spring_chassis_point"),
-        "the rear spring has length 0",
+        "rear spring",
     ),
-    "upper arm on one pivot": (
-        at_another_place(upper_arm_front_pivot="upper_arm_rear_pivot"),
-        "upper arm axis of length 0",
-    ),
-    "lower arm on one pivot": (
-        at_another_place(lower_arm_rear_pivot="lower_arm_front_pivot"),
-        "lower arm axis of length 0",
-    ),
-    "tie rod without length": (
-        at_another_place(tie_rod_inner="tie_rod_outer"),
-        "tie rod of length 0",
-    ),
-    "carrier without length": (
-        at_another_place(upper_ball_joint="lower_ball_joint"),
-        "wheel carrier of length 0",
-    ),
-    "ball joint on its arm's axis": (
-        lambda p: {
-            "lower_ball_joint": (p["lower_arm_rear_pivot"] + p["lower_arm_front_pivot"]) / 2
-        },
-        "lower_ball_joint lies on the axis of its arm",
-    ),
+    # As all that a linkage of its kind refuses.
+    "tie rod without length": (at_another_place(tie_rod_inner="tie_rod_outer"), "tie rod"),
     "front wheels behind the rear ones": (
         lambda p: {"rear_wheel_centre": p["front_frame_origin"] + [0.1, 0.7, 0.0]},
-        "its front wheels are not ahead of the rear",
+        "front wheels",
     ),
     "spring that pushes along its arm": (
         # In line with the arm's pivot axis: no free length turns the arm.
@@ -219,23 +184,22 @@ IMPOSSIBLE = {
             "rear_spring_arm_point": p["rear_arm_pivot"] + [-0.2, 0.0, 0.0],
             "rear_spring_chassis_point": p["rear_arm_pivot"] + [-0.4, 0.0, 0.0],
         },
-        "no free lengths of its springs hold it at its design position",
+        "free lengths",
     ),
-    "springs without stiffness": (
-        lambda _: {"front_stiffness": 1e-30},
-        "no free lengths of its springs hold it at its design position",
-    ),
+    "springs without stiffness": (fixed(front_stiffness=1e-30), "free lengths"),
+    "centre beside the midplane": (fixed(chassis_centre=[0.0, 0.3, 0.2277]), "chassis_centre"),
+    "front beside the midplane": (fixed(front_frame_origin=[1.388, -0.1, 0.1]), "front_frame"),
+    "left wheel on the right": (fixed(rear_wheel_centre=[-1.388, -0.8, 0.0]), "rear wheel"),
+    "a chassis that no mass has": (fixed(chassis_inertia=[1.0, 1.0, 1e3]), "chassis_inertia"),
+    "an arm that no mass has": (fixed(rear_arm_inertia_products=[10.0] * 3), "rear_arm_inertia"),
+    "friction that rises": (fixed(largest_friction=0.2, smallest_friction=0.9), "friction"),
 }
 
 
 @pytest.mark.parametrize(("change", "words"), IMPOSSIBLE.values(), ids=IMPOSSIBLE)
-def test_a_vehicle_that_cant_stand_is_refused_in_one_line(given_values, change, words):
-    with pytest.raises(GeometryError) as error:
+def test_a_vehicle_that_cant_be_or_cant_stand_is_refused(given_values, change, words):
+    with pytest.raises(GeometryError, match=words):
         built(**change(given_values))
-    message = str(error.value)
-    assert words in message
-    assert "\n" not in message
-    assert message.startswith(("the vehicle can't stand: ", "the geometry can't be assembled: "))
 
 
 @pytest.mark.parametrize("ahead", [True, False])
@@ -266,19 +230,3 @@ def test_the_softest_tires_that_carry_the_vehicle(given_values):
     check(given_values | {"tire_stiffness": softest * (1.0 + 1e-12)})
     with pytest.raises(GeometryError, match="presses the rear tires flat"):
         check(given_values | {"tire_stiffness": softest * (1.0 - 1e-12)})
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"chassis_centre": [0.0, 0.3, 0.2277]}, "beside the midplane"),
-        ({"front_frame_origin": [1.388, -0.1, 0.1199]}, "beside the midplane"),
-        ({"rear_wheel_centre": [-1.388, -0.7979, 0.0]}, "rear wheel lies on the right"),
-        ({"chassis_inertia": [1.0, 1.0, 1000.0]}, "no body has"),
-        ({"rear_arm_inertia_products": [10.0, 10.0, 10.0]}, "no body has"),
-        ({"largest_friction": 0.2, "smallest_friction": 0.9}, "friction falls"),
-    ],
-)
-def test_a_car_that_cant_be_is_refused(changes, words):
-    with pytest.raises(GeometryError, match=words):
-        build("high_fidelity_vehicle", overrides=changes)

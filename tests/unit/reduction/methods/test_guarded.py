@@ -1,6 +1,7 @@
 """A fast model with the full order behind it, which runs where the fast one leaves."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -41,10 +42,9 @@ class LeavesAt:
         return replace(full, status=self.status, message="why", trust=trust, **wrong)
 
 
-def whole(cache: list[Trajectory] = []) -> Trajectory:  # noqa: B006
-    if not cache:
-        cache.append(model().simulate(STEER, "dropped", tolerance=TOLERANCE))
-    return cache[0]
+@cache
+def whole() -> Trajectory:
+    return model().simulate(STEER, "dropped", tolerance=TOLERANCE)
 
 
 def model():
@@ -89,7 +89,8 @@ def test_what_the_safe_model_tells_of_itself_is_kept():
 
     safe = Doubtful(model(), "dopri5", TOLERANCE)
     run = replace(guarded(LeavesAt(2.0)), safe=safe).simulate(STEER, "dropped")
-    assert (run.status, run.message) == ("untrusted", "from t = 4 s on an arm is beyond")
+    assert run.status == "untrusted"
+    assert "an arm is beyond" in run.message
 
 
 @pytest.mark.parametrize(

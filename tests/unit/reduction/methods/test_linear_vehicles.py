@@ -23,8 +23,7 @@ VEHICLES = {
     "independent_suspension_vehicle": (lane_change, straight_ahead),
     "high_fidelity_vehicle": (rack_lane_change, rack_straight_ahead),
 }
-EVERY_MODE = {"modal_truncation": {"fastest": 1e4}}
-FOUR = {"modal_truncation": {"fastest": 45.0}}
+EVERY_MODE, FOUR = {"fastest": 1e4}, {"fastest": 45.0}
 EXACT = {"solver": "dopri5", "tolerance": 1e-9}
 
 
@@ -64,20 +63,15 @@ def steady_turn(shape):
     return linear.motion_a[0] @ -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
 
 
-@pytest.mark.parametrize("method", EVERY_MODE)
-def test_all_lateral_modes_give_the_vehicle_at_small_amplitude(shape, method):
-    errors = relative_errors(shape, method, 0.01, **EVERY_MODE[method])
+def test_all_lateral_modes_give_the_vehicle_at_small_amplitude(shape):
+    errors = relative_errors(shape, "modal_truncation", 0.01, **EVERY_MODE)
     assert (errors < 1e-3).all()
     # What is left is the vehicle's nonlinearity: the tires' least power beyond the linear term.
-    smaller = relative_errors(shape, method, 0.001, **EVERY_MODE[method])
+    smaller = relative_errors(shape, "modal_truncation", 0.001, **EVERY_MODE)
     assert (smaller < np.maximum(0.5 * errors, 1e-4)).all()
-
-
-@pytest.mark.parametrize("method", EVERY_MODE)
-def test_four_states_are_worse_than_all_and_still_near(shape, method):
-    few = relative_errors(shape, method, 0.001, **FOUR[method])
-    every = relative_errors(shape, method, 0.001, **EVERY_MODE[method])
-    assert few[0] > every[0]
+    # Four states are worse than all and still near.
+    few = relative_errors(shape, "modal_truncation", 0.001, **FOUR)
+    assert few[0] > smaller[0]
     assert (few < 0.02).all()
 
 
@@ -128,12 +122,14 @@ def test_modes_kept_bring_the_yaw_rate_nearer(shape):
     assert error(20.0) > error(45.0) > error(200.0)
 
 
-@pytest.mark.parametrize("method", ["linear_single_track", *EVERY_MODE])
-def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method):
+@pytest.mark.parametrize(
+    ("method", "settings"), [("linear_single_track", {}), ("modal_truncation", EVERY_MODE)]
+)
+def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method, settings):
     model = vm.model(shape.model.name)
     maneuver = VEHICLES[model.name][1]
     start = vm.model(model.name, {"initial_speed": 22.0}).start(model.starts[0])
-    reduced = fitted(model, maneuver, method, **EVERY_MODE.get(method, {}))
+    reduced = fitted(model, maneuver, method, **settings)
     trajectory = reduced.simulate(maneuver, start)
     outputs = dict(zip(model.outputs, trajectory.outputs.T, strict=True))
     assert np.abs(outputs["lateral_position"]).max() < 1e-8

@@ -170,26 +170,6 @@ def test_restart_in_the_same_subspace_changes_nothing(
     np.testing.assert_allclose(runs[0].coordinates, runs[1].coordinates, rtol=0, atol=1e-12)
 
 
-def test_path_is_continuous_where_a_window_begins(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
-) -> None:
-    run = least_squares.simulate(nominal, model.starts[0]).coordinates
-    error = np.abs(run - full.coordinates).max(axis=1)
-    jump = np.abs(np.diff(run - full.coordinates, axis=0)).max(axis=1)
-    # The error may jump to that of the next subspace, but no farther than errors are large.
-    assert jump[499] <= error[499] + error[500]
-    assert error[498:502].max() <= error.max() < 1e-4
-
-
-def test_every_sample_lies_in_the_subspace_of_its_window(
-    model: AlgebraicModel, nominal: Maneuver, least_squares: AlgebraicProjection
-) -> None:
-    run = least_squares.simulate(nominal, model.starts[0]).coordinates
-    for (mean, vectors), samples in zip(subspaces(least_squares), WINDOWS, strict=True):
-        part = run[samples.start : samples.stop] - mean
-        np.testing.assert_allclose(part @ vectors @ vectors.T, part, rtol=0, atol=1e-14)
-
-
 def test_least_squares_is_stationary(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
 ) -> None:

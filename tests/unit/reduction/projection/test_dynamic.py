@@ -181,23 +181,22 @@ def test_divergence_is_recorded_with_its_time(model):
 
 
 @pytest.mark.parametrize(
-    ("chosen", "text"),
+    ("chosen", "words"),
     [
-        ({"rank": 15, "snapshots": 20}, "rank 15 is above the 14 coordinates"),
-        ({"rank": 29, "snapshots": 40, "formulation": "state"}, "rank 29 is above the 28 states"),
-        ({"rank": 4, "snapshots": 3}, "rank 4 is above the number of snapshots 3"),
-        ({"control_period": 1e-4}, "control_period is below"),
-        ({"formulation": "first order"}, "allowed: coordinates, state, paired"),
+        ({"rank": 15, "snapshots": 20}, "rank 15 .* 14 coordinates"),
+        ({"rank": 29, "snapshots": 40, "formulation": "state"}, "rank 29 .* 28 states"),
+        ({"rank": 4, "snapshots": 3}, "rank 4 .* snapshots 3"),
+        ({"control_period": 1e-4}, "control_period"),
+        ({"formulation": "first order"}, "coordinates, state, paired"),
     ],
 )
-def test_settings_that_do_not_fit_are_refused(model, chosen, text):
-    with pytest.raises(InputError, match=text):
+def test_settings_that_do_not_fit_are_refused(model, chosen, words):
+    with pytest.raises(InputError, match=words):
         fitted(model, **chosen)
 
 
 def test_windows_refuse_runs_of_different_durations(model):
     settings = validated(pod.METHOD, "ode", {})
     runs = [TrainingRun(model, maneuver, "dropped") for maneuver in (lane_change, step_steer)]
-    with pytest.raises(InputError, match="training runs of one duration, not 5, 25 s") as caught:
+    with pytest.raises(InputError, match="5, 25 s"):
         pod.fit(model, runs, settings)
-    assert "\n" not in str(caught.value)

@@ -49,10 +49,8 @@ def test_the_compiled_lifting_is_the_formula(reduced, start):
 
 def test_few_samples_are_lifted_alike(reduced):
     maneuver = replace(CARS[reduced.model.name], duration=0.2, samples=5)
-    run, states = (
-        reduced.simulate(maneuver, "equilibrium"),
-        lifted(reduced, maneuver, "equilibrium"),
-    )
+    run = reduced.simulate(maneuver, "equilibrium")
+    states = lifted(reduced, maneuver, "equilibrium")
     np.testing.assert_allclose(run.states[1:], states[1:], rtol=1e-9, atol=1e-12)
 
 

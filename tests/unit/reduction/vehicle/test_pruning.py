@@ -61,10 +61,7 @@ def test_coefficients_of_no_group_stay():
     assert len(left) == 1
     assert np.count_nonzero(changed) == 4
     assert changed[[0, 3, 5]].all()
-
-
-def test_nothing_goes_where_all_may_stay():
-    columns, goals = problem(8)
-    left, c = eliminated(columns, goals, 6)
-    assert left == list(range(6))
-    np.testing.assert_allclose(c, fitted(columns, goals)[0], rtol=1e-9)
+    # Nothing goes where all may stay.
+    left, every = surviving(normal, c, [[1], [2], [4]], 3)
+    assert left == [0, 1, 2]
+    np.testing.assert_allclose(every, c, rtol=1e-9)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import block_diag, expm
 
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import maneuver
@@ -26,19 +27,13 @@ def jordan(value: float, size: int) -> np.ndarray:
     return value * np.eye(size) + max(1.0, abs(value)) * np.diag(np.ones(size - 1), 1)
 
 
-def block_diagonal(*blocks: np.ndarray) -> np.ndarray:
-    from scipy.linalg import block_diag
-
-    return block_diag(*blocks)
-
-
 OSCILLATOR = np.array([[-1.0, 7.0], [-7.0, -1.0]])
 SPECTRA = {
-    "single and double": block_diagonal(OSCILLATOR, [[-30.0]], [[-4.0]], [[-4.0]]),
-    "the same oscillator twice": block_diagonal(OSCILLATOR, OSCILLATOR, [[-2.0]]),
-    "three defective pairs": block_diagonal(*[jordan(-50.0, 2)] * 3, OSCILLATOR, [[-500.0]]),
-    "a defective and a plain one": block_diagonal(jordan(-5.0, 2), [[-5.0]], [[-5.0]], [[2.0]]),
-    "zero, defective": block_diagonal(jordan(0.0, 3), OSCILLATOR, [[-3.0]]),
+    "single and double": block_diag(OSCILLATOR, [[-30.0]], [[-4.0]], [[-4.0]]),
+    "the same oscillator twice": block_diag(OSCILLATOR, OSCILLATOR, [[-2.0]]),
+    "three defective pairs": block_diag(*[jordan(-50.0, 2)] * 3, OSCILLATOR, [[-500.0]]),
+    "a defective and a plain one": block_diag(jordan(-5.0, 2), [[-5.0]], [[-5.0]], [[2.0]]),
+    "zero, defective": block_diag(jordan(0.0, 3), OSCILLATOR, [[-3.0]]),
     "nothing": np.zeros((2, 2)),
 }
 
@@ -71,7 +66,7 @@ def test_modes_restore_what_is_not_nilpotent(name, seed):
     # Of a matrix of zeros and a chain of them nothing is kept.
     expected = matrix
     if "zero" in name:
-        expected = similar(block_diagonal(np.zeros((3, 3)), SPECTRA[name][3:, 3:]), seed)
+        expected = similar(block_diag(np.zeros((3, 3)), SPECTRA[name][3:, 3:]), seed)
     restored = assembled(found, found.rates, found.forth, found.back)
     np.testing.assert_allclose(restored, expected, rtol=0, atol=1e-5 * np.abs(matrix).max() + 1e-9)
 
@@ -85,8 +80,6 @@ def test_a_longer_jordan_chain_is_left_out_but_for_its_eigenvalue():
 @pytest.mark.parametrize("h", [1e-3, 0.1, 8.0])
 @pytest.mark.parametrize("name", ["three defective pairs", "the same oscillator twice"])
 def test_tables_are_the_phi_functions(name, h):
-    from scipy.linalg import expm
-
     matrix, highest = similar(SPECTRA[name], 3), 6
     found, n = modes(matrix), len(matrix)
     (table,) = modal_tables(found, np.array([h]), highest)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from vehiclemor.simulation.integrators.exponential_functions import (
     exponential_tables,
@@ -16,8 +17,6 @@ from vehiclemor.simulation.integrators.exponential_functions import (
 
 def augmented(matrix: np.ndarray) -> list[np.ndarray]:
     """phi_0 to phi_3 as blocks of one matrix exponential (Higham, theorem 10.15)."""
-    from scipy.linalg import expm
-
     n = len(matrix)
     large = np.zeros((4 * n, 4 * n))
     large[:n, :n] = matrix

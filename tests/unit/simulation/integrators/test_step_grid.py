@@ -35,6 +35,8 @@ def test_pairs_turn_as_complex_numbers(vector, angle):
         assert found[a] + 1j * found[b] == pytest.approx(expected, abs=1e-12)
     # The heading and what is in no pair stay.
     np.testing.assert_array_equal(found[[2, 3, 5]], vector[[2, 3, 5]])
+    for no_pairs in (np.zeros(0, dtype=np.int64), np.array([2])):
+        np.testing.assert_array_equal(turned(vector, angle, no_pairs), vector)
 
 
 @settings(max_examples=20)
@@ -44,13 +46,6 @@ def test_turns_add_up_and_are_undone(vector, angle, other):
     both = turned(turned(vector, angle), other)
     np.testing.assert_allclose(both, turned(vector, angle + other), rtol=0, atol=1e-11)
     np.testing.assert_array_equal(turned(vector, 0.0), vector)
-
-
-@settings(max_examples=20)
-@given(vector=states, angle=angles)
-def test_without_pairs_all_stays(vector, angle):
-    for nothing in (np.zeros(0, dtype=np.int64), np.array([2])):
-        np.testing.assert_array_equal(turned(vector, angle, nothing), vector)
 
 
 @settings(max_examples=20)

@@ -74,30 +74,3 @@ def test_the_same_of_a_reduced_vehicle(solver, tolerance, monkeypatch):
     np.testing.assert_array_equal(found.counts, other.counts)
     assert found.counts[1] > 15
     np.testing.assert_allclose(found.path, other.path, rtol=1e-7, atol=1e-9)
-
-
-def test_a_frame_is_turned_and_mirrored_and_back():
-    system = build.build("high_fidelity_vehicle").system
-    frame = system.frame
-    whole = frame.transform @ system.frozen_jacobian @ np.linalg.inv(frame.transform)
-    size = len(frame.blocks[0])
-    assert len(frame.blocks[1]) == size == 26
-    scale = np.abs(whole).max()
-    assert np.abs(whole[:size, size:]).max() < 1e-10 * scale
-    assert np.abs(whole[size:, :size]).max() < 1e-10 * scale
-    first, second = frame.diagonal(system.frozen_jacobian)
-    np.testing.assert_allclose(first, whole[:size, :size], atol=1e-9 * scale)
-    np.testing.assert_allclose(second, whole[size:, size:], atol=1e-9 * scale)
-
-
-def test_rows_behind_the_last_lane_are_padded():
-    system = build.build("high_fidelity_vehicle").system
-    tables = [np.arange(2.0 * n * n).reshape(1, 2, n, n) for n in (26, 26)]
-    packed = system.frame.packed(tables)[0, 0]
-    for table in range(2):
-        for k, first in enumerate(system.frame.entries(table)[:2]):
-            rows = packed[first:].reshape(-1)[: 28 * len(system.frame.columns[k])].reshape(-1, 28)
-            np.testing.assert_array_equal(
-                rows[:, :26], tables[k][0, table, list(system.frame.columns[k])]
-            )
-            assert not rows[:, 26:].any()
