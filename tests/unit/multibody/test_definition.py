@@ -11,6 +11,7 @@ import pytest
 from tests.unit import standard_problems
 from vehiclemor import registry
 from vehiclemor.errors import InputError
+from vehiclemor.multibody import definition
 from vehiclemor.registry import component
 
 PLAIN = standard_problems.DEFINITION
