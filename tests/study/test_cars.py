@@ -55,11 +55,9 @@ def test_a_component_of_a_point_is_a_parameter(suspension):
     whole = vm.model(suspension.name, {"tie_rod_inner": [x, y, -0.09]})
     moved = vm.model(suspension.name, dict(MOVED))
     np.testing.assert_array_equal(moved.constants, whole.constants)
-    for name in ("tie_rod_inner.w", "tie_rod_inner.", "tie_rod_iner.z"):
-        with pytest.raises(InputError, match="is not a parameter of double_wishbone; "):
-            vm.model(suspension.name, {name: 0.0})
-    with pytest.raises(InputError, match="a number is needed"):
-        vm.model(suspension.name, {"tie_rod_inner.z": [0.0, 0.0]})
+    for wrong in ({"tie_rod_inner.w": 0.0}, {"tie_rod_inner.z": [0.0, 0.0]}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            vm.model(suspension.name, wrong)
 
 
 def test_the_fit_with_other_parameters_is_the_method_on_that_model(suspension):
