@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from tests.study.small import small_study
 from vehiclemor.errors import SpoiledError
 from vehiclemor.study import netcdf_file, run, workers
 from vehiclemor.study.experiment import Experiment
@@ -16,16 +17,7 @@ from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
 
-STUDY = """
-title = "for the tests"
-model = "double_wishbone"
-grid = { amplitude_factor = [0.5, 0.7, 0.9], rank = [2, 3] }
-[[methods]]
-method = "full_order"
-[[methods]]
-method = "pod"
-"""
-TIMED = ["seconds", "offline_seconds"]
+GRID = "grid = { amplitude_factor = [0.5, 0.7, 0.9], rank = [2, 3] }\n"
 
 
 def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
@@ -40,13 +32,7 @@ def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
     given = {
         "title": "t",
         "model": "double_wishbone",
-        "keep": "metrics",
-        "sampling": {
-            "plan": "latin_hypercube",
-            "count": 60,
-            "seed": 1,
-            "ranges": {"parameters.tie_rod_inner.z": [-0.1, -0.09]},
-        },
+        "grid": {"amplitude_factor": np.linspace(0.5, 1.0, 60).tolist()},
         "methods": [{"method": "pod"}, {"method": "full_order"}],
     }
     grid = expand("mine", StudyFile.model_validate(given))
@@ -59,8 +45,8 @@ def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
     assert max(alive) < 10
 
 
-@pytest.mark.parametrize("sizes", [(), (1,), (7,), (3, 1, 5), (2, 3, 4, 1)])
-@pytest.mark.parametrize("at_once", [1, 3, 4, 8, 24])
+@pytest.mark.parametrize("sizes", [(), (7,), (2, 3, 4, 1)])
+@pytest.mark.parametrize("at_once", [1, 4, 24])
 def test_regions_cover_an_array_once_in_order(sizes, at_once):
     array = np.arange(int(np.prod(sizes))).reshape(sizes)
     parts = [array[region].ravel() for region in regions(sizes, at_once)]
@@ -69,8 +55,7 @@ def test_regions_cover_an_array_once_in_order(sizes, at_once):
 
 
 def test_a_dataset_in_parts_is_the_same_as_in_one(tmp_path, monkeypatch):
-    path = tmp_path / "mine.toml"
-    path.write_text(STUDY)
+    path = small_study(tmp_path, GRID, "full_order", "pod", name="mine")
     whole = run_studies(str(path), tmp_path / "results")["mine"]
     file = tmp_path / "results" / "studies" / "mine.nc"
     file.unlink()
