@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from tests.study.small import TIMED, small_study
 from vehiclemor.errors import SpoiledError
 from vehiclemor.study import cell_file, netcdf_file, workers
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
@@ -25,18 +25,7 @@ from vehiclemor.study.run import run_studies
 from vehiclemor.study.status import status_of
 from vehiclemor.study.store import ASIDE, read_arrays, read_cell, write_cell
 
-GRID = """
-title = "for the tests"
-model = "double_wishbone"
-keep = "metrics"
-
-[grid]
-rank = [2, 3]
-
-[[methods]]
-method = "pod"
-"""
-TIMED = ["seconds", "offline_seconds"]
+GRID = 'keep = "metrics"\ngrid = { rank = [2, 3] }\n'
 KEY = "0123456789abcdef0123"
 
 
@@ -127,16 +116,6 @@ def test_every_flipped_bit_and_every_part_of_a_file_is_noticed():
         cell_file.check(whole + b"\0", KEY)
 
 
-def test_foreign_results_and_those_of_other_versions_are_named(monkeypatch):
-    with pytest.raises(SpoiledError, match="not the result that belongs here, but of 0123"):
-        cell_file.check(cell_file.encoded(a_cell(), KEY), KEY[::-1])
-    monkeypatch.setattr(cell_file, "SCHEMA", "vehiclemor cell 0")
-    old = cell_file.encoded(a_cell(), KEY)
-    monkeypatch.undo()
-    with pytest.raises(SpoiledError, match="'vehiclemor cell 0', where this version writes"):
-        cell_file.check(old, KEY)
-
-
 def test_how_a_cell_has_ended_is_told_by_its_header(tmp_path):
     many = a_cell().drop_vars(["status", "message"])
     many = many.assign(
@@ -158,8 +137,7 @@ def test_how_a_cell_has_ended_is_told_by_its_header(tmp_path):
 def done(tmp_path_factory) -> Path:
     """A study file and the folder `out` with its results; not to be changed."""
     folder = tmp_path_factory.mktemp("done")
-    (folder / "small.toml").write_text(GRID)
-    run_studies(str(folder / "small.toml"), folder / "out")
+    run_studies(str(small_study(folder, GRID, "pod")), folder / "out")
     return folder
 
 
@@ -191,21 +169,16 @@ def cells(place: Path) -> list[Path]:
     return sorted((place / "out" / "cells").glob("[!.s]?/*"))
 
 
-def other_version(content: bytes) -> bytes:
-    return content.replace(b"vehiclemor cell 1", b"vehiclemor cell 7", 1)
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (lambda whole, _: whole[:-9], "what it holds is not what was written"),
-        (lambda whole, _: whole[:200], "truncated, or no result of this package"),
-        (lambda *_: b"", "truncated, or no result of this package"),
-        (lambda *_: b"my notes", "truncated, or no result of this package"),
-        (lambda _, other: other, "not the result that belongs here, but of"),
-        (lambda whole, _: other_version(whole), "'vehiclemor cell 7', where this version writes"),
+        (lambda whole, _: whole[:-9], "not what was written"),
+        (lambda whole, _: whole[:200], "truncated"),
+        (lambda *_: b"", "truncated"),
+        (lambda _, other: other, "not the result that belongs here"),
+        (lambda whole, _: whole.replace(b"cell 1", b"cell 7", 1), "'vehiclemor cell 7'"),
     ],
-    ids=["cut", "header", "empty", "text", "foreign", "version"],
+    ids=["cut", "header", "empty", "foreign", "version"],
 )
 def test_a_spoiled_cell_is_set_aside_and_computed_again(
     done, place, computed, caplog, change, reason
@@ -219,8 +192,8 @@ def test_a_spoiled_cell_is_set_aside_and_computed_again(
     assert aside.read_bytes() == spoiled
     assert computed == [first.stem]
     (line,) = caplog.messages
-    assert line.startswith(f"{first}: {reason}")
-    assert line.endswith(f"; moved to {aside}, and computed again")
+    for words in (first, aside, reason):
+        assert str(words) in line
 
 
 def rewritten(cell: bytes, **texts: object) -> bytes:
@@ -252,30 +225,19 @@ def variable(**change: object) -> Callable[[bytes], bytes]:
 DEEP = "[" * 200_000
 HEADERS = {
     "header": lambda _: len(DEEP).to_bytes(8, "little") + DEEP.encode(),
-    "texts": lambda _: (
-        (10**6 + 16).to_bytes(8, "little") + b'{"__metadata__":' + b'{"a":' * 200_000
-    ),
     "runs": lambda cell: rewritten(cell, runs=DEEP),
-    "runs of lists": lambda cell: rewritten(cell, runs='[[["ok"], "", 1]]'),
     "runs of texts": lambda cell: rewritten(cell, runs='[["ok", "", "one"]]'),
     "no text": lambda cell: rewritten(cell, key=[3]),
 }
 DATASETS = {
     "number": lambda cell: rewritten(cell, dataset="3"),
     "nested": lambda cell: rewritten(cell, dataset=DEEP),
-    "no status": described(lambda dataset: dataset["variables"].pop("status")),
     "no errors": described(lambda dataset: dataset["variables"].pop("rms_error")),
-    "no coordinates": described(lambda dataset: dataset.pop("coordinates")),
-    "other coordinates": described(lambda dataset: dataset["coordinates"].pop()),
-    "coordinates that are not there": described(lambda dataset: dataset["coordinates"].append("x")),
+    "coordinates": described(lambda dataset: dataset["coordinates"].append("x")),
     "attributes": described(lambda dataset: dataset.update(attributes=["title"])),
-    "nested attributes": variable(attributes={"units": {"a": "m"}}),
-    "dimensions": variable(dimensions=["time"]),
-    "more dimensions": variable(dimensions=["output", "output"]),
-    "number of dimensions": variable(dimensions=3),
+    "dimensions": variable(dimensions=["output", "output"]),
     "type": variable(type="<U1000000000"),
     "no type": variable(type="(2,"),
-    "text": variable(type="<U1000000000", text=["a"] * 4, shape=[4]),
     "text without place": variable(text=["a"], shape=[10**30]),
     "text of numbers": variable(text=[1.0] * 4, shape=[4]),
 }
@@ -286,13 +248,8 @@ def test_a_crafted_cell_is_set_aside_and_computed_again(done, place, computed, c
     (first, _), study, out = cells(place), place / "small.toml", place / "out"
     first.write_bytes(crafted := craft(first.read_bytes()))
     # How it has ended stands in its header.
-    ended = craft in DATASETS.values()
-    assert status_of(str(study), out)["small"].done == (2 if ended else 1)
+    assert status_of(str(study), out)["small"].done == (2 if craft in DATASETS.values() else 1)
     (out / "studies" / "small.nc").unlink()
-    if ended:
-        for read in (read_cell, read_arrays):
-            with suppress(SpoiledError):
-                read(out, first.stem)
     xr.testing.assert_identical(run(study, out), reread(done))
     assert (out / "cells" / ASIDE / first.name).read_bytes() == crafted
     assert computed == [first.stem]
@@ -317,20 +274,6 @@ def test_a_folder_in_the_place_of_a_cell_is_set_aside(place, computed, caplog):
     assert len(computed) == len(caplog.messages) == 2
 
 
-def test_many_spoiled_cells_are_a_few_lines(tmp_path, caplog):
-    study = tmp_path / "many.toml"
-    study.write_text(GRID.replace("[2, 3]", "{ first = 1, last = 8, count = 8 }"))
-    study.write_text(study.read_text().replace("rank =", "frequency_factor ="))
-    run(study, tmp_path)
-    for path in (tmp_path / "cells").glob("??/*"):
-        path.write_bytes(b"")
-    (tmp_path / "studies" / "many.nc").unlink()
-    assert (run(study, tmp_path)["status"] == "ok").all()
-    assert len(list((tmp_path / "cells" / ASIDE).iterdir())) == 8
-    assert len(caplog.messages) == 6
-    assert caplog.messages[-1] == f"{tmp_path / 'cells' / ASIDE}: 8 such cells in all"
-
-
 def test_a_cell_that_was_spoiled_since_is_not_read(place):
     (first, _) = cells(place)
     first.write_bytes(first.read_bytes()[:-1])
@@ -339,18 +282,13 @@ def test_a_cell_that_was_spoiled_since_is_not_read(place):
             read(place / "out", first.stem)
 
 
-@pytest.mark.parametrize(
-    "damage", [lambda whole: whole[: len(whole) // 2], lambda _: b"my notes"], ids=["cut", "text"]
-)
-def test_a_spoiled_combined_dataset_is_set_aside_and_made_again(
-    done, place, computed, caplog, damage
-):
+def test_a_spoiled_combined_dataset_is_set_aside_and_made_again(done, place, computed, caplog):
     path = place / "out" / "studies" / "small.nc"
-    path.write_bytes(spoiled := damage(path.read_bytes()))
+    path.write_bytes(spoiled := path.read_bytes()[:-1000])
     xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
     assert (path.parent / ASIDE / "small.nc").read_bytes() == spoiled
     assert computed == []
-    assert f"{path}: not a readable result file" in caplog.messages[0]
+    assert str(path) in caplog.messages[0]
     xr.testing.assert_identical(reread(place), reread(done))
 
 
@@ -437,9 +375,7 @@ def test_other_tools_read_files_that_end_with_their_hash(tmp_path):
 
 
 def test_two_studies_of_one_name_are_both_stored(place, computed):
-    other = place / "other" / "small.toml"
-    other.parent.mkdir()
-    other.write_text(GRID.replace("[2, 3]", "[3, 4]"))
+    other = small_study(place / "other", GRID.replace("[2, 3]", "[3, 4]"), "pod")
     out = place / "out"
     both = [run(path, out) for path in (other, place / "small.toml", other)]
     # The cell that both have is computed once.
@@ -448,17 +384,15 @@ def test_two_studies_of_one_name_are_both_stored(place, computed):
     names = sorted(path.name for path in (out / "studies").iterdir())
     assert names == [f"small-{both[0].attrs['content']}.nc", "small.nc"]
     # A study that was edited in its place is the same study.
-    (place / "small.toml").write_text(GRID.replace("[2, 3]", "[2, 3, 4]"))
+    small_study(place, GRID.replace("[2, 3]", "[2, 3, 4]"), "pod")
     assert run(place / "small.toml", out).sizes["rank"] == 3
     assert len(computed) == 1
     assert sorted(path.name for path in (out / "studies").iterdir()) == names
 
 
 def test_a_collection_may_have_two_studies_of_one_name(place, computed):
-    paths = [place / name / "small.toml" for name in ("a", "b")]
-    for path, ranks in zip(paths, ("[2, 3]", "[3]"), strict=True):
-        path.parent.mkdir()
-        path.write_text(GRID.replace("[2, 3]", ranks))
+    grids = {"a": GRID, "b": GRID.replace("[2, 3]", "[3]")}
+    paths = [small_study(place / name, grid, "pod") for name, grid in grids.items()]
     both = place / "both.toml"
     both.write_text(f'title = "both"\nstudies = {json.dumps([str(path) for path in paths])}\n')
     results = run_studies(str(both), place / "out")

@@ -33,7 +33,6 @@ def suspension():
 def test_speed_ups_are_against_ids_wherever_they_stand(suspension):
     data = timed_cases(suspension, CASES, sine_travel, "equilibrium", 3)
     assert list(data["case"].values) == ["pod_r3", "strongest", "replay", "baseline"]
-    assert list(data["label"].values) == ["pod r=3", "the best", "replay", "Newton"]
     assert float(data["speed_up"].sel(case="baseline")) == 1.0
     assert float(data["speed_up_strongest"].sel(case="strongest")) == 1.0
     assert float(data["speed_up"].sel(case="strongest")) > 1.0
@@ -91,15 +90,10 @@ def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(mon
     assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 
-def test_without_baselines_there_are_seconds_but_no_speed_ups(suspension):
-    data = timed_cases(suspension, CASES[:1], sine_travel, "equilibrium", 1)
-    assert "speed_up" not in data
-    assert float(data["seconds"].item()) > 0.0
-
-
-def test_a_case_that_fails_has_no_seconds(suspension):
+def test_a_case_that_fails_has_no_seconds_and_no_baseline_gives_no_speed_up(suspension):
     stuck = TimingCase("stuck", "stuck", "full_order", settings={"tolerance": 1e-300})
-    data = timed_cases(suspension, (CASES[3], stuck), sine_travel, "equilibrium", 2)
+    data = timed_cases(suspension, (CASES[0], stuck), sine_travel, "equilibrium", 2)
+    assert "speed_up" not in data
     assert data["status"].values.tolist() == ["ok", "diverged"]
     assert np.isfinite(data["seconds"]).values.tolist() == [True, False]
 
