@@ -81,7 +81,7 @@ SAME = {
     "its beginning": (OWN, sampled(OWN, 501), True),
     "that of which it is the beginning": (sampled(OWN, 501), OWN, False),
     "other samples": (OWN, sampled(OWN, scale=1.0 + 1e-6), False),
-    "another name": (OTHER, OWN, False),
+    "another amplitude": (OWN, OWN.perturbed(1.0, 0.9), False),
 }
 
 
