@@ -167,13 +167,6 @@ def test_what_was_not_compared_is_drawn_alone(tmp_path):
             vm.plot(result, "errors")
 
 
-@pytest.mark.parametrize("kind", [np.ones(3), "path"])
-def test_what_is_no_kind_is_one_line(results, kind):
-    with pytest.raises(InputError, match="unknown kind of plot") as caught:
-        vm.plot("all", kind, results=results)
-    assert "\n" not in str(caught.value)
-
-
 def test_a_study_is_drawn_by_the_name_of_its_results(results, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["plot", "all", "--results", str(results)]) == 0
@@ -186,14 +179,6 @@ def test_a_study_is_drawn_by_the_name_of_its_results(results, tmp_path, monkeypa
     assert shown.get_xlabel() == "frequency perturbation (%)"
     assert main(["plot", "al", "--results", str(results)]) == 2
     assert "unknown study 'al'" in capsys.readouterr().err
-
-
-def test_a_picture_of_a_method_that_has_failed(tmp_path, monkeypatch, capsys):
-    endings.register(monkeypatch)
-    arguments = ["simulate", "double_wishbone", "--method", "endings", "--set", "end=error"]
-    assert main([*arguments, "--plot", str(tmp_path / "a.png")]) == 1
-    assert "RuntimeError: a bug" in capsys.readouterr().out
-    assert (tmp_path / "a.png").stat().st_size > 1000
 
 
 def test_a_map_of_two_amplitudes_has_its_published_line(results):

@@ -12,7 +12,6 @@ from vehiclemor.cli import main
 from vehiclemor.report import page
 from vehiclemor.report.comparison.rows import COLUMNS
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
-from vehiclemor.study import timing
 from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
@@ -26,19 +25,6 @@ methods = [
     {{ method = "pod", settings = {{ rank = 3 }} }},
     {{ method = "replay", label = {json.dumps(HOSTILE)} }},
 ]
-"""
-PROTOCOL = """
-title = "unseen travels"
-model = "double_wishbone"
-bounds.spindle_y = { measure = "rms", bound = 7.57e-5 }
-training = [{ maneuver = "sine_travel", points = [[1.0, 1.2]] }]
-validation = [{ maneuver = "sine_travel", points = [[1.3, 1.0]] }]
-test = [{ maneuver = "sine_travel", points = [[0.9, 1.0], [1.1, 0.8]] }]
-contestants = [
-    { label = "newton", method = "full_order", role = "full order" },
-    { label = "fixed basis", method = "fixed_basis", candidates = [{ rank = 3 }] },
-]
-targets = [{ against = "within bounds", ratio = 2.0 }]
 """
 
 
@@ -66,18 +52,13 @@ def value(cell):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(tmp_path_factory, small_protocol):
     """Folder of results, and the text of the report of all of them."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "unseen.toml").write_text(PROTOCOL)
     (folder / "hostile.toml").write_text(STUDY)
-    protocol = f'title = "x"\nprotocols = [{json.dumps(str(folder / "unseen.toml"))}]\n'
-    (folder / "mine.toml").write_text(protocol)
-    names = [str(folder / f"{name}.toml") for name in ("hostile", "mine")]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(timing, "PROTOCOL_ROUNDS", 2)
-        out = ["--results", str(folder), "--out", str(folder / "a.html")]
-        assert main(["report", *names, *out]) == 0
+    names = [str(folder / "hostile.toml"), str(small_protocol)]
+    out = ["--results", str(folder), "--out", str(folder / "a.html")]
+    assert main(["report", *names, *out]) == 0
     return folder, (folder / "a.html").read_text(encoding="utf-8")
 
 
@@ -187,10 +168,3 @@ def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys
     assert told.count("\n") == 1
     assert words in told
     assert list(tmp_path.glob("*.html")) == []
-
-
-@pytest.mark.parametrize("studies", [3, ["no-such-study"]])
-def test_wrong_names_in_python_are_one_line(studies, tmp_path):
-    with pytest.raises(vm.VehiclemorError, match="stud") as caught:
-        vm.write_report(studies, tmp_path / "d.html", tmp_path)
-    assert "\n" not in str(caught.value)

@@ -58,8 +58,6 @@ def test_the_fastest_variant_of_pod_within_the_bounds_wins(tables):
     within = terms[terms["within_bounds"]]
     # Of two coordinates one is kept: a variant that is within 1 % would be luck.
     assert terms["winner"].sum() == min(1, len(within))
-    others = {"errors", "paper-terms", "operations", "quantities", "spectrum"}
-    assert set(tables) == {"costs"} | others
 
 
 def test_comparison_names_every_method(folder, capsys, monkeypatch):
@@ -67,12 +65,10 @@ def test_comparison_names_every_method(folder, capsys, monkeypatch):
     assert main(["compare", CAR, "--out", str(folder)]) == 0
     printed = capsys.readouterr().out
     assert max(map(len, printed.splitlines())) <= 80
-    for words in (*METHODS, "perturbations", "full order, strongest", "break-even", "force"):
+    for words in METHODS:
         assert words in printed
     assert main(["compare", CAR, "--json", "--out", str(folder)]) == 0
     rows = json.loads(capsys.readouterr().out)
-    kinds = {"nominal", "perturbed", "cost", "spectrum", "method", "paper"}
-    assert kinds <= {row["kind"] for row in rows}
     unseen = {row["method"]: row for row in rows if row["kind"] == "method"}
     assert {"replay", "pod", "fixed basis", "strongest 2e-3"} <= set(unseen)
     assert unseen["replay"]["score"] > 1.0
@@ -104,8 +100,3 @@ def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
         assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])
     assert "mine" in legend(CAR)
     assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).with_name(f"{CAR}.toml").read_text()
-
-
-def test_an_unknown_figure_of_a_model_names_the_known_ones(capsys):
-    assert main(["figures", "--only", "histories-quarter_cra"]) == 2
-    assert "histories-quarter_car" in capsys.readouterr().err

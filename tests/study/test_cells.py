@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import sine_travel
@@ -61,15 +60,6 @@ def test_key_changes_with_all_that_determines_the_result(cell, field, value):
     assert dataclasses.replace(cell, **{field: value}).key != again.key == cell.key
 
 
-def test_a_maneuver_of_ones_own_is_simulated_and_has_a_key_of_its_own(cell):
-    half = dataclasses.replace(sine_travel, duration=5.0, samples=101)
-    model = build("double_wishbone")
-    assert make_cell(model, half, "pod", {"rank": 3}).key != cell.key
-    data = vm.simulate(model, "full_order", maneuver=half)
-    np.testing.assert_array_equal(data["time"], np.linspace(0.0, 5.0, 101))
-    np.testing.assert_array_equal(data["inputs"], half.at(half.times))
-
-
 def test_another_geometry_gives_another_key_and_result(cell):
     moved = build("double_wishbone", overrides={"tie_rod_inner": [-0.2, 0.4921, -0.0962]})
     other = make_cell(moved, sine_travel, "full_order", {})
@@ -97,13 +87,6 @@ def test_a_plug_in_model_that_breaks_in_the_reference_spoils_only_its_cell(
     dataset = evaluate(cell)
     assert dataset["status"].item() == "error"
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
-
-
-def test_divergence_is_a_result(cell):
-    singular = dataclasses.replace(cell, settings={**cell.settings, "tolerance": 1e-300})
-    dataset = evaluate(singular)
-    assert dataset["status"].item() == "diverged"
-    assert "no convergence" in dataset["message"].item()
 
 
 def test_set_policy_needs_and_uses_its_factors():

@@ -11,7 +11,7 @@ from tests.study.small import small_study
 from vehiclemor.errors import SpoiledError
 from vehiclemor.study import netcdf_file, run, workers
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.netcdf_file import read_dataset, regions
+from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans import grid_results
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import StudyFile
@@ -43,15 +43,6 @@ def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
             alive.append(sum(reference() is not None for reference in made))
     assert len(made) >= 240
     assert max(alive) < 10
-
-
-@pytest.mark.parametrize("sizes", [(), (7,), (2, 3, 4, 1)])
-@pytest.mark.parametrize("at_once", [1, 4, 24])
-def test_regions_cover_an_array_once_in_order(sizes, at_once):
-    array = np.arange(int(np.prod(sizes))).reshape(sizes)
-    parts = [array[region].ravel() for region in regions(sizes, at_once)]
-    assert max(map(len, parts)) <= at_once
-    np.testing.assert_array_equal(np.concatenate(parts), array.ravel())
 
 
 def test_a_dataset_in_parts_is_the_same_as_in_one(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
-from vehiclemor.study.scenario import Scenario, input_hash
+from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.timing import called, case_experiments, timed_cases, timed_model, timed_tests
 
 CASES = (
@@ -114,21 +114,14 @@ def test_what_was_measured_is_measured_again_only_if_it_has_changed(
     assert path.stat().st_mtime_ns > written
 
 
-def test_minus_zero_and_zero_are_one_input():
-    def signed(sign):
-        def signal(times, frequency, amplitude):
-            return np.full((len(times), 2), sign * 0.0 * frequency * amplitude)
+def test_inputs_are_known_by_their_values_and_names():
+    def constant(value):
+        return replace(sine_travel, signal=lambda times, *_: np.full((len(times), 2), value))
 
-        return replace(sine_travel, signal=signal)
+    def log(name):
+        return Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
 
-    runs = [Scenario(signed(sign), "equilibrium").run_key for sign in (1.0, -1.0)]
-    assert runs[0] == runs[1]
-    assert runs[0][0] != input_hash(sine_travel)
-
-
-def test_signals_of_other_inputs_are_other_runs():
-    def key(name):
-        signal = Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
-        return Scenario(signal, "equilibrium").run_key
-
-    assert key("z") == key("z") != key("s0")
+    given = constant(0.0), constant(-0.0), constant(0.01), log("z"), log("s0")
+    zero, minus_zero, *others = [Scenario(each, "equilibrium").run_key for each in given]
+    assert zero == minus_zero
+    assert len({zero, *others}) == 4

@@ -1,8 +1,5 @@
 """What a model is trained on, asked for by the same words everywhere, and told in every result."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -62,15 +59,6 @@ def test_training_is_asked_for_in_the_same_words_everywhere(given):
     np.testing.assert_array_equal(
         found["outputs"], vm.simulate(WISHBONE, maneuver=OTHER)["outputs"]
     )
-
-
-def test_training_of_the_protocol_is_that_of_reduce():
-    model = vm.model(WISHBONE)
-    reduced = vm.reduce(model, "replay", training="protocol")
-    found = vm.simulate(model, "replay", training=reduced.training, maneuver=OTHER)
-    again = vm.simulate(model, "replay", training="protocol", maneuver=OTHER)
-    assert reduced.training[0].maneuver.name == "travel_and_rack"
-    np.testing.assert_array_equal(found["outputs"], again["outputs"])
 
 
 SAME = {
@@ -215,15 +203,3 @@ def test_a_maneuver_by_its_name_and_factors_beside_its_own():
     np.testing.assert_array_equal(run["inputs"], same["inputs"])
     with pytest.raises(InputError, match="did you mean lane_change"):
         vm.maneuver("lane_chnge")
-
-
-@pytest.mark.parametrize(
-    "first", ["import vehiclemor.maneuver", "from vehiclemor import maneuver", "vm.maneuver"]
-)
-def test_the_function_and_the_module_of_plug_ins_go_together(first):
-    """In whatever order they are asked for."""
-    rest = (
-        "from vehiclemor.maneuver import Maneuver; assert isinstance(vm.maneuver(NAME), Maneuver)"
-    )
-    code = f"import vehiclemor as vm; NAME = 'sine_travel'; {first}; {rest}; vm.maneuver(NAME)"
-    subprocess.run([sys.executable, "-c", code], check=True)

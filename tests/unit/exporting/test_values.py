@@ -10,7 +10,7 @@ import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative
 from vehiclemor.exporting.export import system_of
 from vehiclemor.exporting.interpreter import evaluated
-from vehiclemor.exporting.straight_line import FUNCTIONS, entries, straight_line
+from vehiclemor.exporting.straight_line import FUNCTIONS
 
 FLOATS = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}
 FLOATS |= {"fmax": max, "fmin": min, "select": lambda test, then, other: then if test else other}
@@ -107,47 +107,3 @@ def test_sympy(rng):
         rows = [function(x, u, values) for x, u in zip(states, inputs, strict=True)]
         found.append(np.array(rows))
     agree(found, states, model, inputs)
-
-
-TEXT = """
-def kernel(_x, _constants, _work, _result):
-    a = _x[0]
-    b = -_x[1]
-    int = -a ** 3.0 + abs(b)
-    _work[0] = a
-    _work[1] = b
-    {padding}
-    sincos_batch(_work, 0)
-    _sin_a = _work[8]
-    _cos_b = _work[17]
-    s, c = sincos_one(int)
-    ({sums},) = weighted_sums(_constants, 1, (_sin_a, 1.0, (a if a > b else b)))
-    a = s0 - -s1
-    _result[0, 0] = a * (b - s) / (c + 3.0)
-    _result[0, 1] = math.atan2(_cos_b, s2) - math.exp(-a)
-    _result[1, 0] = -(-s4)
-    _result[1, 1] = (1.0 if a != b else 2.0)
-"""
-
-
-@pytest.mark.parametrize("x", [(0.3, -0.7), (-1.2, 0.4), (0.5, -0.5)])
-def test_text_is_written_out_as_it_is_meant(x):
-    padding = "\n    ".join(f"_work[{i}] = 0.0" for i in range(2, 8))
-    text = TEXT.format(padding=padding, sums=", ".join(f"s{i}" for i in range(5))).strip()
-    weights = np.random.default_rng(1).standard_normal(25)
-    weights[3] = 0.0
-    line = straight_line(text, {"_x": entries("x", 2), "_constants": entries("c", 25)})
-    found = evaluated(line.pruned(), {"x": x, "c": weights.tolist()}, FLOATS)
-    a, b = x[0], -x[1]
-    size = -(a**3) + abs(b)
-    sums = np.array([math.sin(a), 1.0, max(a, b)]) @ weights[1:].reshape(3, 8)[:, :5]
-    new = sums[0] + sums[1]
-    assert found == pytest.approx(
-        [
-            new * (b - math.sin(size)) / (math.cos(size) + 3.0),
-            math.atan2(math.cos(b), sums[2]) - math.exp(-new),
-            sums[4],
-            1.0,
-        ],
-        rel=1e-14,
-    )

@@ -15,15 +15,6 @@ def test_lines_are_as_wide_as_the_terminal_within_reason(monkeypatch, columns, e
     assert 0.8 * expected < max(map(len, table_text(["", "error"], rows).splitlines())) <= expected
 
 
-def test_long_headings_give_way_to_names(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    headings = ["method", *["body displacement pert.", "suspension travel pert."] * 3]
-    printed = table_text(headings, [Line(["full_order_strongest [a]", *["1.0e-03"] * 6])])
-    assert "full_order_strongest" in printed
-    assert printed.count("1.0e-03") == 6
-    assert max(map(len, printed.splitlines())) <= 80
-
-
 def test_a_phrase_has_one_letter():
     notes = Footnotes()
     assert notes.marks("one", "", "two") == "[a][b]"
