@@ -188,7 +188,7 @@ FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
 @pytest.mark.parametrize(
     ("dimensions", "label", "panels", "meshes"),
     [
-        (FACTOR | {"rank": [*range(1, 9)]}, "frequency perturbation (%)", 2, 0),
+        (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
         (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
         ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
         ({"rank": [*range(1, 9)], "snapshots": [*range(5, 11)]}, "rank", 4, 4),

@@ -91,30 +91,24 @@ def test_training_policies_and_maneuvers_are_axes():
     assert seen == {(*run, (("tie_rod_inner.z", -0.09),)) for run in runs}
 
 
-SUSPENSION = "double_wishbone"
+WISHBONE = "double_wishbone"
 MASSES = '{ "parameters.sprung_mass" = [1e3, 1e5] }'
+SAMPLES = f'{{ plan = "sobol", count = 2, seed = 1, ranges = {MASSES} }}'
+TWICE = 'grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]'
 
 
 @pytest.mark.parametrize(
     ("model", "text", "words"),
     [
-        (SUSPENSION, 'grid = { "parameters.tie_rod_iner.z" = [0.1] }', "tie_rod_inner"),
-        (SUSPENSION, 'grid = { "parameters.tie_rod_inner" = [0.1] }', "3 components"),
-        (SUSPENSION, 'grid = { "parameters.tie_rod_inner.z" = ["low"] }', "'low'"),
-        (SUSPENSION, 'grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "millimetres"),
-        (SUSPENSION, 'grid = { training = ["mached"] }', "did you mean matched"),
-        (SUSPENSION, 'grid = { start = ["equilibrum"] }', "'equilibrum'"),
-        (
-            SUSPENSION,
-            'grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]',
-            "start is set twice",
-        ),
+        (WISHBONE, 'grid = { "parameters.tie_rod_iner.z" = [0.1] }', "tie_rod_inner"),
+        (WISHBONE, 'grid = { "parameters.tie_rod_inner" = [0.1] }', "3 components"),
+        (WISHBONE, 'grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "millimetres"),
+        (WISHBONE, 'grid = { training = ["mached"] }', "did you mean matched"),
+        (WISHBONE, 'training = "lane_change"', "gives inputs delta, double_wishbone needs z, s0"),
+        (WISHBONE, 'training = "set"', "'set' needs training_set"),
+        (WISHBONE, TWICE, "start is set twice"),
         (CAR, f"grid = {MASSES}", "sprung_mass = 100000.*can't stand"),
-        (
-            CAR,
-            f'sampling = {{ plan = "sobol", count = 2, seed = 1, ranges = {MASSES} }}',
-            "sprung_mass = .*can't stand",
-        ),
+        (CAR, f"sampling = {SAMPLES}", "sprung_mass = .*can't stand"),
     ],
 )
 def test_wrong_cars_are_told_before_the_first_cell(tmp_path, model, text, words):
@@ -136,9 +130,7 @@ def test_a_run_says_why_cells_are_rejected(tmp_path, capsys):
     ("change", "words"),
     [
         ({"count": 6, "plan": "sobol"}, "power of two"),
-        ({"ranges": {}}, "ranges is empty"),
         ({"ranges": {"parameters.a": [2.0, 1.0]}}, "not \\[from, to\\]"),
-        ({"ranges": {"parameters.a": [-1e308, 1e308]}}, "not \\[from, to\\]"),
         ({"ranges": {"a": [1.0, 2.0]}}, "neither parameters.NAME"),
     ],
 )

@@ -122,10 +122,3 @@ def test_settings_of_a_method_that_refuses_the_model_are_not_judged():
     assert dataset["status"].item() == "rejected"
     assert "double_wishbone" in dataset["message"].item()
     assert np.isnan(dataset["coordinates"]).all()
-
-
-def test_every_shipped_study_expands():
-    for name, study in load_studies("paper").items():
-        assert expand(name, study).unique
-    grid = expand("perturbation-grid", load_studies("perturbation-grid")["perturbation-grid"])
-    assert len(grid.cells) == 31 * 11 * 4

@@ -12,7 +12,6 @@ import xarray as xr
 
 from tests.study.small import assert_same, small_study
 from vehiclemor.files import TEMPORARY, temporary_path
-from vehiclemor.study import workers
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.run import run_studies
 
@@ -95,21 +94,6 @@ def test_dataset_is_labelled(uninterrupted):
     assert "units" not in uninterrupted["rms_error"].attrs
     for name in ("title", "source", "versions", "machine", "configuration", "kernel_hash"):
         assert uninterrupted.attrs[name]
-
-
-def test_workers_begin_with_different_methods(tmp_path: Path, monkeypatch):
-    sent = []
-
-    def by_workers(groups, *_):
-        sent.extend(group[0].method for group in groups)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(workers, "evaluated_by_workers", by_workers)
-    with pytest.raises(KeyboardInterrupt):
-        run_studies(str(small_study(tmp_path, GRID, *METHODS)), tmp_path, jobs=2)
-    # Their loops are then compiled side by side.
-    assert len(sent) > len(METHODS)
-    assert set(sent[: len(METHODS)]) == set(METHODS)
 
 
 def test_a_dataset_laid_out_by_other_source_is_combined_again(study, uninterrupted, tmp_path):

@@ -6,10 +6,9 @@ import pytest
 import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.cli.app import main
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import InputError
 from vehiclemor.registry import component
-from vehiclemor.report.comparison.study import grid_rows, study_comparison, study_text
-from vehiclemor.report.figures.result_plot import plot_result
+from vehiclemor.report.comparison.study import study_comparison, study_text
 from vehiclemor.report.page import error_tables
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
@@ -106,8 +105,8 @@ def test_the_models_own_parameters_are_the_same_run_and_others_are_refused():
 
 
 STUDY = """
-training = {training}
-grid = {{ amplitude_factor = [0.9, 1.0], rank = [3] }}
+training = ["nominal"]
+grid = { amplitude_factor = [0.9, 1.0], rank = [3] }
 
 [[methods]]
 method = "pod"
@@ -120,7 +119,7 @@ training = "travel_and_rack"
 def study(tmp_path_factory):
     """A study, its folder and its combined dataset, as read from its file."""
     folder = tmp_path_factory.mktemp("trained")
-    file = small_study(folder, STUDY.format(training='["nominal"]'), "full_order", "replay")
+    file = small_study(folder, STUDY, "full_order", "replay")
     run_studies(str(file), folder)
     (dataset,) = run_studies(str(file), folder).values()
     return file, folder, dataset
@@ -141,47 +140,11 @@ def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys
     assert "; 1 trained on the tested run" in " ".join(capsys.readouterr().out.split())
 
 
-def legend(figure):
-    (found,) = figure.legends
-    return [text.get_text() for text in found.get_texts()], found.get_title().get_text()
-
-
-def test_runs_of_the_training_are_marked_in_pictures(study):
-    _, _, dataset = study
-    names, told = legend(vm.plot(dataset))
-    assert {"replay*", "other"} <= set(names)
-    assert told == "* trained on this run"
-    names, told = legend(vm.plot(dataset, amplitude_factor=0.9))
-    assert "replay" in names
-    assert not told
-    assert (
-        "1 of 6 runs were in their own training"
-        in plot_result(dataset, None, "errors").get_suptitle()
-    )
-    assert legend(vm.plot(replayed()))[1] == "* trained on this run"
-
-
-def test_results_that_do_not_tell_are_read(study):
-    _, _, dataset = study
-    old = dataset.drop_vars("in_training")
-    assert {row["trained"] for row in grid_rows(old)} == {0}
-    assert "replay" in legend(vm.plot(old))[0]
-
-
-@pytest.mark.parametrize(
-    ("training", "words"),
-    [
-        ('"nomnal"', "unknown training 'nomnal'; did you mean nominal?"),
-        ('"lane_change"', "gives inputs delta, double_wishbone needs z, s0"),
-        ('"set"', "'set' needs training_set"),
-    ],
-)
-def test_wrong_training_of_a_study_is_told_before_its_first_run(training, words, tmp_path):
-    file = small_study(tmp_path, STUDY.format(training=training), "replay")
-    with pytest.raises(FileError, match=words) as error:
-        vm.run_study(file, out=tmp_path / "out")
-    assert "\n" not in str(error.value)
-    assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize(("factor", "name"), [(1.0, "replay*"), (0.9, "replay")])
+def test_runs_of_the_training_are_marked_in_pictures(study, factor, name):
+    (legend,) = vm.plot(study[2], amplitude_factor=factor).legends
+    assert {name, "other"} <= {text.get_text() for text in legend.get_texts()}
+    assert ("trained on this run" in legend.get_title().get_text()) == name.endswith("*")
 
 
 def test_training_of_the_command_line(capsys):

@@ -1,7 +1,5 @@
 """Exported systems over the values of other libraries: all give the model's numbers."""
 
-import math
-
 import numpy as np
 import pytest
 import sympy as sp
@@ -9,11 +7,6 @@ import sympy as sp
 import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative
 from vehiclemor.exporting.export import system_of
-from vehiclemor.exporting.interpreter import evaluated
-from vehiclemor.exporting.straight_line import FUNCTIONS
-
-FLOATS = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}
-FLOATS |= {"fmax": max, "fmin": min, "select": lambda test, then, other: then if test else other}
 
 
 def around(model, rng, samples=3):
@@ -33,20 +26,6 @@ def agree(found, states, model, inputs):
     rates, outputs = wanted(model, states, inputs)
     assert np.abs(found[0] - rates).max() <= 1e-12 * np.abs(rates).max()
     assert relative(found[1][:, : outputs.shape[1]], outputs) < 1e-10
-
-
-def test_plain_numbers(rng):
-    model = in_use("independent_suspension_vehicle", "reduced")
-    system = system_of(model)
-    states, inputs = around(model, rng)
-    found = []
-    for x, u in zip(states.tolist(), inputs.tolist(), strict=True):
-        arrays = {"x": x, "u": u, "p": system.values.tolist()}
-        arrays["c"] = evaluated(system.functions["constants"], arrays, FLOATS)
-        found.append(
-            [evaluated(system.functions[n], arrays, FLOATS) for n in ("derivative", "outputs")]
-        )
-    agree([np.array(part) for part in zip(*found, strict=True)], states, model, inputs)
 
 
 @pytest.mark.parametrize(

@@ -85,13 +85,6 @@ def published() -> Published:
     return load_published()
 
 
-def test_paper(published: Published) -> None:
-    paper = published.paper
-    assert paper.authors == ["Ramin Masoudi", "Thomas Uchida", "John McPhee"]
-    assert (paper.volume, paper.number, paper.article, paper.year) == (10, 3, "031007", 2015)
-    assert paper.doi == "10.1115/1.4029390"
-
-
 def test_numbers_are_as_printed_and_all_of_them_are_tested(published: Published) -> None:
     assert set(published.numbers) == set(NUMBERS) | set(SETTINGS)
     for name, expected in NUMBERS.items():
