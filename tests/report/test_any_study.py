@@ -114,8 +114,7 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     assert np.isfinite(row["largest"])
     assert row["largest"] <= before["mine", "dropped", "tire_force"]["largest"]
     figure = plot_result(data, None, "errors")
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert "a run has failed" in labels
+    assert "a run has failed" in [text.get_text() for text in figure.legends[0].get_texts()]
     check_texts_of(figure)
     # What a protocol would not trust has the status ok, and a remark.
     data["remark"] = data["remark"].astype(object)

@@ -307,6 +307,5 @@ def test_a_study_stored_by_other_source_is_named(unseen_travels, tmp_path, capsy
     write_dataset(old, tmp_path / "studies" / f"{study}.nc")
     assert main(["figures", "--results", str(tmp_path), "--out", str(tmp_path / "figures")]) == 1
     printed = capsys.readouterr().err
-    assert printed.startswith("figure pareto-suspension can't be drawn: KeyError")
-    assert "seconds_upper" in printed
-    assert "vehiclemor figures --only pareto-suspension makes its study again" in printed
+    for words in ("pareto-suspension", "seconds_upper", "makes its study again"):
+        assert words in printed
