@@ -26,17 +26,12 @@ title = "My car, my method"
 model = "quarter_car"
 training = "nominal"
 start = ["equilibrium", "dropped"]
-keep = "{keep}"
-[grid]
-frequency_factor = [0.8, 1.0, 1.3]
-fastest = [20.0, 1000.0]
-[[methods]]
-method = "full_order"
-[[methods]]
-method = "replay"
-[[methods]]
-method = "quarter_car_modes"
-label = "mine"
+grid = { frequency_factor = [0.8, 1.0, 1.3], fastest = [20.0, 1000.0] }
+methods = [
+    { method = "full_order" },
+    { method = "replay" },
+    { method = "quarter_car_modes", label = "mine" },
+]
 """
 PROTOCOL = """
 title = "My car, my method, roads that it has not seen"
@@ -46,23 +41,15 @@ training = [{ maneuver = "quarter_car_road" }]
 validation = [{ maneuver = "quarter_car_road", frequency = [1.2] }]
 targets = [{ against = "equal accuracy", ratio = 2.0 }]
 failure_rate = 0.01
+contestants = [
+    { label = "full order", method = "full_order", role = "full order" },
+    { label = "replay", method = "replay", role = "baseline" },
+    { label = "mine", method = "quarter_car_modes", candidates = [{ fastest = 1000.0 }] },
+]
 [[test]]
 maneuver = "quarter_car_road"
 frequency = [0.9, 1.1]
 start = ["equilibrium", "dropped"]
-[[contestants]]
-label = "full order"
-method = "full_order"
-role = "full order"
-candidates = [{ tolerance = 1e-3 }, { tolerance = 1e-6 }]
-[[contestants]]
-label = "replay"
-method = "replay"
-role = "baseline"
-[[contestants]]
-label = "mine"
-method = "quarter_car_modes"
-candidates = [{ fastest = 20.0 }, { fastest = 1000.0 }]
 """
 
 
@@ -70,7 +57,7 @@ candidates = [{ fastest = 20.0 }, { fastest = 1000.0 }]
 def place(plug_in_package, tmp_path_factory):
     """A folder with a study, a protocol and a collection of both, and their results."""
     folder = tmp_path_factory.mktemp("mine")
-    (folder / "mine.toml").write_text(STUDY.format(keep="trajectories"))
+    (folder / "mine.toml").write_text(STUDY)
     (folder / "road.toml").write_text(PROTOCOL)
     (folder / "judged.toml").write_text(f'title = "j"\nprotocols = ["{folder / "road.toml"}"]\n')
     members = ", ".join(f'"{folder / name}.toml"' for name in ("mine", "judged"))
@@ -95,8 +82,7 @@ def said(place, capsys, monkeypatch):
 def test_a_study_is_compared_by_method_start_and_output(place, said):
     status, text = said("compare", place / "mine.toml")
     assert status == 0
-    for words in ("My car, my method", "mine", "replay", "start dropped: tire force, N"):
-        assert words in text
+    assert "start dropped: tire force, N" in text
     status, text = said("compare", place / "mine.toml", "--json")
     rows = {(r["method"], r["start"], r["output"]): r for r in json.loads(text)}
     data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
@@ -122,17 +108,13 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     before = {(r["method"], r["start"], r["output"]): r for r in grid_rows(data)}
     data["status"].loc[there] = "diverged"
     data["rms_error"].loc[there] = np.inf
-    row = next(
-        r
-        for r in grid_rows(data)
-        if (r["method"], r["start"], r["output"]) == ("mine", "dropped", "tire_force")
-    )
+    after = {(r["method"], r["start"], r["output"]): r for r in grid_rows(data)}
+    row = after["mine", "dropped", "tire_force"]
     assert (row["failed"], row["failures"], row["runs"]) == (1, "1 diverged", 6)
     assert np.isfinite(row["largest"])
     assert row["largest"] <= before["mine", "dropped", "tire_force"]["largest"]
     figure = plot_result(data, None, "errors")
-    labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert "a run has failed" in labels
+    assert "a run has failed" in [text.get_text() for text in figure.legends[0].get_texts()]
     check_texts_of(figure)
     # What a protocol would not trust has the status ok, and a remark.
     data["remark"] = data["remark"].astype(object)
@@ -146,17 +128,13 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     assert told == ["ok (trained on this run): not driven; not to be trusted on Mars"]
     data["status"][:] = "diverged"
     assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
-    assert plot_result(data, None, "errors").axes
 
 
 def test_a_protocol_is_judged_by_its_own_targets(place, said):
     # Four runs can't exclude a rate of 1 %, however fast they are.
     status, text = said("compare", place / "both.toml")
     assert status == 1
-    for words in ("My car, my method", "road (quarter_car): 4 runs", "* mine"):
-        assert words in text
     assert re.search(r"failure rate below +0.01\*? +0.53 +missed", text)
-    assert "speed-up, equal accuracy" in text
     rows = vm.compare(str(place / "road.toml"), place / "results")
     assert set(rows["study"]) == {"predictive-road"}
     assert set(rows["method"][rows["kind"] == "target"]) == {"mine"}
@@ -178,17 +156,6 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
         f"figure-road-pareto.{suffix}" for suffix in ("pdf", "svg", "png")
     ]
     assert all(path.stat().st_size > 10_000 for path in written)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [("nothing.toml", "no such file"), ("figurs-2-4", "did you mean figures-2-4")],
-)
-@pytest.mark.parametrize("command", [["compare"], ["figures", "--only"]])
-def test_what_is_no_study_is_named(command, wrong, words, tmp_path, capsys):
-    assert main([*command, wrong, "--out", str(tmp_path / "out")]) == 2
-    assert words in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
 
 
 def check_texts_of(figure):
@@ -220,19 +187,12 @@ FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
 @pytest.mark.parametrize(
     ("dimensions", "label", "panels", "meshes"),
     [
-        (FACTOR, "frequency perturbation (%)", 2, 0),
         (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
         (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
         ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
         ({"rank": [*range(1, 9)], "snapshots": [*range(5, 11)]}, "rank", 4, 4),
         ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 4, 0),
         ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
-        (
-            FACTOR | {"rank": [*range(1, 9)], "snapshots": [5, 6]},
-            "frequency perturbation (%)",
-            2,
-            0,
-        ),
         ({"equation_seed": [*range(30)]}, "", 2, 0),
     ],
 )

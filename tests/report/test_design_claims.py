@@ -16,4 +16,3 @@ def test_claims_about_design_keep_their_verdicts_and_figures():
     assert values["springs and dampers: slow manifold"] == 46.6255
     for row in (*finds, *saves):
         assert row.verdict == (MET if row.reproduced <= row.bound else MISSED)
-        assert row.reason.endswith("; of 2026-11-22, last contained in 44305be")

@@ -17,7 +17,6 @@ from vehiclemor.study.netcdf_file import read_dataset
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
 CURVE = "frequency_factor = [0.8, 1.0, 1.25]"
-OVER = "amplitude_factor = [1.0, 1.2]"
 MAP = f"{CURVE}\namplitude_factor = [-0.5, 1.0, 1.2]"
 # Factor of the amplitude -> of the runs beyond it none comes well to its end.
 PARTLY = 0.08
@@ -33,13 +32,18 @@ def study(*ends, grid="", above=0.0, **entries):
     return "\n".join(lines)
 
 
-STUDIES = {f"alone-{end}": study(end) for end in ENDS}
-STUDIES |= {f"beside-{end}": study(end, "ok", grid=CURVE) for end in ENDS[1:]}
-STUDIES |= {f"map-{n}": study(*ENDS[:n], grid=MAP, above=PARTLY) for n in range(1, 8)}
+# Each end alone, beside another over a curve, or on a map of few and of all methods.
+STUDIES = {f"alone-{end}": study(end) for end in ("ok", "diverged", "unreachable", "error")}
+STUDIES |= {
+    f"beside-{end}": study(end, "ok", grid=CURVE)
+    for end in ("untrusted", "diverged", "rejected", "exact")
+}
+STUDIES |= {f"map-{n}": study(*ENDS[:n], grid=MAP, above=PARTLY) for n in (1, 4, 7)}
+NUMBERS = "amplitude_factor = [1.0, 1.2]"
 STUDIES |= {
     "all": study(*ENDS),
     "none": study("error", "rejected", grid=MAP),
-    "numbers": study("untrusted", "diverged", "exact", "error", grid=OVER, keep="metrics"),
+    "numbers": study("untrusted", "diverged", "exact", "error", grid=NUMBERS, keep="metrics"),
     "late": study("diverged").replace("off = 0.01", "part = 0.999"),
     "at-once": study("diverged", "ok").replace("off = 0.01", "part = 0.001"),
 }
@@ -89,12 +93,12 @@ def test_every_study_is_drawn(results, name):
         checked(vm.plot(results / f"{name}.toml", "errors", results=results))
 
 
-@pytest.mark.parametrize("name", ["all", "late", "at-once", *(f"beside-{e}" for e in ENDS[1:])])
+@pytest.mark.parametrize("name", ["all", "late", "at-once", "beside-exact", "beside-rejected"])
 def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(results, name):
     data = read_dataset(results / "studies" / f"{name}.nc", "source", "vehiclemor")
     figure = vm.plot(str(results / f"{name}.toml"), results=results)
     legend, notes = said(checked(figure))
-    assert ("has diverged" in legend) == (name in ("all", "late", "at-once", "beside-diverged"))
+    assert ("has diverged" in legend) == (name in ("all", "late", "at-once"))
     assert "leaves the axes" not in legend
     assert notes == []
     lines = {line.get_label(): line for line in figure.axes[0].lines}
@@ -109,10 +113,9 @@ def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(results,
         assert np.isfinite(shown[-1]) == (status in ("ok", "untrusted"))
 
 
-@pytest.mark.parametrize("end", ["rejected", "unreachable", "error"])
-def test_what_has_no_values_says_so(results, end):
-    legend, notes = said(vm.plot(f"alone-{end}", results=results))
-    assert legend == [f"{end} 0 ({end})"]
+def test_what_has_no_values_says_so(results):
+    legend, notes = said(vm.plot("alone-unreachable", results=results))
+    assert legend == ["unreachable 0 (unreachable)"]
     assert notes == ["no finite values"] * 2
 
 
@@ -135,11 +138,9 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(results, capsys, monkey
     only = ["--only", f"{results / 'alone-ok.toml'},1", "--results", str(results)]
     assert main(["figures", *only, "--out", str(results / "some"), "--dpi", "20"]) == 1
     printed = capsys.readouterr()
-    line = "figure alone-ok-histories can't be drawn: IndexError: index 51 is out of bounds"
-    assert printed.err.splitlines() == [line]
+    (line,) = printed.err.splitlines()
+    assert line.startswith("figure alone-ok-histories can't be drawn: IndexError")
     assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png", "1.png"]
-    with pytest.raises(InputError, match=r"alone-ok-histories.*IndexError"):
-        vm.figures([str(results / "alone-ok.toml")], results / "some", results)
     page = vm.write_report([str(results / "alone-ok.toml")], results / "page.html", results)
     head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
     assert "Left out: histories of alone-ok (IndexError: index 51" in head
@@ -149,10 +150,7 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(results, capsys, monkey
 def test_paths_of_runs_that_have_failed(results):
     data = read_dataset(results / "studies" / "all.nc", "source", "vehiclemor")
     data = data.sel(output=["spindle_x", "spindle_y"]).assign_coords(output=list(PATH))
-    figure = vm.plot(data.squeeze(), "paths")
-    figure.draw_without_rendering()
-    assert "diverged 2* (diverged)" in said(figure)[0]
-    assert len(figure.axes) == 2
+    assert "diverged 2* (diverged)" in said(checked(vm.plot(data.squeeze(), "paths")))[0]
 
 
 def test_what_was_not_compared_is_drawn_alone(tmp_path):
@@ -169,13 +167,6 @@ def test_what_was_not_compared_is_drawn_alone(tmp_path):
             vm.plot(result, "errors")
 
 
-@pytest.mark.parametrize("kind", [np.ones(3), ["errors"], "path", None])
-def test_what_is_no_kind_is_one_line(results, kind):
-    with pytest.raises(InputError, match="unknown kind of plot") as caught:
-        vm.plot("all", kind, results=results)
-    assert "\n" not in str(caught.value)
-
-
 def test_a_study_is_drawn_by_the_name_of_its_results(results, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["plot", "all", "--results", str(results)]) == 0
@@ -190,29 +181,13 @@ def test_a_study_is_drawn_by_the_name_of_its_results(results, tmp_path, monkeypa
     assert "unknown study 'al'" in capsys.readouterr().err
 
 
-def test_a_picture_of_a_method_that_has_failed(tmp_path, monkeypatch, capsys):
-    endings.register(monkeypatch)
-    arguments = ["simulate", "double_wishbone", "--method", "endings", "--set", "end=error"]
-    assert main([*arguments, "--plot", str(tmp_path / "a.png")]) == 1
-    assert "RuntimeError: a bug" in capsys.readouterr().out
-    assert (tmp_path / "a.png").stat().st_size > 1000
-
-
-def test_an_empty_name_draws_nothing(tmp_path, capsys):
-    assert main(["figures", "--only", "", "--out", str(tmp_path / "a")]) == 2
-    assert "--only '' names no figure" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_map_of_two_amplitudes_has_its_published_line(results):
     values = ", ".join(f"{value:.3f}" for value in np.linspace(0.8, 1.2, 51))
     grid = f"frequency_factor = [{values}]\namplitude_factor = [1.0, 1.1]"
     (results / "wide.toml").write_text(
         study("ok", grid=grid, keep="metrics").replace("0.01", "1e-4")
     )
-    figure = vm.plot(vm.run_study(results / "wide.toml", out=results), "errors")
-    figure.draw_without_rendering()
-    assert figure.axes
+    checked(vm.plot(vm.run_study(results / "wide.toml", out=results), "errors"))
 
 
 def test_counts_agree(results, capsys):

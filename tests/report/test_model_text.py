@@ -8,25 +8,17 @@ from vehiclemor.report.comparison import model
 def test_perturbed_errors_are_of_their_start_and_failures_are_named(monkeypatch, tmp_path):
     monkeypatch.setattr(model, "costs_text", lambda *_: "")
     monkeypatch.setattr(model, "predictive_text", lambda _: "")
-    rows = [
-        {
-            "kind": kind,
-            "method": method,
-            "start": start,
-            "status": status,
-            "rms_second_euler_angle": e,
-        }
-        for kind, method, start, status, e in (
+    table = pd.DataFrame(
+        [
             ("nominal", "pod", "equilibrium", "ok", 1e-6),
             ("nominal", "pod", "dropped", "ok", 2e-6),
             ("nominal", "path_map", "equilibrium", "ok", 3e-6),
             ("perturbed", "pod", "equilibrium", "ok", 4e-6),
             ("perturbed", "pod", "equilibrium", "ok", 5e-6),
-            ("perturbed", "path_map", "equilibrium", "ok", 6e-6),
             ("perturbed", "path_map", "equilibrium", "unreachable", float("nan")),
-        )
-    ]
-    table = pd.DataFrame(rows).assign(effective_rank=3, message="", rms_spindle_y=0.0)
+        ],
+        columns=["kind", "method", "start", "status", "rms_second_euler_angle"],
+    ).assign(effective_rank=3, message="", rms_spindle_y=0.0)
     text = model.model_text("double_wishbone", table, tmp_path)
     found = [line.split()[-2:] for line in text.splitlines() if line.split()[1:2] == ["3"]]
     assert found == [["1.0e-06", "5.0e-06"], ["3.0e-06", "failed"], ["2.0e-06", "-"]]

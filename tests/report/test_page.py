@@ -1,8 +1,9 @@
 """The report as a page: alone in its file, escaped, with every error, status and setting."""
 
 import json
+import re
 import shutil
-from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 import pytest
 
@@ -11,7 +12,6 @@ from vehiclemor.cli import main
 from vehiclemor.report import page
 from vehiclemor.report.comparison.rows import COLUMNS
 from vehiclemor.report.predictive.rows import method_rows, protocol_of
-from vehiclemor.study import timing
 from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
@@ -20,88 +20,51 @@ title = {json.dumps(HOSTILE)}
 model = "double_wishbone"
 training = "nominal"
 keep = "metrics"
-[grid]
-frequency_factor = [0.9, 1.0, 1.2]
-[[methods]]
-method = "pod"
-settings = {{ rank = 3 }}
-[[methods]]
-method = "replay"
-label = {json.dumps(HOSTILE)}
-"""
-PROTOCOL = """
-title = "unseen travels"
-model = "double_wishbone"
-bounds.spindle_y = { measure = "rms", bound = 7.57e-5 }
-training = [{ maneuver = "sine_travel", points = [[1.0, 1.2]] }]
-validation = [{ maneuver = "sine_travel", points = [[1.3, 1.0]] }]
-test = [{ maneuver = "sine_travel", points = [[0.9, 1.0], [1.1, 0.8]] }]
-contestants = [
-    { label = "newton", method = "full_order", role = "full order" },
-    { label = "fixed basis", method = "fixed_basis", candidates = [{ rank = 3 }] },
+grid = {{ frequency_factor = [0.9, 1.0, 1.2] }}
+methods = [
+    {{ method = "pod", settings = {{ rank = 3 }} }},
+    {{ method = "replay", label = {json.dumps(HOSTILE)} }},
 ]
-targets = [{ against = "within bounds", ratio = 2.0 }]
 """
-VOID = {"meta", "hr", "img"}
 
 
-class Page(HTMLParser):
-    """A page that was read: its elements, texts by element, and rows of tables."""
+def parsed(text):
+    """A page as XML, which it is but for the elements that are never closed."""
+    return ElementTree.fromstring(re.sub(r"<(meta|hr|img)\b([^>]*)>", r"<\1\2/>", text))  # noqa: S314 - our own
 
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.elements, self.rows, self.texts = [], [], [], {}
-        self.feed(text)
-        self.close()
-        assert self.open == []
 
-    def handle_starttag(self, tag, attrs):
-        self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-        if tag == "tr":
-            self.rows.append([])
-        if tag in ("td", "th"):
-            self.rows[-1].append("")
-        if tag == "data":
-            self.rows[-1][-1] = float(dict(attrs)["value"])
+def texts(page, tag):
+    return ["".join(element.itertext()) for element in page.iter(tag)]
 
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
 
-    def handle_data(self, data):
-        if self.open:
-            self.texts.setdefault(self.open[-1], []).append(data)
-        if {"td", "th"} & set(self.open) and isinstance(self.rows[-1][-1], str):
-            self.rows[-1][-1] += data
+def table(page, heading):
+    """Rows of the table with this heading, as dictionaries."""
+    for element in page.iter("table"):
+        heads, *rows = ([value(cell) for cell in row] for row in element.iter("tr"))
+        if heading in heads:
+            return [dict(zip(heads, row, strict=True)) for row in rows]
+    raise AssertionError(heading)
 
-    def table(self, heading):
-        """Rows of the table with this heading, as dictionaries."""
-        place = next(n for n, row in enumerate(self.rows) if heading in row)
-        heads = self.rows[place]
-        rest = [row for row in self.rows[place + 1 :] if len(row) == len(heads)]
-        return [dict(zip(heads, row, strict=True)) for row in rest]
+
+def value(cell):
+    (number,) = [element.get("value") for element in cell.iter("data")] or [None]
+    return "".join(cell.itertext()) if number is None else float(number)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(tmp_path_factory, small_protocol):
     """Folder of results, and the text of the report of all of them."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "unseen.toml").write_text(PROTOCOL)
     (folder / "hostile.toml").write_text(STUDY)
-    protocol = f'title = "x"\nprotocols = [{json.dumps(str(folder / "unseen.toml"))}]\n'
-    (folder / "mine.toml").write_text(protocol)
-    names = [str(folder / f"{name}.toml") for name in ("hostile", "mine")]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(timing, "PROTOCOL_ROUNDS", 2)
-        out = ["--results", str(folder), "--out", str(folder / "a.html")]
-        assert main(["report", *names, *out]) == 0
+    names = [str(folder / "hostile.toml"), str(small_protocol)]
+    out = ["--results", str(folder), "--out", str(folder / "a.html")]
+    assert main(["report", *names, *out]) == 0
     return folder, (folder / "a.html").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def read(made):
-    return Page(made[1])
+    return parsed(made[1])
 
 
 def dataset_of(folder, name):
@@ -109,25 +72,25 @@ def dataset_of(folder, name):
 
 
 def test_the_file_is_whole_and_loads_nothing(read):
-    ids = [attributes["id"] for _, attributes in read.elements if "id" in attributes]
-    links = [attributes["href"][1:] for _, attributes in read.elements if "href" in attributes]
-    assert links == ids
-    pictures = [attributes["src"] for _, attributes in read.elements if "src" in attributes]
+    every = list(read.iter())
+    links = [element.get("href")[1:] for element in every if element.get("href")]
+    assert links == [element.get("id") for element in every if element.get("id")]
+    pictures = [element.get("src") for element in every if element.get("src")]
     assert len(pictures) == 2
     assert all(picture.startswith("data:image/svg+xml;base64,") for picture in pictures)
-    policy = next(a["content"] for tag, a in read.elements if "http-equiv" in a)
+    (policy,) = [element.get("content") for element in every if element.get("http-equiv")]
     assert policy == "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def test_hostile_titles_are_texts(read):
-    assert not [tag for tag, _ in read.elements if tag == "script"]
-    assert HOSTILE in read.texts["h2"]
-    assert any(row["method"] == HOSTILE for row in read.table("cell"))
+    assert not list(read.iter("script"))
+    assert HOSTILE in texts(read, "h2")
+    assert any(row["method"] == HOSTILE for row in table(read, "cell"))
 
 
 def test_every_run_is_listed_with_its_error_status_and_cell(made, read):
     dataset = dataset_of(made[0], "hostile")
-    rows = {(row["method"], row["frequency factor"]): row for row in read.table("cell")}
+    rows = {(row["method"], row["frequency factor"]): row for row in table(read, "cell")}
     assert len(rows) == 6
     for method in dataset["method"].values:
         for factor in dataset["frequency_factor"].values:
@@ -142,18 +105,18 @@ def test_every_run_is_listed_with_its_error_status_and_cell(made, read):
 
 def test_provenance_and_settings_stand_there(made, read):
     dataset = dataset_of(made[0], "hostile")
-    assert json.loads(read.texts["pre"][0]) == json.loads(dataset.attrs["configuration"])
-    for name in ("versions", "machine", "kernel_hash"):
-        assert str(dataset.attrs[name]) in read.texts["dd"]
+    assert json.loads(texts(read, "pre")[0]) == json.loads(dataset.attrs["configuration"])
+    for name in ("versions", "kernel_hash"):
+        assert str(dataset.attrs[name]) in texts(read, "dd")
 
 
 def test_a_protocol_shows_its_contestants_and_targets(made, read):
     dataset = dataset_of(made[0], "predictive-unseen")
     expected = {row["method"]: row for row in method_rows(dataset, protocol_of(dataset))}
-    rows = {row["method"]: row for row in read.table("ratio equal")}
+    rows = {row["method"]: row for row in table(read, "ratio equal")}
     for name in ("misses", "score", "seconds"):
         assert float(rows["fixed basis"][name]) == expected["fixed basis"][name]
-    targets = read.table("threshold source")
+    targets = table(read, "threshold source")
     assert {row["verdict"] for row in targets} <= {"met", "missed", "not comparable"}
     assert {row["threshold source"] for row in targets} == {"ours"}
 
@@ -175,7 +138,10 @@ def test_the_paper_is_judged(made, monkeypatch):
     monkeypatch.setattr(page, "run_studies", lambda *_: {})
     out = vm.write_report("paper", made[0] / "paper.html", made[0])
     text = out.read_text(encoding="utf-8")
-    assert [row["verdict"] for row in Page(text).table("variant")] == ["missed", "not comparable"]
+    assert [row["verdict"] for row in table(parsed(text), "variant")] == [
+        "missed",
+        "not comparable",
+    ]
     assert "2 rows: 1 missed, 1 not comparable" in text
 
 
@@ -184,7 +150,7 @@ def test_a_damaged_file_is_named_and_left_out(made, tmp_path):
     shutil.copy(made[0] / "studies" / "predictive-unseen.nc", tmp_path / "studies")
     (tmp_path / "studies" / "broken.nc").write_bytes(b"nothing")
     text = vm.write_report(out=tmp_path / "c.html", results=tmp_path).read_text(encoding="utf-8")
-    assert "broken.nc" in Page(text).texts["p"][1]
+    assert "broken.nc" in texts(parsed(text), "p")[1]
 
 
 @pytest.mark.parametrize(
@@ -192,7 +158,6 @@ def test_a_damaged_file_is_named_and_left_out(made, tmp_path):
     [
         ([], "no results of a study"),
         (["--out", "report.pdf"], "ends with .html"),
-        (["--out", "nowhere/report.html"], "does not exist"),
         (["nonsense"], "nonsense"),
     ],
 )
@@ -203,10 +168,3 @@ def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys
     assert told.count("\n") == 1
     assert words in told
     assert list(tmp_path.glob("*.html")) == []
-
-
-@pytest.mark.parametrize("studies", [3, [3], ["no-such-study"]])
-def test_wrong_names_in_python_are_one_line(studies, tmp_path):
-    with pytest.raises(vm.VehiclemorError, match="stud") as caught:
-        vm.write_report(studies, tmp_path / "d.html", tmp_path)
-    assert "\n" not in str(caught.value)

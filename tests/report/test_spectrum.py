@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.registry import component
-from vehiclemor.report.spectrum import spectrum, spectrum_table, spectrum_text
+from vehiclemor.report.spectrum import spectrum, spectrum_table
 from vehiclemor.simulation.build import build
 
 
@@ -55,15 +55,3 @@ def test_table_has_the_worst_control_period(suspension):
     assert row["least_energy"] == float(suspension["energy"].sel(mode=1).min())
     assert row["largest_left_out"] == float(suspension["left_out"].sel(mode=1).max())
     assert list(table.loc["literal"].index) == list(range(1, 9))
-
-
-def test_printed_spectrum_has_both_presets(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    rows = spectrum_table("double_wishbone").to_dict("records")
-    lines = spectrum_text(rows).splitlines()
-    assert max(map(len, lines)) <= 80
-    # Nothing is left out by the last mode, and the singular value of the third is small.
-    third = next(line for line in lines if line.split()[0] == "3").split()
-    assert third[1:4] == ["4.7e-04", "5.6e-04", "3.3e-10"]
-    assert third[4:] == third[1:4]
-    assert lines[-1].split()[-1] == "-"

@@ -20,6 +20,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.study.small import assert_same, small_study
 from tests.texts.markdown import blocks
 from vehiclemor.errors import InputError, MachineError
 from vehiclemor.study import cluster as engine
@@ -28,35 +29,21 @@ from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.workers import WAITING, Timed, evaluate_and_store, in_batches
+from vehiclemor.study.workers import LARGEST, WAITING, Timed, evaluate_and_store, in_batches
 
 distributed = pytest.importorskip("distributed")
 
 STUDY = """
-title = "for the tests"
-model = "double_wishbone"
 training = "nominal"
 keep = "metrics"
-
-[grid]
-frequency_factor = [0.9, 1.0, 1.1]
-amplitude_factor = [1.0, 3.0]
-rank = [2, 3]
-
-[[methods]]
-method = "full_order"
-
-[[methods]]
-method = "pod"
+grid = { frequency_factor = [0.9, 1.0, 1.1], amplitude_factor = [1.0, 3.0], rank = [2, 3] }
 """
 CELLS = 6 + 12
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("study") / "small.toml"
-    path.write_text(STUDY)
-    return path
+    return small_study(tmp_path_factory.mktemp("study"), STUDY, "full_order", "pod")
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +71,6 @@ def client():
 
 def run(study: Path, folder: Path, client) -> xr.Dataset:
     return run_studies(str(study), folder, scheduler=client.scheduler.address)["small"]
-
-
-def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
-    seconds = ["seconds", "offline_seconds"]
-    xr.testing.assert_identical(one.drop_vars(seconds), other.drop_vars(seconds))
 
 
 def cells_in(folder: Path) -> dict[Path, int]:
@@ -177,15 +159,8 @@ def test_nobody_else_reaches_the_workers_of_this_machine():
 # Batches
 
 
-@given(
-    number=st.integers(0, 300),
-    places=st.integers(0, 5),
-    pace=st.sampled_from([0.0, 1e-3, 0.05, 1.0]),
-    most=st.sampled_from([1, 10, 100]),
-)
-def test_batches_hold_each_group_once_and_whole(number, places, pace, most):
-    sizes = [1 + group**2 % 4 for group in range(number)]
-    groups = [[(number, part) for part in range(size)] for number, size in enumerate(sizes)]
+def batched(groups, places, pace, most):
+    """Batches that are sent and that come back where a cell takes `pace` seconds."""
     sent = []
 
     def submit(batch):
@@ -194,49 +169,34 @@ def test_batches_hold_each_group_once_and_whole(number, places, pace, most):
         future.set_result(Timed(batch, pace * len(batch)))
         return future
 
-    found = list(in_batches(groups, submit, lambda: places, Future.result, most))
-    assert sorted(chain(*found)) == sorted(chain(*groups))
-    assert list(chain(*sent)) == list(chain(*groups))
-    assert all(len(batch) <= max([most, *sizes]) for batch in sent)
-    # As many as there are places end together.
-    assert all(len(batch) <= 4 for batch in sent[-WAITING * places :] if places)
+    return sent, list(in_batches(groups, submit, lambda: places, Future.result, most))
 
 
 def test_quick_cells_go_in_large_batches():
-    sent = []
-
-    def submit(batch):
-        sent.append(len(batch))
-        future: Future[Timed] = Future()
-        future.set_result(Timed(batch, 1e-3 * len(batch)))
-        return future
-
-    list(in_batches([[i] for i in range(10_000)], submit, lambda: 2, Future.result))
+    sent, _ = batched([[i] for i in range(10_000)], 2, 1e-3, LARGEST)
     assert len(sent) < 150
+
+
+@given(number=st.integers(0, 300), places=st.integers(0, 5), pace=st.sampled_from([0.0, 0.05]))
+def test_batches_hold_each_group_once_and_whole(number, places, pace):
+    groups = [[(group, part) for part in range(1 + group**2 % 4)] for group in range(number)]
+    sent, found = batched(groups, places, pace, 10)
+    assert sorted(chain(*found)) == sorted(chain(*groups))
+    assert list(chain(*sent)) == list(chain(*groups))
+    assert all(len(batch) <= 10 for batch in sent)
+    # As many as there are places end together.
+    assert all(len(batch) <= 4 for batch in sent[-WAITING * places :] if places)
 
 
 # What can't be
 
 
 def test_no_scheduler_is_one_line(study, tmp_path, monkeypatch):
-    for address, reason in (
-        ("nonsense", "missing port number"),
-        ("tls://127.0.0.1:9", "TLS expects"),
-        ("foo://here:1", "unknown address scheme"),
-    ):
-        with pytest.raises(InputError, match=rf"^scheduler {address}: can't be reached .*{reason}"):
-            run_studies(str(study), tmp_path, scheduler=address)
     monkeypatch.setattr(engine, "REACH", 0.2)
-    with pytest.raises(InputError, match=r"can't be reached .*Timed out"):
-        run_studies(str(study), tmp_path, scheduler="127.0.0.1:1")
-
-    async def connect(*_, **__):
-        raise LookupError("Non-websocket response")
-
-    with monkeypatch.context() as patch:
-        patch.setattr("distributed.core.connect", connect)
-        with pytest.raises(InputError, match=r"can't be reached .Non-websocket response"):
-            run_studies(str(study), tmp_path, scheduler="ws://127.0.0.1:1")
+    for address in ("nonsense", "tls://127.0.0.1:9", "127.0.0.1:1"):
+        with pytest.raises(InputError, match=rf"^scheduler {address}: can't be reached ") as error:
+            run_studies(str(study), tmp_path, scheduler=address)
+        assert "\n" not in str(error.value)
     with pytest.raises(InputError, match="jobs: a scheduler at an address has its own workers"):
         run_studies(str(study), tmp_path, jobs=2, scheduler="127.0.0.1:1")
     monkeypatch.setitem(sys.modules, "distributed", None)
@@ -268,23 +228,19 @@ def test_a_worker_with_other_source_is_one_line(study, client, tmp_path, change,
 
 
 @pytest.mark.parametrize(
-    ("error", "expected", "text"),
+    ("error", "ends"),
     [
-        (CancelledError(), MachineError, "the scheduler is lost.*run again to resume"),
-        (ModuleNotFoundError("No module named 'mine'"), InputError, "a worker lacks.*'mine'"),
+        (CancelledError(), pytest.raises(MachineError, match="run again to resume")),
+        (ModuleNotFoundError("No module named 'mine'"), pytest.raises(InputError, match="'mine'")),
+        (distributed.KilledWorker("batch", None, 3), nullcontext()),
     ],
+    ids=["scheduler", "source", "killed"],
 )
-def test_what_ends_a_cluster_is_one_line(error, expected, text):
+def test_what_ends_a_batch_is_one_line_or_tried_again(error, ends):
     future: Future[Timed] = Future()
     future.set_exception(error)
-    with pytest.raises(expected, match=text):
-        engine._taken(future)
-
-
-def test_a_batch_that_kills_its_workers_is_the_machines_fault():
-    future: Future[Timed] = Future()
-    future.set_exception(distributed.KilledWorker("batch", None, 3))
-    assert engine._taken(future).result == (([], engine.KILLED), {})
+    with ends:
+        assert engine._taken(future).result == (([], engine.KILLED), {})
 
 
 def test_the_code_of_the_handbook_runs(study, alone, client, tmp_path, monkeypatch, capsys):

@@ -6,27 +6,20 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
+from tests.study.small import small_study
 from vehiclemor.cli import main
 from vehiclemor.errors import VehiclemorError
 from vehiclemor.report import study_formats
 
-STUDY = """
-title = "for the tests"
-model = "double_wishbone"
-grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], rank = [2, 3] }
-[[methods]]
-method = "full_order"
-[[methods]]
-method = "pod"
-"""
+GRID = 'grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], rank = [2, 3] }\n'
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     """Result of a study, and the folder that holds it."""
     folder = tmp_path_factory.mktemp("study")
-    (folder / "mine.toml").write_text(STUDY)
-    return vm.run_study(folder / "mine.toml", out=folder / "results"), folder
+    path = small_study(folder, GRID, "full_order", "pod", name="mine")
+    return vm.run_study(path, out=folder / "results"), folder
 
 
 @pytest.mark.parametrize("to", ["csv", "parquet"])
@@ -68,7 +61,6 @@ def test_zarr_holds_the_whole_dataset(study, tmp_path):
     [
         ("mine.toml", {"to": "xls"}, "unknown format 'xls'"),
         ("mine.toml", {"to": "csv", "out": "there.csv"}, "exists already"),
-        ("mine.toml", {"to": "csv", "out": "nowhere/mine.csv"}, "no such folder"),
         ("mine.toml", {"to": "csv", "out": "/"}, "is a folder"),
         ("mine.toml", {"to": "csv", "results": "elsewhere"}, "no such result"),
         ("paper", {"to": "csv"}, "is a collection"),
@@ -85,7 +77,7 @@ def test_wrong_conversions_leave_nothing(study, tmp_path, monkeypatch, name, arg
     assert (tmp_path / "there.csv").read_text() == "kept"
 
 
-def test_formats_of_one_result_share_their_columns(study, tmp_path):
+def test_formats_of_one_result_share_their_columns(study, tmp_path, monkeypatch):
     pytest.importorskip("pyarrow")
     _, folder = study
     for to in ("csv", "parquet"):
@@ -95,10 +87,6 @@ def test_formats_of_one_result_share_their_columns(study, tmp_path):
         vm.convert(folder / "mine.toml", "csv", tmp_path / "b.csv", results=folder / "results")
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"a.csv", "a.parquet", "a.columns.csv", "b.columns.csv"}
-
-
-def test_a_missing_engine_is_one_line(study, tmp_path, monkeypatch):
-    _, folder = study
     monkeypatch.setattr(study_formats, "find_spec", lambda _: None)
     with pytest.raises(VehiclemorError, match=r"pip install 'vehiclemor\[convert\]'"):
         vm.convert(folder / "mine.toml", "parquet", tmp_path / "a.parquet", folder / "results")

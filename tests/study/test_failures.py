@@ -5,22 +5,13 @@ from dataclasses import replace
 
 import pytest
 
+from tests.study.small import small_study
 from vehiclemor.errors import ConvergenceError, FileError, InputError, UnreachableError
 from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.study import evaluate, timing
-from vehiclemor.study.failure import Failure, attempt
+from vehiclemor.study.failure import attempt
 from vehiclemor.study.run import run_studies
 
-GRID = """
-title = "for the tests"
-model = "double_wishbone"
-
-[[methods]]
-method = "full_order"
-
-[[methods]]
-method = "fixed_basis"
-"""
 RAISED = [
     (InputError("asks for too much"), "rejected", "asks for too much"),
     (UnreachableError("too high"), "unreachable", "too high"),
@@ -46,9 +37,8 @@ def raised(request, monkeypatch):
 
 
 def test_what_a_fit_raises_is_a_result_in_a_grid(raised, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(GRID)
-    cells = run_studies(str(path), tmp_path)["mine"].squeeze()
+    path = small_study(tmp_path, "", "full_order", "fixed_basis")
+    cells = run_studies(str(path), tmp_path)["small"].squeeze()
     broken, full = cells.sel({"method": "fixed_basis"}), cells.sel({"method": "full_order"})
     status, message = raised
     assert broken["status"].item() == status
@@ -73,14 +63,3 @@ def test_what_is_wrong_with_a_file_ends_the_study():
 
     with pytest.raises(FileError):
         attempt(broken)
-
-
-def test_only_what_was_not_asked_for_is_put_down_to_the_reference():
-    def failing(error):
-        def run():
-            raise error
-
-        return attempt(run, "the reference: ")
-
-    assert failing(ConvergenceError("stuck")) == Failure("diverged", "the reference: stuck")
-    assert failing(UnreachableError("too high")) == Failure("unreachable", "too high")

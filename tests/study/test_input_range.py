@@ -43,7 +43,6 @@ def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, 
     [
         ("linear_single_track", 1.0, "ok"),
         ("linear_single_track", 1.5, "untrusted"),
-        ("modal_truncation", 1.5, "untrusted"),
         ("full_order", 1.5, "ok"),
         ("replay", 1.5, "ok"),
     ],

@@ -5,20 +5,12 @@ import weakref
 import pytest
 
 import vehiclemor as vm
+from tests.study.small import small_study
 from vehiclemor.errors import FileError
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.study_file import StudyFile
 
-STUDY = """
-title = "for the tests"
-model = "double_wishbone"
-grid = { amplitude_factor = [0.5, 0.7, 0.9], rank = [2, 3] }
-[[methods]]
-method = "full_order"
-[[methods]]
-method = "pod"
-"""
 AMPLITUDES = "amplitude_factor = { first = 0.5, last = 0.9, count = 60 }"
 
 
@@ -55,8 +47,7 @@ def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
 
 def test_histories_that_can_not_be_held_are_refused_before_anything_is_run(tmp_path):
     grid = "frequency_factor = { first = 0.7, last = 1.3, count = 600 }"
-    path = tmp_path / "mine.toml"
-    path.write_text(STUDY.replace("amplitude_factor = [0.5, 0.7, 0.9]", f"{grid}, {AMPLITUDES}"))
+    path = small_study(tmp_path, f"[grid]\n{grid}\n{AMPLITUDES}\n", "full_order", "pod")
     with pytest.raises(FileError, match='GB, more than 4: give keep = "metrics"'):
         vm.run_study(path, out=tmp_path / "results")
     assert not (tmp_path / "results").exists()

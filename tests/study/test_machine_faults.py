@@ -12,27 +12,16 @@ from pathlib import Path
 import netCDF4
 import pytest
 
+from tests.study.small import small_study
 from vehiclemor.errors import FileError, MachineError
-from vehiclemor.reduction.methods import fixed_basis, pod
+from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.study import cell_file, evaluate, store, workers
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
 
-GRID = """
-title = "for the tests"
-model = "double_wishbone"
-keep = "metrics"
-
-[grid]
-rank = [2, 3]
-
-[[methods]]
-method = "pod"
-
-[[methods]]
-method = "fixed_basis"
-"""
+GRID = 'keep = "metrics"\ngrid = { rank = [2, 3] }\n'
+BOTH = "pod", "fixed_basis"
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
@@ -46,8 +35,7 @@ def _nothing_kept():
 @pytest.fixture
 def run(tmp_path):
     """Run the small study in one folder; gives the statuses of a method by rank."""
-    path = tmp_path / "small.toml"
-    path.write_text(GRID)
+    path = small_study(tmp_path, GRID, *BOTH)
 
     def statuses(method: str, **options) -> list[str]:
         cells = run_studies(str(path), tmp_path / "out", **options)["small"].squeeze()
@@ -60,20 +48,6 @@ def cells_in(folder: Path) -> list[Path]:
     return sorted((folder / "out" / "cells").glob("[!.]?/*"))
 
 
-@pytest.fixture
-def broken_fit(monkeypatch):
-    """Let every fit of the method `fixed_basis` raise, until `undo`."""
-
-    def set_to(error: Exception) -> pytest.MonkeyPatch:
-        def fit(*_):
-            raise error
-
-        monkeypatch.setattr(fixed_basis, "METHOD", replace(fixed_basis.METHOD, fit=fit))
-        return monkeypatch
-
-    return set_to
-
-
 @pytest.mark.parametrize(
     ("error", "reason"),
     [
@@ -82,60 +56,53 @@ def broken_fit(monkeypatch):
     ],
     ids=["memory", "files"],
 )
-def test_what_the_machine_does_is_no_result(run, broken_fit, tmp_path, caplog, error, reason):
-    patched = broken_fit(error)
-    reason = f"method 'fixed_basis': fit: {reason} ({__file__}:"
-    with pytest.raises(MachineError, match=r"2 of 4 cells can't be computed .*resume") as told:
-        run("pod")
-    assert reason in str(told.value)
+def test_what_the_machine_does_is_no_result(run, monkeypatch, tmp_path, caplog, error, reason):
+    with monkeypatch.context() as patch:
+        breaking(patch, error)
+        with pytest.raises(MachineError, match=r"2 of 4 cells can't be computed .*resume") as told:
+            run("pod")
+    assert f"fit: {reason} ({__file__}:" in str(told.value)
     # Each further try names the reason once; the rest of the study is finished.
-    assert [m.startswith(f"small: {reason}") for m in caplog.messages] == [True] * (
-        workers.TRIES - 1
-    )
+    assert [reason in message for message in caplog.messages] == [True] * (workers.TRIES - 1)
     assert len(cells_in(tmp_path)) == 2
-    patched.undo()
     assert run("fixed_basis") == ["ok", "ok"]
 
 
-def test_a_bug_is_tried_again_by_the_next_run(run, broken_fit, tmp_path):
-    patched = broken_fit(ZeroDivisionError("in a plug-in"))
-    assert run("fixed_basis") == ["error", "error"]
-    assert run("pod") == ["ok", "ok"]
-    patched.undo()
+def breaking(patch: pytest.MonkeyPatch, error: Exception, part: str = "fit") -> None:
+    """Let a part of the method `fixed_basis`, or what measures its runs, raise."""
+    measured = evaluate.metrics_dataset
+
+    def broken(*given):
+        if part == "errors" and (given[1].method == "pod" or isinstance(given[2], Failure)):
+            return measured(*given)
+        raise error
+
+    if part == "errors":
+        patch.setattr(evaluate, "metrics_dataset", broken)
+    else:
+        patch.setattr(fixed_basis, "METHOD", replace(fixed_basis.METHOD, **{part: broken}))
+
+
+@pytest.mark.parametrize("part", ["fit", "check", "errors"])
+def test_a_bug_ends_no_study_and_is_tried_again_by_the_next_run(run, monkeypatch, tmp_path, part):
+    with monkeypatch.context() as patch:
+        breaking(patch, ZeroDivisionError("in a plug-in"), part)
+        assert run("fixed_basis") == ["error", "error"]
+        assert run("pod") == ["ok", "ok"]
     # In the same process: no failed fit is kept.
     assert run("fixed_basis") == ["ok", "ok"]
     assert not [path for path in cells_in(tmp_path) if store.BROKEN in path.name]
-
-
-def raising(*_):
-    raise ZeroDivisionError("in a plug-in")
-
-
-def test_a_bug_in_a_check_ends_no_study(run, monkeypatch):
-    monkeypatch.setattr(pod, "METHOD", replace(pod.METHOD, check=raising))
-    assert run("pod") == ["error", "error"]
-    assert run("fixed_basis") == ["ok", "ok"]
-
-
-def test_a_bug_after_a_run_that_went_well_ends_no_study(run, monkeypatch):
-    measured = evaluate.metrics_dataset
-
-    def broken(model, experiment, outcome, *more):
-        if experiment.method == "pod" and not isinstance(outcome, Failure):
-            raising()
-        return measured(model, experiment, outcome, *more)
-
-    monkeypatch.setattr(evaluate, "metrics_dataset", broken)
-    assert run("pod") == ["error", "error"]
-    assert run("fixed_basis") == ["ok", "ok"]
 
 
 def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tmp_path):
     def full(path, *_):
         raise FULL
 
-    def dataset(*_):
-        raise PermissionError(errno.EACCES, "Permission denied")
+    def dataset(error):
+        def broken(*_):
+            raise error
+
+        return broken
 
     reason = r"can't be written \(No space left on device\)"
     with monkeypatch.context() as patch:
@@ -145,22 +112,19 @@ def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tm
         assert cells_in(tmp_path) == []
     with monkeypatch.context() as patch:
         # The combined dataset: plain writing tells what netCDF hides.
-        patch.setattr(netCDF4, "Dataset", dataset)
+        denied = PermissionError(errno.EACCES, "Permission denied")
+        patch.setattr(netCDF4, "Dataset", dataset(denied))
         fill = {".nc": full, cell_file.ENDING: Path.write_bytes}
         patch.setattr(Path, "write_bytes", lambda path, what: fill[path.suffix](path, what))
         with pytest.raises(MachineError, match=rf"small\.nc: {reason}"):
             run("pod")
+    with monkeypatch.context() as patch:
+        # What is no fault of the disk is named as it is.
+        patch.setattr(netCDF4, "Dataset", dataset(RuntimeError("NetCDF: HDF error")))
+        with pytest.raises(FileError, match=r"can't be written \(NetCDF: HDF error\)"):
+            run("pod")
     assert len(cells_in(tmp_path)) == 4
     assert run("pod") == ["ok", "ok"]
-
-
-def test_an_error_of_the_library_that_is_not_the_disks_is_one_line(run, monkeypatch):
-    def dataset(*_):
-        raise RuntimeError("NetCDF: HDF error")
-
-    monkeypatch.setattr(netCDF4, "Dataset", dataset)
-    with pytest.raises(FileError, match=r"can't be written \(NetCDF: HDF error\)"):
-        run("pod")
 
 
 def test_complete_results_are_read_where_nothing_can_be_written(run, monkeypatch):
@@ -178,7 +142,7 @@ def test_complete_results_are_read_where_nothing_can_be_written(run, monkeypatch
 def test_a_label_that_was_edited_is_in_the_results(run, tmp_path):
     run("pod")
     path = tmp_path / "small.toml"
-    path.write_text(GRID.replace('method = "pod"', 'method = "pod"\nlabel = "mine"'))
+    path.write_text(path.read_text().replace('method = "pod"', 'method = "pod"\nlabel = "mine"'))
     assert run("mine") == ["ok", "ok"]
 
 
@@ -204,12 +168,9 @@ def test_a_worker_without_its_driver_ends():
     assert subprocess.run(command, timeout=50, check=False).returncode == 1
 
 
-STUDY = GRID.replace("[2, 3]", "[1, 2, 3, 4, 5, 6, 7, 8]") + "[[methods]]\nmethod = 'full_order'\n"
-
-
 def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(tmp_path, caplog):
-    path = tmp_path / "eight.toml"
-    path.write_text(STUDY)
+    eight = GRID.replace("[2, 3]", "[1, 2, 3, 4, 5, 6, 7, 8]")
+    path = small_study(tmp_path, eight, *BOTH, "full_order", name="eight")
     processes, killed = [], []
 
     def stop(_, done, __):

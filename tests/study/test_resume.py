@@ -10,38 +10,25 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from tests.study.small import assert_same, small_study
 from vehiclemor.files import TEMPORARY, temporary_path
-from vehiclemor.study import workers
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.run import run_studies
 
-STUDY = """
-title = "for the tests"
-model = "double_wishbone"
+GRID = """
 training = "nominal"
 
 [grid]
 frequency_factor = { first = 0.8, last = 1.4, count = 7 }
 amplitude_factor = [0.9, 1.0, 1.1, 3.0]
 rank = [2, 3]
-
-[[methods]]
-method = "full_order"
-
-[[methods]]
-method = "replay"
-
-[[methods]]
-method = "pod"
 """
-TIMED = ["seconds", "offline_seconds"]
+METHODS = "full_order", "replay", "pod"
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("study") / "small.toml"
-    path.write_text(STUDY)
-    return path
+    return small_study(tmp_path_factory.mktemp("study"), GRID, *METHODS)
 
 
 @pytest.fixture(scope="module")
@@ -50,12 +37,11 @@ def uninterrupted(study, tmp_path_factory) -> xr.Dataset:
     return run_studies(str(study), folder, jobs=1)["small"]
 
 
-def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
-    xr.testing.assert_identical(one.drop_vars(TIMED), other.drop_vars(TIMED))
-
-
-def test_two_processes_give_the_same_dataset(study, uninterrupted, tmp_path):
-    assert_same(uninterrupted, run_studies(str(study), tmp_path, jobs=2)["small"])
+def test_two_processes_give_the_same_dataset_and_store_it(study, uninterrupted, tmp_path):
+    written = run_studies(str(study), tmp_path, jobs=2)["small"]
+    assert_same(uninterrupted, written)
+    with xr.open_dataset(tmp_path / "studies" / "small.nc") as read:
+        xr.testing.assert_identical(written, read.load())
 
 
 def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_path):
@@ -93,7 +79,7 @@ def test_unreachable_cells_are_results(uninterrupted):
     status = uninterrupted["status"].sel(amplitude_factor=3.0)
     assert (status == "unreachable").all()
     messages = uninterrupted["message"].sel(amplitude_factor=3.0).values.ravel()
-    assert all("reachable range is -0.2146 to 0.2966 m" in message for message in messages)
+    assert all("reachable range" in message for message in messages)
     reached = uninterrupted.sel(amplitude_factor=[0.9, 1.0, 1.1])
     assert (reached["status"] == "ok").all()
     assert np.isfinite(reached["rms_error"]).all()
@@ -101,56 +87,12 @@ def test_unreachable_cells_are_results(uninterrupted):
 
 
 def test_dataset_is_labelled(uninterrupted):
-    for name in ("frequency_factor", "amplitude_factor", "method", "rank", "time", "output"):
-        assert name in uninterrupted.dims
     for name, variable in uninterrupted.variables.items():
         assert variable.attrs.get("long_name"), name
-    for name in ("seconds", "time", "largest_residual"):
-        assert uninterrupted[name].attrs["units"]
     # Outputs differ in their units: each has its own beside it.
     assert set(uninterrupted["rms_error"]["output_unit"].values) == {"m", "rad"}
     assert "units" not in uninterrupted["rms_error"].attrs
-    for name in ("title", "source", "versions", "machine", "configuration", "kernel_hash"):
-        assert uninterrupted.attrs[name]
-
-
-def test_stored_dataset_round_trips(study, tmp_path):
-    written = run_studies(str(study), tmp_path)["small"]
-    with xr.open_dataset(tmp_path / "studies" / "small.nc") as read:
-        xr.testing.assert_identical(written, read.load())
-
-
-TWO_OF_A_KIND = """[[methods]]
-method = "pod"
-label = "first"
-
-[[methods]]
-method = "pod"
-label = "second"
-preset = "literal"
-
-"""
-
-
-def test_workers_begin_with_different_methods(tmp_path: Path, monkeypatch):
-    class EnoughError(Exception):
-        pass
-
-    sent = []
-
-    def by_workers(groups, folder, jobs):
-        sent.extend(group[0].method for group in groups)
-        raise EnoughError
-
-    monkeypatch.setattr(workers, "evaluated_by_workers", by_workers)
-    path = tmp_path / "study.toml"
-    path.write_text(STUDY.replace("[[methods]]", f"{TWO_OF_A_KIND}[[methods]]", 1))
-    with pytest.raises(EnoughError):
-        run_studies(str(path), tmp_path / "results", jobs=2)
-    # Their loops are then compiled side by side.
-    methods = set(sent)
-    assert len(sent) > len(methods) > 1
-    assert set(sent[: len(methods)]) == methods
+    assert {"source", "versions", "machine", "kernel_hash"} <= set(uninterrupted.attrs)
 
 
 def test_a_dataset_laid_out_by_other_source_is_combined_again(study, uninterrupted, tmp_path):

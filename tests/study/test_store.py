@@ -6,18 +6,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as arrays
 
+from tests.study.small import TIMED, small_study
 from vehiclemor.errors import SpoiledError
 from vehiclemor.study import cell_file, netcdf_file, workers
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
@@ -25,18 +21,7 @@ from vehiclemor.study.run import run_studies
 from vehiclemor.study.status import status_of
 from vehiclemor.study.store import ASIDE, read_arrays, read_cell, write_cell
 
-GRID = """
-title = "for the tests"
-model = "double_wishbone"
-keep = "metrics"
-
-[grid]
-rank = [2, 3]
-
-[[methods]]
-method = "pod"
-"""
-TIMED = ["seconds", "offline_seconds"]
+GRID = 'keep = "metrics"\ngrid = { rank = [2, 3] }\n'
 KEY = "0123456789abcdef0123"
 
 
@@ -51,55 +36,34 @@ def a_cell() -> xr.Dataset:
 
 # The file of a cell
 
-NAMES = st.text(st.characters(codec="utf-8"), min_size=1, max_size=8)
 KINDS = [np.dtype(kind) for kind in ("f8", "f4", "i8", "i4", "u1", "?", "U5", "O")]
-NUMBERS = st.floats() | st.integers(-(2**53), 2**53) | st.booleans()
-ATTRIBUTES = st.dictionaries(
-    NAMES, NAMES | NUMBERS | st.floats().map(np.float64) | st.lists(st.floats(allow_nan=False))
-)
 
 
-@st.composite
-def datasets(draw) -> xr.Dataset:
-    """Any dataset of numbers, truths and text on a few dimensions, some of it as coordinates."""
-    sizes = draw(st.dictionaries(NAMES, st.integers(0, 3), max_size=3))
-    found: dict[str, tuple] = {}
-    for name in draw(st.lists(NAMES, max_size=4, unique=True)):
-        dimensions = draw(st.permutations(list(sizes)))[: draw(st.integers(0, len(sizes)))]
-        dimensions = [name] if name in sizes else dimensions
-        kind = draw(st.sampled_from(KINDS))
-        shape = tuple(sizes[d] for d in dimensions)
-        texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=5)
-        values = draw(arrays.arrays(kind, shape, elements=texts if kind.kind in "OU" else None))
-        found[name] = dimensions, values, draw(ATTRIBUTES)
-    dataset = xr.Dataset(found, attrs=draw(ATTRIBUTES))
-    chosen = [name for name in dataset.data_vars if draw(st.booleans())]
-    return dataset.set_coords(chosen)
-
-
-@settings(max_examples=60, deadline=None)
-@given(datasets(), st.floats(0.0, 1e6))
-def test_any_dataset_comes_back_as_it_was(dataset, seconds):
-    content = cell_file.encoded(dataset, KEY, seconds)
-    again = cell_file.dataset_of(content, KEY)
+@pytest.mark.parametrize("shape", [{}, {"none": 0}, {"Länge": 2, "time": 3}], ids=str)
+def test_any_dataset_comes_back_as_it_was(shape):
+    values = np.arange(np.prod([*shape.values()], dtype=int)).reshape(tuple(shape.values()))
+    arrays = {kind.str: values.astype("U5").astype(kind) for kind in KINDS}
+    arrays["<f8"] = np.where(values > 1, np.nan, -np.inf * (1 + values))
+    attributes = {"units": "m/s²", "nan": float("nan"), "none": [], "many": [1.5, 2], "yes": True}
+    found = {name: (list(shape), array, attributes) for name, array in arrays.items()}
+    dataset = xr.Dataset(found, attrs=attributes).set_coords(["<f4", "|O"])
+    dataset = dataset.assign_coords({name: np.arange(size) for name, size in shape.items()})
+    content = cell_file.encoded(dataset, KEY, 0.5)
+    again, held = cell_file.dataset_of(content, KEY), cell_file.arrays_of(content, KEY)
     xr.testing.assert_identical(dataset, again)
     assert list(dataset.variables) == list(again.variables)
-    found = cell_file.arrays_of(content, KEY)
     for name, variable in dataset.variables.items():
         assert variable.dtype == again[name].dtype
         assert again[name].values.flags.writeable or name in again.indexes
         if variable.dtype.kind in "OU":
-            assert np.asarray(found[name], dtype=object).tolist() == variable.values.tolist()
+            assert np.asarray(held[name], dtype=object).tolist() == variable.values.tolist()
         else:
-            assert found[name].dtype == variable.dtype
-            assert found[name].tobytes() == variable.values.tobytes()
+            assert held[name].tobytes() == variable.values.tobytes()
 
 
 def test_what_has_no_place_in_a_cell_is_refused():
     with pytest.raises(TypeError, match="objects that are no text"):
         cell_file.encoded(xr.Dataset({"x": ("d", np.array([{}], dtype=object))}), KEY)
-    with pytest.raises(Exception, match="datetime64"):
-        cell_file.encoded(xr.Dataset({"x": ("d", np.array(["2026"], dtype="M8[Y]"))}), KEY)
     with pytest.raises(TypeError, match="Path can't be stored"):
         cell_file.encoded(xr.Dataset(attrs={"file": Path()}), KEY)
 
@@ -127,16 +91,6 @@ def test_every_flipped_bit_and_every_part_of_a_file_is_noticed():
         cell_file.check(whole + b"\0", KEY)
 
 
-def test_foreign_results_and_those_of_other_versions_are_named(monkeypatch):
-    with pytest.raises(SpoiledError, match="not the result that belongs here, but of 0123"):
-        cell_file.check(cell_file.encoded(a_cell(), KEY), KEY[::-1])
-    monkeypatch.setattr(cell_file, "SCHEMA", "vehiclemor cell 0")
-    old = cell_file.encoded(a_cell(), KEY)
-    monkeypatch.undo()
-    with pytest.raises(SpoiledError, match="'vehiclemor cell 0', where this version writes"):
-        cell_file.check(old, KEY)
-
-
 def test_how_a_cell_has_ended_is_told_by_its_header(tmp_path):
     many = a_cell().drop_vars(["status", "message"])
     many = many.assign(
@@ -158,8 +112,7 @@ def test_how_a_cell_has_ended_is_told_by_its_header(tmp_path):
 def done(tmp_path_factory) -> Path:
     """A study file and the folder `out` with its results; not to be changed."""
     folder = tmp_path_factory.mktemp("done")
-    (folder / "small.toml").write_text(GRID)
-    run_studies(str(folder / "small.toml"), folder / "out")
+    run_studies(str(small_study(folder, GRID, "pod")), folder / "out")
     return folder
 
 
@@ -191,21 +144,16 @@ def cells(place: Path) -> list[Path]:
     return sorted((place / "out" / "cells").glob("[!.s]?/*"))
 
 
-def other_version(content: bytes) -> bytes:
-    return content.replace(b"vehiclemor cell 1", b"vehiclemor cell 7", 1)
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (lambda whole, _: whole[:-9], "what it holds is not what was written"),
-        (lambda whole, _: whole[:200], "truncated, or no result of this package"),
-        (lambda *_: b"", "truncated, or no result of this package"),
-        (lambda *_: b"my notes", "truncated, or no result of this package"),
-        (lambda _, other: other, "not the result that belongs here, but of"),
-        (lambda whole, _: other_version(whole), "'vehiclemor cell 7', where this version writes"),
+        (lambda whole, _: whole[:-9], "not what was written"),
+        (lambda whole, _: whole[:200], "truncated"),
+        (lambda *_: b"", "truncated"),
+        (lambda _, other: other, "not the result that belongs here"),
+        (lambda whole, _: whole.replace(b"cell 1", b"cell 7", 1), "'vehiclemor cell 7'"),
     ],
-    ids=["cut", "header", "empty", "text", "foreign", "version"],
+    ids=["cut", "header", "empty", "foreign", "version"],
 )
 def test_a_spoiled_cell_is_set_aside_and_computed_again(
     done, place, computed, caplog, change, reason
@@ -219,65 +167,54 @@ def test_a_spoiled_cell_is_set_aside_and_computed_again(
     assert aside.read_bytes() == spoiled
     assert computed == [first.stem]
     (line,) = caplog.messages
-    assert line.startswith(f"{first}: {reason}")
-    assert line.endswith(f"; moved to {aside}, and computed again")
+    for words in (first, aside, reason):
+        assert str(words) in line
 
 
-def rewritten(cell: bytes, **texts: object) -> bytes:
-    """A cell with other texts in its header, whole by its hash."""
-    end = 8 + int.from_bytes(cell[:8], "little")
-    header = json.loads(cell[8:end])
-    header["__metadata__"] |= texts | {"sha256": cell_file.ZEROS}
-    head = json.dumps(header, separators=(",", ":")).encode()
-    whole = len(head).to_bytes(8, "little") + head + cell[end:]
-    return cell_file._filled(whole, cell_file.ZEROS, hashlib.sha256(whole).hexdigest())
-
-
-def described(change: Callable[[dict[str, Any]], object]) -> Callable[[bytes], bytes]:
-    """Change what a cell says of its dataset."""
+def rewritten(**texts: object) -> Callable[[bytes], bytes]:
+    """Let a cell have other texts in its header, whole by its hash."""
 
     def changed(cell: bytes) -> bytes:
-        found = json.loads(cell[8 : 8 + int.from_bytes(cell[:8], "little")])["__metadata__"]
-        change(dataset := json.loads(found["dataset"]))
-        return rewritten(cell, dataset=json.dumps(dataset))
+        end = 8 + int.from_bytes(cell[:8], "little")
+        header = json.loads(cell[8:end])
+        header["__metadata__"] |= texts | {"sha256": cell_file.ZEROS}
+        head = json.dumps(header, separators=(",", ":")).encode()
+        whole = len(head).to_bytes(8, "little") + head + cell[end:]
+        return cell_file._filled(whole, cell_file.ZEROS, hashlib.sha256(whole).hexdigest())
 
     return changed
 
 
-def variable(**change: object) -> Callable[[bytes], bytes]:
-    """Change what a cell says of its errors."""
-    return described(lambda dataset: dataset["variables"]["rms_error"].update(change))
+def described(what: str, **change: object) -> Callable[[bytes], bytes]:
+    """Let a cell say something else of its dataset, or of its errors."""
+
+    def changed(cell: bytes) -> bytes:
+        found = json.loads(cell[8 : 8 + int.from_bytes(cell[:8], "little")])["__metadata__"]
+        dataset = json.loads(found["dataset"])
+        (dataset["variables"]["rms_error"] if what == "errors" else dataset).update(change)
+        return rewritten(dataset=json.dumps(dataset))(cell)
+
+    return changed
 
 
 DEEP = "[" * 200_000
 HEADERS = {
     "header": lambda _: len(DEEP).to_bytes(8, "little") + DEEP.encode(),
-    "texts": lambda _: (
-        (10**6 + 16).to_bytes(8, "little") + b'{"__metadata__":' + b'{"a":' * 200_000
-    ),
-    "runs": lambda cell: rewritten(cell, runs=DEEP),
-    "runs of lists": lambda cell: rewritten(cell, runs='[[["ok"], "", 1]]'),
-    "runs of texts": lambda cell: rewritten(cell, runs='[["ok", "", "one"]]'),
-    "no text": lambda cell: rewritten(cell, key=[3]),
+    "runs": rewritten(runs=DEEP),
+    "runs of texts": rewritten(runs='[["ok", "", "one"]]'),
+    "no text": rewritten(key=[3]),
 }
 DATASETS = {
-    "number": lambda cell: rewritten(cell, dataset="3"),
-    "nested": lambda cell: rewritten(cell, dataset=DEEP),
-    "no status": described(lambda dataset: dataset["variables"].pop("status")),
-    "no errors": described(lambda dataset: dataset["variables"].pop("rms_error")),
-    "no coordinates": described(lambda dataset: dataset.pop("coordinates")),
-    "other coordinates": described(lambda dataset: dataset["coordinates"].pop()),
-    "coordinates that are not there": described(lambda dataset: dataset["coordinates"].append("x")),
-    "attributes": described(lambda dataset: dataset.update(attributes=["title"])),
-    "nested attributes": variable(attributes={"units": {"a": "m"}}),
-    "dimensions": variable(dimensions=["time"]),
-    "more dimensions": variable(dimensions=["output", "output"]),
-    "number of dimensions": variable(dimensions=3),
-    "type": variable(type="<U1000000000"),
-    "no type": variable(type="(2,"),
-    "text": variable(type="<U1000000000", text=["a"] * 4, shape=[4]),
-    "text without place": variable(text=["a"], shape=[10**30]),
-    "text of numbers": variable(text=[1.0] * 4, shape=[4]),
+    "number": rewritten(dataset="3"),
+    "nested": rewritten(dataset=DEEP),
+    "no variables": described("dataset", variables={}),
+    "coordinates": described("dataset", coordinates=["x"]),
+    "attributes": described("dataset", attributes=["title"]),
+    "dimensions": described("errors", dimensions=["output", "output"]),
+    "type": described("errors", type="<U1000000000"),
+    "no type": described("errors", type="(2,"),
+    "text without place": described("errors", text=["a"], shape=[10**30]),
+    "text of numbers": described("errors", text=[1.0] * 4, shape=[4]),
 }
 
 
@@ -286,13 +223,8 @@ def test_a_crafted_cell_is_set_aside_and_computed_again(done, place, computed, c
     (first, _), study, out = cells(place), place / "small.toml", place / "out"
     first.write_bytes(crafted := craft(first.read_bytes()))
     # How it has ended stands in its header.
-    ended = craft in DATASETS.values()
-    assert status_of(str(study), out)["small"].done == (2 if ended else 1)
+    assert status_of(str(study), out)["small"].done == (2 if craft in DATASETS.values() else 1)
     (out / "studies" / "small.nc").unlink()
-    if ended:
-        for read in (read_cell, read_arrays):
-            with suppress(SpoiledError):
-                read(out, first.stem)
     xr.testing.assert_identical(run(study, out), reread(done))
     assert (out / "cells" / ASIDE / first.name).read_bytes() == crafted
     assert computed == [first.stem]
@@ -317,20 +249,6 @@ def test_a_folder_in_the_place_of_a_cell_is_set_aside(place, computed, caplog):
     assert len(computed) == len(caplog.messages) == 2
 
 
-def test_many_spoiled_cells_are_a_few_lines(tmp_path, caplog):
-    study = tmp_path / "many.toml"
-    study.write_text(GRID.replace("[2, 3]", "{ first = 1, last = 8, count = 8 }"))
-    study.write_text(study.read_text().replace("rank =", "frequency_factor ="))
-    run(study, tmp_path)
-    for path in (tmp_path / "cells").glob("??/*"):
-        path.write_bytes(b"")
-    (tmp_path / "studies" / "many.nc").unlink()
-    assert (run(study, tmp_path)["status"] == "ok").all()
-    assert len(list((tmp_path / "cells" / ASIDE).iterdir())) == 8
-    assert len(caplog.messages) == 6
-    assert caplog.messages[-1] == f"{tmp_path / 'cells' / ASIDE}: 8 such cells in all"
-
-
 def test_a_cell_that_was_spoiled_since_is_not_read(place):
     (first, _) = cells(place)
     first.write_bytes(first.read_bytes()[:-1])
@@ -339,18 +257,13 @@ def test_a_cell_that_was_spoiled_since_is_not_read(place):
             read(place / "out", first.stem)
 
 
-@pytest.mark.parametrize(
-    "damage", [lambda whole: whole[: len(whole) // 2], lambda _: b"my notes"], ids=["cut", "text"]
-)
-def test_a_spoiled_combined_dataset_is_set_aside_and_made_again(
-    done, place, computed, caplog, damage
-):
+def test_a_spoiled_combined_dataset_is_set_aside_and_made_again(done, place, computed, caplog):
     path = place / "out" / "studies" / "small.nc"
-    path.write_bytes(spoiled := damage(path.read_bytes()))
+    path.write_bytes(spoiled := path.read_bytes()[:-1000])
     xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
     assert (path.parent / ASIDE / "small.nc").read_bytes() == spoiled
     assert computed == []
-    assert f"{path}: not a readable result file" in caplog.messages[0]
+    assert str(path) in caplog.messages[0]
     xr.testing.assert_identical(reread(place), reread(done))
 
 
@@ -362,10 +275,10 @@ from vehiclemor.errors import SpoiledError
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
-study, path, every = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
+study, path = sys.argv[1], Path(sys.argv[2])
 whole, rng = path.read_bytes(), np.random.default_rng(2)
 damaged = [whole[:-1], whole[:-100], whole + b"x"]
-for at in range(0, len(whole), every):
+for at in range(0, len(whole), 2999):
     damaged.append(whole[:at] + bytes(len(whole[at : at + 334])) + whole[at + 334 :])
     bit = int(rng.integers(8 * len(whole)))
     damaged.append(bytearray(whole))
@@ -379,29 +292,18 @@ for content in damaged:
         assert "\\n" not in str(error)
     else:
         raise AssertionError("read")
-    if study:
-        assert (run_studies(study, path.parents[1])["small"]["status"] == "ok").all()
-        assert read_dataset(path, "source", "vehiclemor").attrs["study"] == "small"
+    assert (run_studies(study, path.parents[1])["small"]["status"] == "ok").all()
+    assert read_dataset(path, "source", "vehiclemor").attrs["study"] == "small"
 print(len(damaged), len(list(path.parent.glob("set-aside/*"))))
 """
 
 
-def in_a_child(*arguments: object) -> list[int]:
-    """What damaged files give: the library may never come back of them."""
-    command = [sys.executable, "-c", DAMAGED, *map(str, arguments)]
-    ended = subprocess.run(command, capture_output=True, timeout=60, check=True, text=True)
-    return [int(number) for number in ended.stdout.split()]
-
-
-def test_no_damage_of_a_file_reaches_the_library(tmp_path):
-    write_dataset(a_cell().assign_attrs(source="vehiclemor"), path := tmp_path / "a.nc")
-    tries, _ = in_a_child("", path, 61)
-    assert tries > 200
-
-
 def test_combined_datasets_with_any_damage_are_made_again(place):
     path = place / "out" / "studies" / "small.nc"
-    tries, aside = in_a_child(place / "small.toml", path, 2999)
+    # In a child: the library may never come back of them.
+    command = [sys.executable, "-c", DAMAGED, str(place / "small.toml"), str(path)]
+    ended = subprocess.run(command, capture_output=True, timeout=60, check=True, text=True)
+    tries, aside = map(int, ended.stdout.split())
     assert tries == aside > 20
 
 
@@ -437,9 +339,7 @@ def test_other_tools_read_files_that_end_with_their_hash(tmp_path):
 
 
 def test_two_studies_of_one_name_are_both_stored(place, computed):
-    other = place / "other" / "small.toml"
-    other.parent.mkdir()
-    other.write_text(GRID.replace("[2, 3]", "[3, 4]"))
+    other = small_study(place / "other", GRID.replace("[2, 3]", "[3, 4]"), "pod")
     out = place / "out"
     both = [run(path, out) for path in (other, place / "small.toml", other)]
     # The cell that both have is computed once.
@@ -448,17 +348,15 @@ def test_two_studies_of_one_name_are_both_stored(place, computed):
     names = sorted(path.name for path in (out / "studies").iterdir())
     assert names == [f"small-{both[0].attrs['content']}.nc", "small.nc"]
     # A study that was edited in its place is the same study.
-    (place / "small.toml").write_text(GRID.replace("[2, 3]", "[2, 3, 4]"))
+    small_study(place, GRID.replace("[2, 3]", "[2, 3, 4]"), "pod")
     assert run(place / "small.toml", out).sizes["rank"] == 3
     assert len(computed) == 1
     assert sorted(path.name for path in (out / "studies").iterdir()) == names
 
 
 def test_a_collection_may_have_two_studies_of_one_name(place, computed):
-    paths = [place / name / "small.toml" for name in ("a", "b")]
-    for path, ranks in zip(paths, ("[2, 3]", "[3]"), strict=True):
-        path.parent.mkdir()
-        path.write_text(GRID.replace("[2, 3]", ranks))
+    grids = {"a": GRID, "b": GRID.replace("[2, 3]", "[3]")}
+    paths = [small_study(place / name, grid, "pod") for name, grid in grids.items()]
     both = place / "both.toml"
     both.write_text(f'title = "both"\nstudies = {json.dumps([str(path) for path in paths])}\n')
     results = run_studies(str(both), place / "out")

@@ -13,7 +13,7 @@ from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
-from vehiclemor.study.scenario import Scenario, input_hash
+from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.timing import (
     TimingCase,
     called,
@@ -39,7 +39,6 @@ def suspension():
 def test_speed_ups_are_against_ids_wherever_they_stand(suspension):
     data = timed_cases(suspension, CASES, sine_travel, "equilibrium", 3)
     assert list(data["case"].values) == ["pod_r3", "strongest", "replay", "baseline"]
-    assert list(data["label"].values) == ["pod r=3", "the best", "replay", "Newton"]
     assert float(data["speed_up"].sel(case="baseline")) == 1.0
     assert float(data["speed_up_strongest"].sel(case="strongest")) == 1.0
     assert float(data["speed_up"].sel(case="strongest")) > 1.0
@@ -97,15 +96,10 @@ def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(mon
     assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 
-def test_without_baselines_there_are_seconds_but_no_speed_ups(suspension):
-    data = timed_cases(suspension, CASES[:1], sine_travel, "equilibrium", 1)
-    assert "speed_up" not in data
-    assert float(data["seconds"].item()) > 0.0
-
-
-def test_a_case_that_fails_has_no_seconds(suspension):
+def test_a_case_that_fails_has_no_seconds_and_no_baseline_gives_no_speed_up(suspension):
     stuck = TimingCase("stuck", "stuck", "full_order", settings={"tolerance": 1e-300})
-    data = timed_cases(suspension, (CASES[3], stuck), sine_travel, "equilibrium", 2)
+    data = timed_cases(suspension, (CASES[0], stuck), sine_travel, "equilibrium", 2)
+    assert "speed_up" not in data
     assert data["status"].values.tolist() == ["ok", "diverged"]
     assert np.isfinite(data["seconds"]).values.tolist() == [True, False]
 
@@ -126,21 +120,14 @@ def test_what_was_measured_is_measured_again_only_if_it_has_changed(
     assert path.stat().st_mtime_ns > written
 
 
-def test_minus_zero_and_zero_are_one_input():
-    def signed(sign):
-        def signal(times, frequency, amplitude):
-            return np.full((len(times), 2), sign * 0.0 * frequency * amplitude)
+def test_inputs_are_known_by_their_values_and_names():
+    def constant(value):
+        return replace(sine_travel, signal=lambda times, *_: np.full((len(times), 2), value))
 
-        return replace(sine_travel, signal=signal)
+    def log(name):
+        return Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
 
-    runs = [Scenario(signed(sign), "equilibrium").run_key for sign in (1.0, -1.0)]
-    assert runs[0] == runs[1]
-    assert runs[0][0] != input_hash(sine_travel)
-
-
-def test_signals_of_other_inputs_are_other_runs():
-    def key(name):
-        signal = Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
-        return Scenario(signal, "equilibrium").run_key
-
-    assert key("z") == key("z") != key("s0")
+    given = constant(0.0), constant(-0.0), constant(0.01), log("z"), log("s0")
+    zero, minus_zero, *others = [Scenario(each, "equilibrium").run_key for each in given]
+    assert zero == minus_zero
+    assert len({zero, *others}) == 4

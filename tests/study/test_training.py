@@ -1,17 +1,14 @@
 """What a model is trained on, asked for by the same words everywhere, and told in every result."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.study.small import small_study
 from vehiclemor.cli.app import main
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.errors import InputError
 from vehiclemor.registry import component
-from vehiclemor.report.comparison.study import grid_rows, study_comparison, study_text
-from vehiclemor.report.figures.result_plot import plot_result
+from vehiclemor.report.comparison.study import study_comparison, study_text
 from vehiclemor.report.page import error_tables
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
@@ -31,7 +28,7 @@ def replayed(**arguments):
     return vm.simulate(WISHBONE, "replay", **arguments)
 
 
-@pytest.mark.parametrize("given", [sampled(OTHER), OTHER, "chirp_travel"], ids=str)
+@pytest.mark.parametrize("given", [sampled(OTHER), "chirp_travel"], ids=str)
 def test_nominal_is_the_models_own_maneuver_whatever_is_tested(given):
     run = replayed(maneuver=given, training="nominal")
     own = vm.simulate(WISHBONE)
@@ -47,11 +44,7 @@ def test_nominal_is_the_models_own_maneuver_whatever_is_tested(given):
     "given",
     [
         "chirp_travel",
-        ["chirp_travel"],
-        OTHER,
         (OTHER,),
-        vm.maneuver("chirp_travel"),
-        Scenario(OTHER, "equilibrium"),
         [Scenario(OTHER, "equilibrium"), "sine_travel"],
     ],
     ids=str,
@@ -67,27 +60,15 @@ def test_training_is_asked_for_in_the_same_words_everywhere(given):
     )
 
 
-def test_training_of_the_protocol_is_that_of_reduce():
-    model = vm.model(WISHBONE)
-    reduced = vm.reduce(model, "replay", training="protocol")
-    found = vm.simulate(model, "replay", training=reduced.training, maneuver=OTHER)
-    again = vm.simulate(model, "replay", training="protocol", maneuver=OTHER)
-    assert reduced.training[0].maneuver.name == "travel_and_rack"
-    np.testing.assert_array_equal(found["outputs"], again["outputs"])
-
-
 SAME = {
-    "the same": (OWN, OWN, True),
     "by name": ("sine_travel", OWN, True),
     "a signal with its samples": (OWN, sampled(OWN), True),
-    "of a signal with its samples": (sampled(OWN), OWN, True),
     "a signal of another name": (sampled(OWN, name="a"), sampled(OWN, name="b"), True),
     "one of several": ([OTHER, OWN], sampled(OWN), True),
     "its beginning": (OWN, sampled(OWN, 501), True),
     "that of which it is the beginning": (sampled(OWN, 501), OWN, False),
     "other samples": (OWN, sampled(OWN, scale=1.0 + 1e-6), False),
     "another amplitude": (OWN, OWN.perturbed(1.0, 0.9), False),
-    "another name": (OTHER, OWN, False),
 }
 
 
@@ -124,19 +105,8 @@ def test_the_models_own_parameters_are_the_same_run_and_others_are_refused():
 
 
 STUDY = """
-title = "Two trainings"
-model = "double_wishbone"
-training = {training}
-
-[grid]
-amplitude_factor = [0.9, 1.0]
-rank = [3]
-
-[[methods]]
-method = "full_order"
-
-[[methods]]
-method = "replay"
+training = ["nominal"]
+grid = { amplitude_factor = [0.9, 1.0], rank = [3] }
 
 [[methods]]
 method = "pod"
@@ -149,8 +119,7 @@ training = "travel_and_rack"
 def study(tmp_path_factory):
     """A study, its folder and its combined dataset, as read from its file."""
     folder = tmp_path_factory.mktemp("trained")
-    file = folder / "trained.toml"
-    file.write_text(STUDY.format(training='["nominal"]'))
+    file = small_study(folder, STUDY, "full_order", "replay")
     run_studies(str(file), folder)
     (dataset,) = run_studies(str(file), folder).values()
     return file, folder, dataset
@@ -159,8 +128,6 @@ def study(tmp_path_factory):
 def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys):
     file, folder, dataset = study
     trained = dataset["in_training"].squeeze(drop=True).sel({"method": "replay"})
-    assert trained.dtype == bool
-    assert "trained on this very run" in trained.attrs["long_name"]
     assert trained.to_series().to_dict() == {0.9: False, 1.0: True}
     assert dataset["in_training"].sum() == 1
     text = study_text(study_comparison(str(file), folder))
@@ -173,50 +140,11 @@ def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys
     assert "; 1 trained on the tested run" in " ".join(capsys.readouterr().out.split())
 
 
-def legend(figure):
-    (found,) = figure.legends
-    return [text.get_text() for text in found.get_texts()], found.get_title().get_text()
-
-
-def test_runs_of_the_training_are_marked_in_pictures(study):
-    _, _, dataset = study
-    names, told = legend(vm.plot(dataset))
-    assert {"replay*", "other"} <= set(names)
-    assert told == "* trained on this run"
-    names, told = legend(vm.plot(dataset, amplitude_factor=0.9))
-    assert "replay" in names
-    assert not told
-    assert (
-        "1 of 6 runs were in their own training"
-        in plot_result(dataset, None, "errors").get_suptitle()
-    )
-    assert legend(vm.plot(replayed()))[1] == "* trained on this run"
-
-
-def test_results_that_do_not_tell_are_read(study):
-    _, _, dataset = study
-    old = dataset.drop_vars("in_training")
-    assert {row["trained"] for row in grid_rows(old)} == {0}
-    assert "replay" in legend(vm.plot(old))[0]
-
-
-@pytest.mark.parametrize(
-    ("training", "words"),
-    [
-        ('"nomnal"', "unknown training 'nomnal'; did you mean nominal?"),
-        ('["nominal", "sine_travl"]', "unknown training 'sine_travl'; did you mean sine_travel"),
-        ('"lane_change"', "gives inputs delta, double_wishbone needs z, s0"),
-        ('"set"', "'set' needs training_set"),
-        ("[]", "training"),
-    ],
-)
-def test_wrong_training_of_a_study_is_told_before_its_first_run(training, words, tmp_path):
-    file = tmp_path / "wrong.toml"
-    file.write_text(STUDY.format(training=training))
-    with pytest.raises(FileError, match=words) as error:
-        vm.run_study(file, out=tmp_path / "out")
-    assert "\n" not in str(error.value)
-    assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize(("factor", "name"), [(1.0, "replay*"), (0.9, "replay")])
+def test_runs_of_the_training_are_marked_in_pictures(study, factor, name):
+    (legend,) = vm.plot(study[2], amplitude_factor=factor).legends
+    assert {name, "other"} <= {text.get_text() for text in legend.get_texts()}
+    assert ("trained on this run" in legend.get_title().get_text()) == name.endswith("*")
 
 
 def test_training_of_the_command_line(capsys):
@@ -229,32 +157,12 @@ def test_training_of_the_command_line(capsys):
     assert "did you mean chirp_travel" in capsys.readouterr().err
 
 
-def test_factors_are_beside_those_of_the_maneuver():
-    given = {"maneuver": vm.maneuver("sine_travel", frequency=1.2, amplitude=0.8)}
-    run = vm.simulate(WISHBONE, frequency=1.5, amplitude=0.5, **given)
+def test_a_maneuver_by_its_name_and_factors_beside_its_own():
+    given = vm.maneuver("sine_travel", frequency=1.2, amplitude=0.8)
+    assert given == OWN.perturbed(1.2, 0.8)
+    run = vm.simulate(WISHBONE, maneuver=given, frequency=1.5, amplitude=0.5)
     same = vm.simulate(WISHBONE, frequency=1.2 * 1.5, amplitude=0.8 * 0.5)
     np.testing.assert_array_equal(run["outputs"], same["outputs"])
     np.testing.assert_array_equal(run["inputs"], same["inputs"])
-
-
-def test_a_maneuver_by_its_name():
-    found = vm.maneuver("lane_change", frequency=1.2, amplitude=-0.5)
-    assert found == component("maneuver", "lane_change").perturbed(1.2, -0.5)
-    reduced = vm.model(CAR).simulate("lane_change").outputs
-    np.testing.assert_array_equal(
-        reduced, vm.model(CAR).simulate(vm.maneuver("lane_change")).outputs
-    )
     with pytest.raises(InputError, match="did you mean lane_change"):
         vm.maneuver("lane_chnge")
-
-
-@pytest.mark.parametrize(
-    "first", ["import vehiclemor.maneuver", "from vehiclemor import maneuver", "vm.maneuver"]
-)
-def test_the_function_and_the_module_of_plug_ins_go_together(first):
-    """In whatever order they are asked for."""
-    rest = (
-        "from vehiclemor.maneuver import Maneuver; assert isinstance(vm.maneuver(NAME), Maneuver)"
-    )
-    code = f"import vehiclemor as vm; NAME = 'sine_travel'; {first}; {rest}; vm.maneuver(NAME)"
-    subprocess.run([sys.executable, "-c", code], check=True)
