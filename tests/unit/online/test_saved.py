@@ -90,24 +90,21 @@ def replaced(changes: dict[str, Any]) -> Callable[[xr.Dataset, dict[str, Any]], 
     """Puts values, or functions of what is there, at places `a.b.c` in the parts of a model."""
 
     def change(dataset: xr.Dataset, found: dict[str, Any]) -> None:
+        arrays = {str(name): variable.values for name, variable in dataset.items()}
+        writer = Writer(NOTHING)
         for number, (places, value) in enumerate(changes.items()):
-            node, *path = found, *places.split(".")
-            for name in path:
-                inside = node if name in node else node.get("fields") or node["tuple"]
-                key = int(name) if isinstance(inside, list) else name
-                holder, node = inside, inside[key]
-            if callable(value):
-                old, writer = node, Writer(NOTHING)
-                if "array" in node:
-                    arrays = {node["array"]: dataset[node["array"]].values}
-                    old = Reader(NOTHING, arrays).value(node, "")
-                holder[key] = new = value(old)
-                if "array" in node:
-                    holder[key] = writer.part(new, f"changed{number}")
-                for place, array in writer.arrays.items():
-                    dataset[place] = [f"{place}_{axis}" for axis in range(array.ndim)], array
-            else:
-                holder[key] = value
+            holder, key, node = found, "", found
+            for name in places.split("."):
+                holder = node if name in node else node.get("fields") or node["tuple"]
+                key = int(name) if isinstance(holder, list) else name
+                node = holder[key]
+            stored = isinstance(node, dict) and "array" in node
+            old = Reader(NOTHING, arrays).value(node, "") if stored else node
+            new = value(old) if callable(value) else value
+            part = writer.part(new, f"changed{number}") if isinstance(new, np.ndarray) else new
+            holder[key] = part
+        for place, array in writer.arrays.items():
+            dataset[place] = [f"{place}_{axis}" for axis in range(array.ndim)], array
 
     return change
 
@@ -156,44 +153,28 @@ def test_another_process_gets_the_same_to_the_bit_and_derives_nothing(car, tmp_p
 
 def parted(value: Any) -> tuple[Any, dict[str, np.ndarray]]:
     """A value, written and read again; arrays as they were written."""
-    model = build("double_wishbone")
-    writer = Writer(model)
+    writer = Writer(NOTHING)
     written = json.loads(json.dumps(writer.part(value, "value")))
-    return Reader(model, writer.arrays).value(written, "value"), writer.arrays
+    return Reader(NOTHING, writer.arrays).value(written, "value"), writer.arrays
 
 
 def test_parts_are_what_they_were(monkeypatch):
     # As of a plug-in that is in use.
     monkeypatch.setattr(parts, "_plug_ins", lambda: {"tests"})
     table = np.arange(6.0).reshape(2, 3)
-    values = {
-        "numbers": (1, -0.0, np.inf, True, None, "text", np.float64(0.1), np.int64(3)),
-        "nested": [Pair(1, (2, [3.0])), {"a": {"b": ()}}],
-        "arrays": Pair(table, table.T),
-        "kinds": (
-            table > 2.0,
-            table.astype(int),
-            table + 1j * table,
-            np.zeros((0, 3)),
-            np.array(2.0),
-        ),
-        "rest": np.array([np.nan, -np.inf]),
-    }
-    made, _ = parted(values)
-    for before, after in zip(values["kinds"], made["kinds"], strict=True):
+    whole = table.astype(int), table > 2.0, table + 1j * table
+    arrays = (table, table.T, *whole, np.zeros((0, 3)), np.array([np.nan, -np.inf]), np.array(2.0))
+    values = 1, -0.0, np.inf, True, None, "text", np.float64(0.1), [Pair(1, (2, [3.0]))], {"b": ()}
+    (made, others), _ = parted((arrays, values))
+    for before, after in zip(arrays, made, strict=True):
         assert (after.dtype, after.shape) == (before.dtype, before.shape)
         np.testing.assert_array_equal(after, before)
-    assert made["numbers"] == values["numbers"]
-    assert math.copysign(1.0, made["numbers"][1]) == -1.0
-    assert made["nested"] == values["nested"]
-    assert isinstance(made["nested"][0], Pair)
+    assert others == values
+    assert math.copysign(1.0, others[1]) == -1.0
+    assert isinstance(others[-2][0], Pair)
     # Rows or columns stand together as they did: products are rounded by it.
-    assert made["arrays"].second.flags.f_contiguous
-    np.testing.assert_array_equal(made["arrays"].second, table.T)
-    np.testing.assert_array_equal(made["rest"], values["rest"])
-    again, once = parted((table, table))
-    assert len(once) == 1
-    np.testing.assert_array_equal(again[0], again[1])
+    assert made[1].flags.f_contiguous
+    assert len(parted((table, table))[1]) == 1
 
 
 def test_parameters_settings_and_training_come_along(tmp_path):
@@ -226,20 +207,15 @@ def test_a_path_that_is_taken_is_refused_unless_asked(car, saved):
     assert [path.name for path in saved.parent.iterdir()] == ["car.nc"]
 
 
-@pytest.mark.parametrize(
-    ("wrong", "what"),
-    [
-        (lambda state: state, "offline"),
-        (build(CAR).start, "offline"),
-        (Pair(1.0, 2.0), "offline"),
-        ([1.0, {2: 3.0}], "offline.1"),
-        (np.array(["text"]), "offline"),
-        (np.zeros(3, dtype=np.float32), "offline"),
-        (KERNELS, "offline"),
-        ([KERNELS], "offline.0"),
-        (dataclasses.replace(build(CAR).system, inputs=1), "offline"),
-    ],
-)
+UNWRITABLE = [
+    *((lambda state: state, "offline"), (build(CAR).start, "offline"), (Pair(1.0, 2.0), "offline")),
+    *((KERNELS, "offline"), ([1.0, KERNELS], "offline.1"), ({2: 3.0}, "offline")),
+    *((np.array(["text"]), "offline"), (np.zeros(3, dtype=np.float32), "offline")),
+    (dataclasses.replace(build(CAR).system, inputs=1), "offline"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "what"), UNWRITABLE)
 def test_what_cant_be_written_is_named_and_leaves_no_file(wrong, what, car, tmp_path):
     other = dataclasses.replace(car, reduced=dataclasses.replace(car.reduced, offline=wrong))
     with pytest.raises(InputError) as error:
@@ -266,11 +242,6 @@ def test_what_is_no_saved_model_is_refused(saved, tmp_path):
     assert refusal(foreign).endswith("not a saved model")
     with pytest.raises(InputError, match="is not a path"):
         vm.load(3)
-
-
-def test_another_version_is_refused(saved):
-    rewritten(saved, lambda dataset, _: dataset.attrs.update(saved_model=99))
-    assert "saved by another version, format 99 where" in refusal(saved)
 
 
 def test_another_version_that_makes_the_same_of_it_is_not(car, saved, monkeypatch):
@@ -307,32 +278,22 @@ HARM = "__import__('pathlib').Path('harm').touch()"
 ROOM = "vehiclemor.reduction"
 VECTOR = {"array": "reduced.error_scale", "type": "float64", "shape": [6], "turned": False}
 SHAPES = ([-1], [5, -1], [True, 6], [2, 3], [1, 6], [10**9], [6.0], 6, None, "6")
-# A class that is none, its check left out.
+# Types are checked whatever else a part says of itself.
 HIDDEN = {"model": "none", "class": f"{ROOM}.interface:Offline", "fields": {"seconds": "long"}}
+NAN = {"tuple": [{"tuple": [{"tuple": [math.nan]}, {"tuple": [1]}]}]}
+KERNEL = {"kernels": "def derivative(_x, _result):\n    _result[9] = _x[9]\n"}
 # Of the bicycle: place -> what is no part that may stand there.
 PARTS = [
-    ("class", f"{ROOM}.vehicle.features:monomials"),
-    ("offline", {"function": f"{ROOM}.trust:trust_of"}),
-    ("offline", {"code": HARM}),
-    ("offline", {"kernels": "def derivative(_x, _result):\n    _result[9] = _x[9]\n"}),
-    ("offline", {"method": "encoded", "of": {"same": "reduced"}}),
-    ("offline", {"same": "reduced.nothing"}),
-    ("offline", {"same": []}),
-    ("offline", {"same": "reduced.shape"}),
-    ("offline", {"model": "parameters"}),
-    ("offline", {"model": "kernels"}),
-    ("offline", HIDDEN),
-    ("offline.fields", {"minutes": 0.0}),
-    ("fields", {}),
-    ("features", {"same": "reduced.shape"}),
-    ("features.states", True),
-    ("features.terms.tuple", ["z0", "z1", 3]),
-    ("features.groups", {"tuple": [{"tuple": [{"tuple": [math.nan]}, {"tuple": [1]}]}]}),
-    ("coefficients", 3.0),
-    ("coefficients", VECTOR | {"array": "reduced.nothing"}),
-    ("solver", VECTOR),
-    ("tolerance", "1e-3"),
-    ("tolerance", True),
+    *(("known", None), ("known", {"tuple": [1.0]}), ("known", {"same": "reduced.offline"})),
+    *(("class", f"{ROOM}.vehicle.features:monomials"), ("fields", {}), ("offline", HIDDEN)),
+    *(("offline", {"function": f"{ROOM}.trust:trust_of"}), ("offline", {"code": HARM})),
+    *(("offline", KERNEL), ("offline", {"method": "encoded", "of": {"same": "reduced"}})),
+    *(("offline", {"same": same}) for same in ("reduced.nothing", [], "reduced.shape")),
+    *(("offline", {"model": name}) for name in ("parameters", "kernels")),
+    *(("offline.fields", {"minutes": 0.0}), ("features", {"same": "reduced.shape"})),
+    *(("features.states", True), ("features.terms.tuple", ["z0", 3]), ("features.groups", NAN)),
+    *(("coefficients", 3.0), ("coefficients", VECTOR | {"array": "reduced.nothing"})),
+    *(("solver", VECTOR), ("tolerance", "1e-3"), ("tolerance", True)),
     ("model", {"class": "vehiclemor.simulation.dynamic:DynamicModel", "fields": {}}),
     *(("error_scale", VECTOR | {"shape": shape}) for shape in SHAPES),
     *(("error_scale", VECTOR | {"type": kind}) for kind in ("int64", "object")),
@@ -342,236 +303,123 @@ PARTS = [
 
 @pytest.mark.parametrize(("place", "value"), PARTS)
 def test_parts_that_would_do_harm_are_refused(saved, place, value):
-    refused_untouched(rewritten(saved, replaced({f"reduced.{place}": value})))
+    whole = place if place == "known" else f"reduced.{place}"
+    refused_untouched(rewritten(saved, replaced({whole: value})))
 
 
-@pytest.mark.parametrize("known", [None, {"tuple": [1.0]}, {"same": "reduced.offline"}])
-def test_a_range_of_inputs_is_one(saved, known):
-    refused_untouched(rewritten(saved, replaced({"known": known})))
-    refused_untouched(rewritten(saved, replaced({"reduced": known})))
+NAMES = [
+    *("os:system", "builtins:eval", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
+    *("vehiclemor.simulation.dynamic:DynamicModel", "vehiclemor.simulation.build:build"),
+    *("vehiclemor.simulation.system:System", f"{ROOM}.state_space:KinematicStates"),
+    *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
+    # Defined elsewhere.
+    f"{ROOM}.vehicle.reduced_vehicle:Features",
+]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "os:system",
-        "builtins:eval",
-        "vehiclemor.files:write_text",
-        f"{ROOM}.no_such_room:thing",
-        "vehiclemor.simulation.dynamic:DynamicModel",
-        "vehiclemor.simulation.integrators.structures:Equations",
-        "vehiclemor.simulation.system:System",
-        "vehiclemor.simulation.build:build",
-        f"{ROOM}.reduced_system:KinematicStates",
-        f"{ROOM}.vehicle.features:monomials",
-        f"{ROOM}.vehicle.features:Features.blocks",
-        f"{ROOM}.vehicle.features:PLANAR",
-        # Defined elsewhere.
-        f"{ROOM}.vehicle.reduced_vehicle:Features",
-    ],
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_names_of_other_things_are_refused(name):
     with pytest.raises(ValueError, match="there is no"):
         parts.named(name)
 
 
-def short(a: np.ndarray) -> np.ndarray:
-    """Without its last row."""
-    return a[:-1]
-
-
-def thin(a: np.ndarray) -> np.ndarray:
-    """Without its last column."""
-    return a[..., :-1]
-
-
-def whole(a: np.ndarray) -> np.ndarray:
-    return a.astype(int)
-
-
-def first(a: np.ndarray) -> np.ndarray:
-    return a[:1]
-
-
-def none(a: np.ndarray) -> np.ndarray:
-    return a[:0]
-
-
-def unknown(a: np.ndarray) -> np.ndarray:
-    return np.nan * a
-
-
-def grouped(*groups: tuple[list[int], list[int]]) -> dict[str, Any]:
-    return {"tuple": [{"tuple": [{"tuple": part} for part in group]} for group in groups]}
-
-
-BOXED = ("centres", "scales", "halves", "tops", "numbers")
-MODES = {f"transient.{name}": lambda a: np.ones((22, *a.shape[1:])) for name in ("left", "right")}
-# File -> what in its sizes would reach beyond others, and the word of the check that sees it.
-SIZES: dict[str, list[tuple[dict[str, Any], str]]] = {
-    "bicycle": [
-        ({"features.states": 0}, "states"),
-        ({"features.states": 101}, "states"),
-        ({"features.inputs": -1}, "states"),
-        ({"features.inputs": 101}, "states"),
-        ({"features.inputs": 2}, "features"),
-        ({"features.lateral": 1}, "lateral"),
-        ({"features.lateral": -1}, "lateral"),
-        ({"features.groups": grouped(*[([0], [0])] * 7)}, "groups"),
-        ({"features.groups": grouped(([0, 0], [1]))}, "groups"),
-        ({"features.groups": grouped(([-1], [1]))}, "groups"),
-        ({"features.groups": grouped(([8], [1]))}, "groups"),
-        ({"features.groups": grouped(([0], [1, 1]))}, "groups"),
-        ({"features.groups": grouped(([0], [6]))}, "groups"),
-        ({"features.groups": grouped(([], [1]))}, "groups"),
-        ({"features.groups": grouped(([0], []))}, "groups"),
-        ({"parameters": short}, "parameters"),
-        ({"parameters": whole}, "parameters"),
-        ({"parameters": lambda a: a[None]}, "parameters"),
-        ({"transient.rates": lambda _: np.ones(22), **MODES}, "transient"),
-    ],
-    "car": [
-        ({"features.lateral": 4}, "lateral"),
-        ({"lifted_features.states": 8}, ""),
-        ({"lifted_features.inputs": 2}, "features"),
-        *(({name: short}, name) for name in ("coefficients", "lifting", "error_scale")),
-        *(({name: thin}, name) for name in ("coefficients", "lifting", "encoding")),
-        ({"coefficients": whole}, "coefficients"),
-        ({"feedthrough": short}, "encoding"),
-        *(({f"transient.{name}": short}, "transient") for name in ("rates", "left", "right")),
-        ({"transient.left": thin, "transient.right": thin}, "transient"),
-        *(({f"reach.{name}": thin}, "") for name in ("lasted", "starts", "left")),
-        *(({f"reach.{name}": short}, "") for name in ("decaying", "steered", "begun")),
-        ({"reach.lasted": lambda a: a[:-2]}, "lasted"),
-        ({"reach.decaying": short, "reach.steered": short}, "lasted"),
-        ({"reach.left": thin, "reach.starts": thin}, "lasted"),
-        ({"reach.inputs": short}, "reach"),
-        ({"reach.inputs": whole}, "reach"),
-        ({"reach.inputs": lambda a: np.hstack([a, a])}, "reach"),
-    ],
-    "guarded": [
-        ({"fast": {"class": f"{ROOM}.interface:Offline", "fields": {}}}, "no simulate"),
-        ({"safe": {"same": "reduced.fast.offline"}}, "no simulate"),
-    ],
-    "map": [
-        ({"ranges": short}, "ranges"),
-        ({"ranges": unknown}, "ranges"),
-        ({"moving.tuple": [0, 2]}, "moving"),
-        ({"moving.tuple": [0, -1]}, "moving"),
-        ({"moving.tuple": [1, 1]}, "moving"),
-        ({"moving.tuple": [], "cells.coefficients": lambda a: a[:, :1]}, "degree"),
-        ({"degree": 21}, "degree"),
-        ({"degree": -1}, "degree"),
-        ({"columns.tuple": short}, "columns"),
-        ({"columns.tuple": lambda c: [*c[:-1], -1]}, "columns"),
-        ({"columns.tuple": lambda c: [*c[:-1], 14]}, "columns"),
-        *(({f"cells.{name}": short}, "cells") for name in BOXED[:4]),
-        *(({f"cells.{name}": unknown}, "cells") for name in BOXED[:2]),
-        *(({f"cells.{name}": lambda a: a + 1.0}, name) for name in ("halves", "tops")),
-        ({"cells.numbers": lambda a: -a}, "numbers"),
-        ({"cells.numbers": lambda a: 1.0 * a}, "numbers"),
-        ({"cells.coefficients": short}, "cells"),
-        ({"cells.coefficients": whole}, "cells"),
-        ({"cells.coefficients": lambda a: a[:, :-1]}, "coefficients"),
-        ({"cells.coefficients": thin}, "coefficients"),
-        (
-            {f"cells.{name}": short for name in BOXED} | {"cells.coefficients": lambda a: a[:24]},
-            "cells",
-        ),
-    ],
-    "pod": [
-        *(({f"spaces.{name}": short}, "spaces") for name in ("edges", "means", "test_basis")),
-        *(({f"spaces.{name}": thin}, "spaces") for name in ("means", "test_basis")),
-        ({"spaces.trial_basis": lambda a: a[0]}, ""),
-        ({f"spaces.{name}": thin for name in ("means", "trial_basis", "test_basis")}, "spaces"),
-        ({"spaces.formulation": "other"}, "formulation"),
-        (
-            {"spaces.edges": first}
-            | {f"spaces.{name}": none for name in ("means", "trial_basis", "test_basis", "ranks")},
-            "formulation",
-        ),
-        ({"spaces.formulation": "full"}, "ranks"),
-        ({"spaces.ranks": lambda a: a + 99}, "ranks"),
-        ({"spaces.ranks": lambda a: -a}, "ranks"),
-        ({"spaces.ranks": lambda a: 1.0 * a}, "ranks"),
-    ],
-    "windows": [
-        ({"edges": short}, "edges"),
-        ({"bases.0.mean": short}, "basis"),
-        ({"bases.0.mean": whole}, "basis"),
-        ({"bases.1.mean": short, "bases.1.vectors": short}, "bases"),
-        ({"bases.0.vectors": lambda a: np.ones((len(a), len(a) + 1))}, "rank"),
-    ],
-    "replay": [
-        *(({f"recorded.0.{name}": short}, "") for name in ("time", "inputs", "outputs")),
-        ({"recorded.0.time": none}, ""),
-        ({"recorded.0.coordinates": whole}, "samples"),
-        ({"recorded.0.coordinates": lambda a: a[:, 0]}, ""),
-        ({"recorded.0.outputs": thin}, "outputs"),
-    ],
-}
-CASES = [(file, *case) for file, cases in SIZES.items() for case in cases]
-
-
-def crafted(content: bytes, folder: Path, changes: dict[str, Any]) -> Path:
-    (path := folder / "model.nc").write_bytes(content)
-    return rewritten(path, replaced(changes))
-
-
-@pytest.mark.parametrize(
-    ("file", "changes", "word"), CASES, ids=[f"{c[0]}-{'-'.join(c[1])}" for c in CASES]
+OFFLINE = {"class": f"{ROOM}.interface:Offline", "fields": {}}
+# File, word of the check that sees it, changes of the array a that reach beyond other parts.
+SIZES = """
+bicycle states features.states=0 features.states=101 features.inputs=-1 features.inputs=101
+bicycle features features.inputs=2
+bicycle lateral features.lateral=1 features.lateral=-1
+bicycle groups features.groups=g([0,0],[1]) features.groups=g([-1],[1]) features.groups=g([8],[1])
+bicycle groups features.groups=g([0],[1,1]) features.groups=g([0],[6]) features.groups=g([],[1])
+bicycle groups features.groups=g([0],[]) features.groups=g(*[[0]]*14)
+bicycle parameters parameters=a[:-1] parameters=a.astype(int) parameters=a[None]
+bicycle modes transient.rates=ones(22)|transient.left=ones([22,21])|transient.right=ones([22,21])
+bicycle largest known.largest=a[:-1] known.largest=a[:,:0] known.largest=a.astype(int)
+car lateral features.lateral=4
+car features lifted_features.states=8 lifted_features.inputs=2
+car coefficients coefficients=a[:-1] coefficients=a[:,:-1] coefficients=a.astype(int)
+car lifting lifting=a[:-1] lifting=a[:,:-1]
+car encoding encoding=a[:,:-1] feedthrough=a[:-1]
+car error_scale error_scale=a[:-1]
+car transient transient.rates=a[:-1] transient.left=a[:-1] transient.right=a[:-1]
+car transient transient.left=a[:,:-1]|transient.right=a[:,:-1]
+car lasted reach.lasted=a[:,:-1] reach.lasted=a[:-2] reach.left=a[:-1]|reach.starts=a[:,:-1]
+car lasted reach.decaying=a[:-1]|reach.steered=a[:-1]
+car starts reach.starts=a[:,:-1] reach.left=a.astype(int) reach.begun=a.astype(int)
+car steered reach.steered=a[:-1] reach.decaying=a.astype(int)
+car reach reach.inputs=a[:-1] reach.inputs=a.astype(int) reach.inputs=hstack([a,a])
+guarded simulate fast=OFFLINE safe=OFFLINE
+map ranges ranges=a[:-1] ranges=nan*a
+map moving moving.tuple=[0,2] moving.tuple=[0,-1] moving.tuple=[1,1]
+map degree degree=21 degree=-1 moving.tuple=[]|cells.coefficients=a[:,:1]
+map columns columns.tuple=a[:-1] columns.tuple=[*a[:-1],-1] columns.tuple=[*a[:-1],14]
+map cells cells.centres=a[:1] cells.scales=a[:1] cells.halves=a[:1] cells.tops=a[:1]
+map cells cells.centres=nan*a cells.scales=nan*a
+map cells cells.coefficients=a[:-1] cells.coefficients=a.astype(int)
+map coefficients cells.coefficients=a[:,:-1] cells.coefficients=a[:,:,:-1]
+map tops cells.tops=a+1.0
+map halves cells.halves=a+1.0
+map numbers cells.numbers=-a cells.numbers=1.0*a
+pod spaces spaces.edges=a[:-1] spaces.means=a[:-1] spaces.means=a[:,:-1]
+pod spaces spaces.test_basis=a[:-1] spaces.test_basis=a[:,:,:-1] spaces.trial_basis=a[:-1]
+pod formulation spaces.formulation="other"
+pod ranks spaces.formulation="full" spaces.ranks=a+99 spaces.ranks=-a spaces.ranks=1.0*a
+windows edges edges=a[:-1]
+windows basis bases.0.mean=a[:-1] bases.0.mean=a.astype(int)
+windows bases bases.1.mean=a[:-1]|bases.1.vectors=a[:-1]
+windows rank bases.0.vectors=ones((len(a),len(a)+1))
+replay samples recorded.0.inputs=a[:-1] recorded.0.outputs=a[:-1] recorded.0.speeds=ones(3)
+replay time recorded.0.time=a[:0] recorded.0.time=a.astype(int)
+replay outputs recorded.0.outputs=a[:,:-1]
+"""
+ROWS = [row.split() for row in SIZES.strip().splitlines()]
+CASES = [(file, word, change) for file, word, *row in ROWS for change in row]
+# At several places.
+BOXES = ("centres=a[:1]", "scales=a[:1]", "halves=a[:1]", "tops=a[:1]", "numbers=a[:1]")
+BASES, NO_BASES = (
+    ("means=a[{}]", "trial_basis=a[{}]", "test_basis=a[{}]"),
+    ("ranks=a[:0]", "edges=a[:1]"),
 )
-def test_sizes_that_dont_fit_are_refused(file, changes, word, contents, tmp_path):
-    within = {f"reduced.{place}": change for place, change in changes.items()}
-    assert word in refused_untouched(crafted(contents[file], tmp_path, within))
+CASES += [
+    ("map", "cells", "|".join(f"cells.{box}" for box in (*BOXES, "coefficients=a[:24]"))),
+    ("pod", "spaces", "|".join(f"spaces.{base}".format("...,:-1") for base in BASES)),
+    ("pod", "formulation", "|".join(f"spaces.{b}".format(":0") for b in (*BASES, *NO_BASES))),
+]
 
 
-@pytest.mark.parametrize("change", [short, thin, whole, lambda a: a[:1]])
-def test_the_range_of_inputs_is_of_the_model(change, saved):
-    assert "largest" in refused_untouched(rewritten(saved, replaced({"known.largest": change})))
+def grouped(*parts: list[int]) -> dict[str, Any]:
+    lists = [{"tuple": part} for part in parts]
+    return {"tuple": [{"tuple": [*pair]} for pair in zip(lists[::2], lists[1::2], strict=True)]}
+
+
+def changed(text: str) -> dict[str, Any]:
+    """Changes `place=expression|place=expression`."""
+    names = vars(np) | {"g": grouped, "OFFLINE": OFFLINE}
+    pairs = [pair.split("=") for pair in text.split("|")]
+    return {
+        place if place.startswith("known") else f"reduced.{place}": eval(f"lambda a: {way}", names)  # noqa: S307
+        for place, way in pairs
+    }
+
+
+@pytest.mark.parametrize(("file", "word", "change"), CASES)
+def test_sizes_that_dont_fit_are_refused(file, word, change, contents, tmp_path):
+    (path := tmp_path / "model.nc").write_bytes(contents[file])
+    assert word in refused_untouched(rewritten(path, replaced(changed(change))))
 
 
 # Texts of one feature.
-TEXTS = {
-    "call": HARM,
-    "array": "_x[99999]",
-    "parameter beyond": "p[99999]",
-    "negative parameter": "p[-1]",
-    "truth value": "p[True]",
-    "parameter of parameters": "p[p[0]]",
-    "slice": "p[0:1]",
-    "unknown": "z9",
-    "unknown input": "u9",
-    "own name": "term",
-    "line behind": "z0\n    _result[99999] = z0",
-    "line behind a semicolon": "z0; _result[0] = z0",
-    "comment": "z0 # )",
-    "two": "z0, z1",
-    "end of the sum": "z0,)) or ((z0",
-    "two targets": "z1 = z0",
-    "walrus": "(z0 := 1.0)",
-    "star": "*z0",
-    "lambda": "lambda: z0",
-    "f-string": "f'{z0}'",
-    "attribute": "z0.real",
-    "comparison": "z0 < z1",
-    "chained comparison": "1.0 if 0.0 < z0 < 1.0 else 0.0",
-    "remainder": "z0 % 2.0",
-    "whole number": "1",
-    "complex number": "1j",
-    "full-width": "\uff5a0",
-    "unknown function": "math.system(z0)",
-    "too many arguments": "math.sin(z0, z0)",
-    "keyword": "math.sin(x=z0)",
-    "execute": "execute(p[0], p[0], p[0], p[0])",
-    "signs": "-" * 60_000 + "u0",
-    "deep": "z0 + " * 145 + "z0",
-    "nothing": "",
-    "number": 3,
-}
+TEXTS = [
+    *(HARM, "_x[99999]", "p[99999]", "p[-1]", "p[True]", "p[p[0]]", "p[0:1]", "z9", "u9", "term"),
+    *("z0\n    _result[99999] = z0", "z0; _result[0] = z0", "z0 # )", "z0, z1", "z0,)) or ((z0"),
+    *("z1 = z0", "(z0 := 1.0)", "*z0", "lambda: z0", "f'{z0}'", "z0.real", "z0 < z1", "z0 % 2.0"),
+    *("1.0 if 0.0 < z0 < 1.0 else 0.0", "1", "1j", "\uff5a0", "math.system(z0)", "math.sin(x=z0)"),
+    *("math.sin(z0, z0)", "execute(p[0], p[0], p[0], p[0])", "", 3),
+    *("-" * 60_000 + "u0", "z0 + " * 145 + "z0"),
+]
 
 
-@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+@pytest.mark.parametrize("text", TEXTS, ids=range(len(TEXTS)))
 def test_features_that_are_more_than_arithmetic_of_their_numbers_are_refused(text, saved):
     terms = replaced({"reduced.features.terms.tuple": lambda known: [text, *known[1:]]})
     refused_untouched(rewritten(saved, terms))

@@ -104,7 +104,7 @@ class ReducedVehicle(ShortRepr):
         shaped("error_scale", (self.error_scale, k + PLANAR))
         modes = len(self.transient.rates)
         require(not modes or self.transient.left.shape[1:] == (n,), "transient")
-        require(modes <= n, "transient")
+        require(modes <= n, "modes")
         require(reach.inputs.shape[1] in (0, inputs), "reach")
         require(0 <= own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
         if len(reach.lasted):
