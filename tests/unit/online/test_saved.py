@@ -336,7 +336,7 @@ bicycle parameters parameters=a[:-1] parameters=a.astype(int) parameters=a[None]
 bicycle modes transient.rates=ones(22)|transient.left=ones([22,21])|transient.right=ones([22,21])
 bicycle largest known.largest=a[:-1] known.largest=a[:,:0] known.largest=a.astype(int)
 car lateral features.lateral=4
-car features lifted_features.states=8 lifted_features.inputs=2
+car features lifted_features.states=10 lifted_features.inputs=2
 car coefficients coefficients=a[:-1] coefficients=a[:,:-1] coefficients=a.astype(int)
 car lifting lifting=a[:-1] lifting=a[:,:-1]
 car encoding encoding=a[:,:-1] feedthrough=a[:-1]
