@@ -179,7 +179,8 @@ def test_parts_are_what_they_were(monkeypatch):
 
 def test_parameters_settings_and_training_come_along(tmp_path):
     mass = {"sprung_mass": 1400.0}
-    made = vm.reduce(build(CAR, overrides=mass), "pod", training="nominal", rank=4)
+    given: dict[str, Any] = {"training": "nominal", "rank": 4, "restart": "full_model"}
+    made = vm.reduce(build(CAR, overrides=mass), "pod", **given)
     again = vm.load(made.save(tmp_path / "model.nc"))
     assert again.parameters["sprung_mass"] == 1400.0
     assert again.settings == made.settings
@@ -253,25 +254,24 @@ def test_another_version_that_makes_the_same_of_it_is_not(car, saved, monkeypatc
     assert "linear_single_track makes something else of these numbers" in refusal(saved)
 
 
-def other(name: str, text: Any) -> Callable[[xr.Dataset, Any], None]:
-    """Puts another text into a file."""
-    return lambda dataset, _: dataset.update({name: ((), json.dumps(text))})
+TEXTS_BESIDE = [
+    *(("parameters", {"no_such_mass": 3.0}, "no_such_mass"), ("training", 3, "TypeError")),
+    *(("parameters", {"sprung_mass": -3.0}, "sprung_mass"), ("settings", {"none": 1.0}, "none")),
+    ("settings", {"tolerance": "wide"}, "tolerance"),
+]
 
 
-@pytest.mark.parametrize(
-    ("change", "why"),
-    [
-        (other("parameters", {"no_such_mass": 3.0}), "'no_such_mass' is not a parameter"),
-        (other("parameters", {"sprung_mass": -3.0}), "sprung_mass"),
-        (other("settings", {"no_such_setting": 3.0}), "unknown setting"),
-        (other("settings", {"tolerance": "wide"}), "tolerance"),
-        (other("training", 3), "TypeError"),
-        (lambda dataset, _: dataset.update({"fingerprint": 1.01 * dataset.fingerprint}), "changed"),
-        (lambda dataset, _: dataset.attrs.update(saved_model=99), "format 99 where"),
-    ],
-)
-def test_what_doesnt_fit_is_refused(saved, change, why):
-    assert why in refusal(rewritten(saved, change))
+@pytest.mark.parametrize(("name", "text", "why"), TEXTS_BESIDE)
+def test_texts_that_dont_fit_are_refused(saved, name, text, why):
+    change = {name: ((), json.dumps(text))}
+    assert why in refusal(rewritten(saved, lambda dataset, _: dataset.update(change)))
+
+
+def test_other_equations_and_formats_are_refused(saved):
+    rewritten(saved, lambda dataset, _: dataset.update({"fingerprint": 1.01 * dataset.fingerprint}))
+    assert "changed since" in refusal(saved)
+    rewritten(saved, lambda dataset, _: dataset.attrs.update(saved_model=99))
+    assert "format 99 where" in refusal(saved)
 
 
 HARM = "__import__('pathlib').Path('harm').touch()"
@@ -511,7 +511,11 @@ def test_a_model_without_a_shipped_one_is_named():
         vm.rom("tricycle")
 
 
-def test_a_reduced_plug_in_is_saved(plug_in_package, tmp_path):
-    made = vm.reduce("quarter_car", "pod", training="nominal", rank=2)
+def test_a_plug_in_is_saved_unless_it_has_kernels(plug_in_package, tmp_path, monkeypatch):
+    monkeypatch.setattr(parts, "_plug_ins", lambda: {"quarter_car"})
+    made = vm.reduce("quarter_car", "quarter_car_modes", training="nominal")
     again = vm.load(made.save(tmp_path / "model.nc"))
     np.testing.assert_array_equal(again.simulate().outputs, made.simulate().outputs)
+    wrong = dataclasses.replace(made.reduced, equations=KERNELS)
+    with pytest.raises(InputError, match=r"can't be saved: reduced\.equations is .*Kernels"):
+        dataclasses.replace(made, reduced=wrong).save(tmp_path / "wrong.nc")
