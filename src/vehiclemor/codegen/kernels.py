@@ -134,14 +134,10 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
     return address, ctypes.CFUNCTYPE(None, *pointers)(address), code
 
 
-def kernel_texts(text: str) -> list[str]:
-    """Texts of the kernels in a text."""
-    return [f"{part}\n" for part in re.split(r"\n+(?=def )", text.strip())]
-
-
 def kernel_sources(text: str) -> dict[str, KernelSource]:
     """Sources of the kernels in a text, by name."""
-    return {source.name: source for source in map(_source, kernel_texts(text))}
+    parts = re.split(r"\n+(?=def )", text.strip())
+    return {source.name: source for source in (_source(f"{part}\n") for part in parts)}
 
 
 # Models with other parameters ask for the same again.

@@ -1,7 +1,7 @@
 """Reduced models as files: one netCDF-4 file with all that they are made of, and nothing to run.
 
-Numbers are variables by the names of the fields that they stand in; their order, texts of features
-and of kernels are JSON.  Machine code is made of these texts, or comes from the cache.
+Numbers are variables by the names of the fields that they stand in; their order and the texts
+of features are JSON.  Machine code is made of these texts, or comes from the cache.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,9 +22,10 @@ from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.validation import checked_fit, checked_settings
 from vehiclemor.registry import component
-from vehiclemor.short_repr import ShortRepr, shortened
+from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
+from vehiclemor.sizes import require
 from vehiclemor.study.input_range import InputRange
 from vehiclemor.study.method_settings import Settings, for_method
 from vehiclemor.study.netcdf_file import INTEGRITY, opened, write_dataset
@@ -48,23 +48,8 @@ SAME, ROUNDING = 1e-8, 1e-12
 STEP = 0.01
 
 
-@dataclass(frozen=True)
-class Saved(ShortRepr):
-    """What a file holds.
-
-    Attributes
-    ----------
-    model
-        The full-order model.
-    method, settings
-        Name of the method and its complete settings.
-    training
-        What it was trained on: the content of each scenario.
-    reduced
-        What the method's `fit` gave.
-    known
-        Range of the inputs of its training.
-    """
+class Saved(NamedTuple):
+    """What a file holds, in the order of the fields of a `ReducedOrderModel`."""
 
     model: Model
     method: str
@@ -146,6 +131,8 @@ def read(path: Any) -> Saved:
         checked_fit(method, made["reduced"])
         if not isinstance(made["known"], InputRange):
             raise TypeError(f"known is {quoted(made['known'])}, no InputRange")
+        kinds = 1 if model.kind == "ae" else 3
+        require(made["known"].largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
         return Saved(model, method, settings, tuple(training), **made)

@@ -1,48 +1,35 @@
 """A reduced model as plain parts, and made of them again: numbers, texts, arrays by name.
 
 What a method's `fit` gives is a tree of dataclasses and named tuples.  It is written field by
-field; the full-order model, and what is the model's own, is only referred to.  What is read can
-name the classes and functions that are listed here, or those of a plug-in that is in use, and
+field; the full-order model and its system are only referred to.  What is read can name the classes
+of this package that check their sizes, see `sizes`, and those of a plug-in that is in use, and
 nothing else: no text becomes Python.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any
+from types import UnionType
+from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.codegen.foreign_texts import check_kernel
-from vehiclemor.codegen.kernels import Kernels, kernel_sources, kernel_texts
 from vehiclemor.errors import InputError
-from vehiclemor.online.bounds import check
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
+from vehiclemor.sizes import require
 
-# Where the classes and functions are that are parts of reduced models; `bounds` checks their sizes.
+# Where the classes are that may be parts of reduced models.
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
-PARTS = (
-    *("AlgebraicProjection", "Basis", "Cells", "DynamicProjection", "Features"),
-    *("FullOrderModel", "GuardedModel", "InputRange", "Offline"),
-    *("PathMapModel", "ProjectionWindows", "ReducedSystem"),
-    *("ReducedVehicle", "ReplayModel", "System", "TrainingReach", "Trajectory", "Transient"),
-    *("Trust", "VehicleShape", "_nothing_told", "_own_path", "_same_state"),
-)
-# Methods that are.
-METHODS = ("encode", "lift", "judge", "slopes")
 # Parts that a model may have, each counted wherever it is meant: those of this package have 20,000.
 MOST_PARTS = 500_000
-# What of a model may be a part of a reduced one.
-OWN = ("system", "kernels")
 # Types of arrays, and as what they are stored.
 STORED = {"float64": "f8", "int64": "i8", "bool": "i1", "complex128": "f8"}
 
@@ -59,10 +46,8 @@ class Writer:
     def __init__(self, model: Model) -> None:
         self.arrays: dict[str, np.ndarray] = {}
         self._known: dict[int, tuple[Any, Any]] = {id(model): (model, {"model": ""})}
-        for name in OWN:
-            if (own := getattr(model, name, None)) is not None:
-                self._known[id(own)] = own, {"model": name}
-        self._own_sources = model.kernels.sources
+        if (system := getattr(model, "system", None)) is not None:
+            self._known[id(system)] = system, {"model": "system"}
 
     def part(self, value: Any, place: str) -> Any:
         """A value as JSON has it; its arrays apart.
@@ -87,26 +72,15 @@ class Writer:
         kind = type(value)
         if isinstance(value, np.ndarray) and value.dtype.name in STORED:
             return self._array(value, place)
-        if isinstance(value, Kernels):
-            if value.sources == self._own_sources:
-                return {"model": "kernels"}
-            text = "\n".join(s.text for s in value.sources.values())
-            with suppress(ValueError):
-                kernels_of(text)
-                return {"kernels": text}
-            raise _unwritable(place, value)
         if names := _fields(kind):
+            name = _name(value, place)
             fields = {name: self.part(getattr(value, name), f"{place}.{name}") for name in names}
-            return {"class": _name(value, kind, place), "fields": fields}
+            return {"class": name, "fields": fields}
         if kind in (tuple, list):
             items = [self.part(item, f"{place}.{i}") for i, item in enumerate(value)]
             return {kind.__name__: items}
         if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
             return {"mapping": {key: self.part(v, f"{place}.{key}") for key, v in value.items()}}
-        if inspect.ismethod(value) and value.__name__ in METHODS and _fields(type(value.__self__)):
-            return {"method": value.__name__, "of": self.part(value.__self__, f"{place}.of")}
-        if inspect.isfunction(value):
-            return {"function": _name(value, value, place)}
         raise _unwritable(place, value)
 
     def _array(self, value: np.ndarray, place: str) -> dict[str, Any]:
@@ -155,8 +129,6 @@ class Reader:
                 raise ValueError(f"{place} has too many parts")
             return made
         made = self._of_kind(part, place)
-        if "model" not in part:
-            check(made, self._model)
         self._made[place] = made, self._count - before
         return made
 
@@ -166,29 +138,19 @@ class Reader:
                 return self._array(self._arrays[name], part)
             case {"model": ""}:
                 return self._model
-            case {"model": name} if name in OWN:
+            case {"model": "system" as name}:
                 return getattr(self._model, name)
-            case {"kernels": text}:
-                return kernels_of(text)
             case {"class": name, "fields": fields}:
-                made = named(name)
-                # What has a default may have come since.
-                if not _required(made) <= set(fields) <= set(_fields(made)):
-                    raise ValueError(f"{name} has other fields here")
-                return made(**{key: self.value(v, f"{place}.{key}") for key, v in fields.items()})
+                kind = named(name)
+                made = kind(**{key: self.value(v, f"{place}.{key}") for key, v in fields.items()})
+                _check(made)
+                return made
             case {"tuple": items}:
                 return tuple(self.value(item, f"{place}.{i}") for i, item in enumerate(items))
             case {"list": items}:
                 return [self.value(item, f"{place}.{i}") for i, item in enumerate(items)]
             case {"mapping": items}:
                 return {key: self.value(item, f"{place}.{key}") for key, item in items.items()}
-            case {"method": name, "of": of}:
-                owner = self.value(of, f"{place}.of")
-                if name not in METHODS or not inspect.isfunction(getattr(type(owner), name)):
-                    raise ValueError(f"{name} is no method")
-                return getattr(owner, name)
-            case {"function": name} if inspect.isfunction(found := named(name)):
-                return found
         raise ValueError(f"{quoted(part)} is no part of a model")
 
     def _array(self, stored: np.ndarray, part: dict[str, Any]) -> np.ndarray:
@@ -201,21 +163,8 @@ class Reader:
         return found.T if part["turned"] else found
 
 
-def kernels_of(text: str) -> Kernels:
-    """Kernels of a text, which is decided on before anything of it is compiled.
-
-    Raises
-    ------
-    ValueError
-        If one of them is not allowed.
-    """
-    for part in kernel_texts(text):
-        check_kernel(part)
-    return Kernels(kernel_sources(text))
-
-
 def named(name: str) -> Any:
-    """The dataclass, named tuple or function `module:name` of `PARTS` or of a plug-in.
+    """The dataclass or named tuple `module:name` that checks its sizes, or is of a plug-in.
 
     Raises
     ------
@@ -223,16 +172,14 @@ def named(name: str) -> Any:
         If it is anything else.
     """
     module, _, own = name.partition(":")
+    # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
+    known = module.partition(".")[0] in _plug_ins()
     if module.startswith(ROOMS):
         with suppress(ImportError):
             import_module(module)
-        own = own if own in PARTS else ""
-    # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
-    elif module.partition(".")[0] not in _plug_ins():
-        module = ""
     found = getattr(sys.modules.get(module), own, None)
-    fitting = inspect.isfunction(found) or _fields(found)
-    if not fitting or getattr(found, "__module__", "") != module:
+    known = known or (module.startswith(ROOMS) and hasattr(found, "check_sizes"))
+    if not (known and _fields(found) and found.__module__ == module):
         raise ValueError(f"there is no {name}")
     return found
 
@@ -253,26 +200,52 @@ def _fields(kind: Any) -> tuple[str, ...]:
     return getattr(kind, "_fields", ()) if issubclass(kind, tuple) else ()
 
 
-def _required(kind: type) -> set[str]:
-    """Names of those without a default."""
-    if not dataclasses.is_dataclass(kind):
-        return {*_fields(kind)} - {*getattr(kind, "_field_defaults", ())}
-    missing = dataclasses.MISSING
-    given = (f for f in dataclasses.fields(kind) if f.init)
-    return {f.name for f in given if f.default is missing and f.default_factory is missing}
-
-
-def _name(value: Any, definition: Any, place: str) -> str:
-    """`module:name` by which a class or a function is found again."""
-    name = f"{definition.__module__}:{definition.__qualname__}"
-    try:
-        found = named(name)
-    except ValueError:
-        found = None
-    if found is not definition:
-        raise _unwritable(place, value)
-    return name
+def _name(value: Any, place: str) -> str:
+    """`module:name` by which its class is found again."""
+    name = f"{type(value).__module__}:{type(value).__qualname__}"
+    with suppress(ValueError):
+        if named(name) is type(value):
+            return name
+    raise _unwritable(place, value)
 
 
 def _unwritable(place: str, value: Any) -> InputError:
     return InputError(f"it can't be saved: {place} is {quoted(value)}")
+
+
+def _check(part: Any) -> None:
+    """Raise `ValueError` if a part is not what others will take it for."""
+    if type(part).__module__.startswith("vehiclemor."):
+        for name, kind in _declared(type(part)).items():
+            require(_is(getattr(part, name), kind), name)
+    # A plug-in's class may be made of one of ours.
+    if hasattr(part, "check_sizes"):
+        part.check_sizes()
+
+
+@cache
+def _declared(kind: type) -> Mapping[str, Any]:
+    """Fields of a dataclass or a named tuple, with their types."""
+    hints = get_type_hints(kind)
+    return {name: of for name, of in hints.items() if get_origin(of) is not ClassVar}
+
+
+def _is(value: Any, kind: Any) -> bool:
+    """Whether a value is of a declared type; what is made of others is of it in all its parts."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return any(_is(value, one) for one in inner)
+    if origin is tuple and inner[-1:] != (...,):
+        fits = isinstance(value, tuple) and len(value) == len(inner)
+        return fits and all(map(_is, value, inner))
+    if origin in (tuple, list):
+        return isinstance(value, origin) and all(_is(part, inner[0]) for part in value)
+    if origin in (dict, Mapping):
+        return isinstance(value, Mapping) and all(_is(v, inner[1]) for v in value.values())
+    if origin is Callable:
+        return False
+    if kind is Any or getattr(kind, "_is_protocol", False):
+        return True
+    # A truth value is a whole number to Python, and that is a float to the type's author.
+    wider = (float, int) if kind is float else kind
+    return isinstance(value, wider) and (kind is bool or not isinstance(value, bool))

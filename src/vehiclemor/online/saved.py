@@ -17,10 +17,7 @@ def load(path: Any) -> ReducedOrderModel:
     FileError
         If the file is missing, damaged or something else, or does not fit what is installed.
     """
-    saved = read(path)
-    return ReducedOrderModel(
-        saved.model, saved.method, saved.settings, saved.training, saved.reduced, saved.known
-    )
+    return ReducedOrderModel(*read(path))
 
 
 def rom(model: str) -> ReducedOrderModel:

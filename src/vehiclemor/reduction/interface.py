@@ -37,6 +37,9 @@ class Offline:
     seconds: float = 0.0
     evaluations: int = 0
 
+    def check_sizes(self) -> None:
+        """There are none."""
+
 
 def offline_cost(
     began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0

@@ -33,26 +33,15 @@ from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.sizes import require
 
 # Encoded starts that are kept.
 MOST_STARTS = 64
 
 
-def _same_state(state: np.ndarray, _: np.ndarray) -> np.ndarray:
-    return state
-
-
-def _nothing_told(_: Run, __: np.ndarray) -> None:
-    return
-
-
 def _given(states: np.ndarray) -> Run:
     """States (samples, dim) as a run, all at time zero."""
     return Run(np.zeros(len(states)), states, np.zeros(0), 0.0, "")
-
-
-def _own_path(run: Run, _: np.ndarray, __: np.ndarray) -> np.ndarray:
-    return run.whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +61,12 @@ class ReducedSystem(ShortRepr):
     solver, tolerance
         Integrator and its tolerance.
     encode
-        (full state (2 n,), inputs) -> state (dim,) of the system; the same by default.
+        (full state (2 n,), inputs) -> state (dim,) of the system; the same if there is none.
     lift
-        (run of the system, inputs (samples, inputs), full state at the start) -> full states; by
-        default the run's own.  It keeps nothing of the run.
+        (run of the system, inputs (samples, inputs)) -> full states, the run's own if there is
+        none.  It keeps nothing of the run.
     judge
-        (run of the system, inputs) -> what the model tells of it; nothing by default.
+        (run of the system, inputs) -> what the model tells of it.
     names
         Of the system's states; the model's by default.
     slopes
@@ -92,11 +81,19 @@ class ReducedSystem(ShortRepr):
     offline: Offline
     solver: str
     tolerance: float
-    encode: Callable[[np.ndarray, np.ndarray], np.ndarray] = _same_state
-    lift: Callable[[Run, np.ndarray, np.ndarray], np.ndarray] = _own_path
-    judge: Callable[[Run, np.ndarray], Trust | None] = _nothing_told
+    encode: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    lift: Callable[[Run, np.ndarray], np.ndarray] | None = None
+    judge: Callable[[Run, np.ndarray], Trust | None] | None = None
     names: tuple[str, ...] = ()
     slopes: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the subspaces are of other states than the system's."""
+        spaces, dim = self.spaces, len(self.system.reference)
+        if spaces.formulation == "full":
+            require(spaces.ranks.dtype == int and spaces.ranks.tolist() == [dim], "ranks")
+        else:
+            require(spaces.means.shape[1] == dim, "spaces")
 
     @property
     def state_space(self) -> ReducedSystem:
@@ -157,12 +154,14 @@ class ReducedSystem(ShortRepr):
 
     def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """States (samples, 2 n) of the model."""
-        run = _given(states)
-        return self.lift(run, inputs, states[0])[:, : 2 * len(self.model.coordinates)]
+        return self._lifted(_given(states), inputs)[:, : 2 * len(self.model.coordinates)]
+
+    def _lifted(self, run: Run, inputs: np.ndarray) -> np.ndarray:
+        return self.lift(run, inputs) if self.lift else run.whole
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
         """What the model tells of states, if it judges itself."""
-        return self.judge(_given(states), inputs)
+        return self.judge(_given(states), inputs) if self.judge else None
 
     def run(
         self,
@@ -186,7 +185,8 @@ class ReducedSystem(ShortRepr):
         if found is None:
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            found = self._starts[key] = self.encode(self.model.start(start), inputs)
+            full = self.model.start(start)
+            found = self._starts[key] = self.encode(full, inputs) if self.encode else full
         return found
 
     @cached_property
@@ -198,8 +198,9 @@ class ReducedSystem(ShortRepr):
         maneuver = checked_maneuver(maneuver, self.model.definition)
         run = self.run(maneuver, start)
         inputs = recorded_inputs(maneuver)[1]
-        states = self.lift(run, inputs, self.model.start(start))
-        found = self.model.recorded(maneuver, run, inputs, states, self.judge(run, inputs))
+        states = self._lifted(run, inputs)
+        trust = self.judge(run, inputs) if self.judge else None
+        found = self.model.recorded(maneuver, run, inputs, states, trust)
         run.give_back()
         return found
 

@@ -8,6 +8,7 @@ import numpy as np
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.integrators.structures import Spans, Subspaces
+from vehiclemor.sizes import require, shaped, within
 
 # Of the equations that are integrated; see the modules of these names in `formulations`.
 FORMULATIONS = ("full", "state", "coordinates")
@@ -39,6 +40,21 @@ class ProjectionWindows(ShortRepr):
     trial_basis: np.ndarray
     test_basis: np.ndarray
     ranks: np.ndarray
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if loops would read or write beyond a basis."""
+        windows, form = len(self.ranks), self.formulation
+        rows, columns = self.trial_basis.shape[1:]
+        require(form in FORMULATIONS and windows > 0, "formulation")
+        bases = (
+            (self.trial_basis, windows, rows, columns),
+            (self.test_basis, windows, rows, columns),
+        )
+        shaped("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
+        if form != "full":
+            # A coordinate and its rate share a row where coordinates are projected.
+            most = rows * (2 if form == "coordinates" else 1)
+            within("ranks", self.ranks.tolist(), min(most, columns) + 1)
 
     @cached_property
     def subspaces(self) -> Ready:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.sizes import shaped
 
 # A named initial condition of a model, or a state (n,).
 Start = str | tuple[float, ...] | np.ndarray
@@ -93,6 +94,13 @@ class Trajectory(ShortRepr):
     message: str = ""
     remark: str = ""
     trust: Trust | None = None
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if histories are of other samples than the times."""
+        samples = max(len(self.time), 1)
+        shaped("time", (self.time, samples))
+        for history in (self.inputs, self.coordinates, self.speeds, self.outputs):
+            shaped("samples", (history, samples, *history.shape[1:2]))
 
     @classmethod
     def of(cls, **fields: Any) -> Trajectory:

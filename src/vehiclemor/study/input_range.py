@@ -18,6 +18,7 @@ from vehiclemor.reduction.trust import (
 from vehiclemor.simulation.input_polynomials import extent_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
+from vehiclemor.sizes import shaped
 from vehiclemor.study.scenario import Scenario, car_of, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
@@ -50,6 +51,10 @@ class InputRange:
     reach: float
     longest: float
     histories: np.ndarray | None = None
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the magnitudes are no table of floats."""
+        shaped("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
 
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""

@@ -170,37 +170,28 @@ def test_points_are_parameters_by_run():
 STATE = [0.0] * 27
 
 
-@pytest.mark.parametrize(
-    ("changes", "line"),
-    [
-        ({"signals": []}, "signals is [], not a list with a signal for each run"),
-        ({"signals": [1.0]}, "signals[0] is 1.0, not a signal or maneuver"),
-        ({"signals": [component("maneuver", "sine_travel")]}, "gives inputs z, s0"),
-        ({"starts": ["equilibrium"]}, "there are 1 starts for 2 runs"),
-        ({"starts": "above"}, "unknown start 'above'"),
-        ({"starts": STATE}, "start has shape (27,)"),
-        ({"outputs": ["yaww"]}, "unknown output 'yaww'; did you mean yaw"),
-        (
-            {"times": [1.0, 5.0]},
-            "times: 5 s is no output time of signals[0]: they go from 0 to 4 s",
-        ),
-        ({"times": [0.505]}, "times: 0.505 s is no output time of signals[0]"),
-        ({"times": [1.0, 0.5]}, "times must increase"),
-        ({"jobs": 0}, "jobs is 0"),
-        ({"parameters": {"mass": 1.0}}, "'mass' is not a parameter of"),
-        ({"parameters": {"sprung_mass": [1.0] * 3}}, "has shape (3,), not () or (2,)"),
-        ({"parameters": [{}]}, "not a mapping for each run"),
-        ({"parameters": [None] * 2}, "not a mapping for each run"),
-        ({"parameters": [{"mass": 1.0}] * 2}, "'mass' is not a parameter of"),
-        ({"parameters": [{"sprung_mass": np.ones(1)}] * 2}, "has shape (1,), not ()"),
-        ({"model": 3}, "model is 3"),
-    ],
-)
-def test_wrong_input_is_one_line(changes, line, full):
-    given = {"model": full, "signals": vm.many_signals(TIMES, steering(2))} | changes
+# What is wrong, and the name that the error begins with.
+WRONG = [
+    *((("signals", []), "signals"), (("signals", [1.0]), "signals")),
+    (("signals", [component("maneuver", "sine_travel")]), "sine_travel"),
+    *((("starts", ["equilibrium"]), "starts"), (("starts", "above"), "start 'above'")),
+    *((("starts", STATE), "start"), (("outputs", ["yaww"]), "output 'yaww'")),
+    *((("times", times), "times") for times in ([1.0, 5.0], [0.505], [1.0, 0.5])),
+    *((("jobs", 0), "jobs"), (("model", 3), "model")),
+    *((("parameters", given), "'mass'") for given in ({"mass": 1.0}, [{"mass": 1.0}] * 2)),
+    *((("parameters", given), "parameters") for given in ([{}], [None] * 2)),
+    (("parameters", {"sprung_mass": [1.0] * 3}), "sprung_mass"),
+    (("parameters", [{"sprung_mass": np.ones(1)}] * 2), "sprung_mass"),
+]
+
+
+@pytest.mark.parametrize(("change", "word"), WRONG)
+def test_wrong_input_is_one_line(change, word, full):
+    name, value = change
+    given = {"model": full, "signals": vm.many_signals(TIMES, steering(2))} | {name: value}
     with pytest.raises(InputError) as error:
         vm.simulate_many(**given)
-    assert line in str(error.value)
+    assert word in str(error.value)
     assert "\n" not in str(error.value)
 
 

@@ -58,6 +58,9 @@ class FullOrderModel(ShortRepr):
     tolerance: float
     offline: Offline = field(default_factory=Offline)
 
+    def check_sizes(self) -> None:
+        """There are none."""
+
     @property
     def effective_rank(self) -> int:
         """Number of coordinates."""

@@ -18,7 +18,7 @@ from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedMod
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.validation import checked_settings, fitted, validated
+from vehiclemor.reduction.validation import checked_fit, checked_settings, fitted, validated
 from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
@@ -57,6 +57,11 @@ class GuardedModel(ShortRepr):
     offline: Offline
     solver: str
     tolerance: float
+
+    def check_sizes(self) -> None:
+        """Raise `PlugInError` if one of them is no reduced model."""
+        checked_fit(NAME, self.fast)
+        checked_fit(NAME, self.safe)
 
     @property
     def effective_rank(self) -> int:

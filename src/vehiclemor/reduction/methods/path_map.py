@@ -7,6 +7,7 @@ geometrically with the degree, and with the size of the cells at the order of th
 runs only tell between which inputs: the equations are solved in all of that box.  Online none is.
 """
 
+import math
 import time
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
+from vehiclemor.codegen.foreign_texts import MOST_SIZE
 from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.tangent import Tangent, tangent
@@ -37,6 +39,7 @@ from vehiclemor.simulation.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.spare_spaces import SpareSpaces
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.sizes import apart, require, shaped, within
 
 # Above this degree, powers lose digits to rounding.
 HIGHEST_DEGREE = 20
@@ -90,6 +93,24 @@ class PathMapModel(ShortRepr):
     columns: tuple[int, ...]
     stops: bool
     offline: Offline
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the loop would read beyond inputs, cells or columns."""
+        inputs, cells = len(self.model.inputs), self.cells
+        require(len(cells.numbers) == inputs, "cells")
+        shaped("ranges", (self.ranges, inputs, 2))
+        require(bool(np.isfinite(self.ranges).all()), "ranges")
+        apart("moving", self.moving, inputs)
+        require(0 <= self.degree <= HIGHEST_DEGREE, "degree")
+        require(
+            len(self.columns) == len(self.model.coordinates) + len(self.model.outputs), "columns"
+        )
+        within("columns", self.columns, len(self.columns))
+        terms = math.comb(len(self.moving) + self.degree, self.degree)
+        width = padded(max(self.columns) + 1)
+        require(cells.coefficients.shape[1:] == (terms, width), "coefficients")
+        # The text of the loop grows with them.
+        require(bool(self.moving) and terms * width <= MOST_SIZE, "degree")
 
     @property
     def effective_rank(self) -> int:

@@ -17,6 +17,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.sizes import require
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,12 @@ class ReplayModel(ShortRepr):
     model: Model
     recorded: tuple[Trajectory, ...]
     offline: Offline
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if a run is none of this model."""
+        for name in ("inputs", "coordinates", "speeds", "outputs"):
+            columns = len(getattr(self.model, name))
+            require(all(getattr(r, name).shape[1] == columns for r in self.recorded), name)
 
     @property
     def effective_rank(self) -> int:

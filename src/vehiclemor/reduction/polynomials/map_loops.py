@@ -3,10 +3,14 @@
 The polynomials are a kernel that `kernels.py` writes for their number and degree.
 """
 
+import math
 from typing import NamedTuple
+
+import numpy as np
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
 from vehiclemor.simulation.newton_loops import CONVERGED
+from vehiclemor.sizes import require, shaped
 
 # Sizes that the compiler knows.
 INPUTS, QUANTITIES = 0, 0
@@ -37,6 +41,17 @@ class Cells(NamedTuple):
     tops: Vector
     numbers: IntVector
     coefficients: Cube
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the loop would read beyond the coefficients."""
+        numbers, inputs = self.numbers.tolist(), len(self.numbers)
+        require(all(type(number) is int and number > 0 for number in numbers), "numbers")
+        shaped("cells", *((array, inputs) for array in self[:4]))
+        shaped("cells", (self.coefficients, math.prod(numbers), *self.coefficients.shape[1:3]))
+        require(np.array_equal(self.tops, self.numbers - 1.0), "tops")
+        require(np.array_equal(self.halves, 0.5 * self.numbers), "halves")
+        # What is no number would be a place anywhere.
+        require(bool(np.isfinite([self.centres, self.scales]).all()), "cells")
 
 
 def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:

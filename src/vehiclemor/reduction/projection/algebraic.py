@@ -19,6 +19,7 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Iteration
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.sizes import require, shaped
 
 ITERATION_LIMIT = 50
 
@@ -45,6 +46,12 @@ class AlgebraicProjection(SolvedAnywhere):
     tests: tuple[np.ndarray, ...] | None
     offline: Offline
     tolerance: float
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if there is no basis of the model's coordinates for each window."""
+        n, windows = len(self.model.coordinates), len(self.bases)
+        shaped("edges", (self.edges, windows + 1))
+        require(all(len(basis.mean) == n for basis in self.bases), "bases")
 
     @property
     def effective_rank(self) -> int:

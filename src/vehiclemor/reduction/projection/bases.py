@@ -9,6 +9,7 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.sizes import require, shaped
 
 MOST_SNAPSHOTS = 100_000
 
@@ -30,6 +31,12 @@ class Basis(ShortRepr):
     mean: np.ndarray
     vectors: np.ndarray
     singular_values: np.ndarray
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the columns are not as long as the mean, or are more."""
+        n = len(self.mean)
+        shaped("basis", (self.mean, n), (self.vectors, n, self.rank))
+        require(self.rank <= n, "rank")
 
     @property
     def rank(self) -> int:

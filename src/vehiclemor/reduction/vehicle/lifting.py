@@ -22,6 +22,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.trajectory import Trust
+from vehiclemor.sizes import require
 
 # Part of a transient below which it needs no samples of its own.
 NEGLIGIBLE = 1e-4
@@ -47,6 +48,11 @@ class Transient:
     rates: np.ndarray
     left: np.ndarray
     right: np.ndarray
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if there are not as many vectors as rates."""
+        modes, *n = self.left.shape
+        require(self.rates.shape == (modes,) and self.right.shape == (modes, *n), "transient")
 
     def amplitudes(self, deviation: np.ndarray) -> np.ndarray:
         """Amplitudes (m,) that a deviation (n,) of a start's shape excites; empty if it is none."""

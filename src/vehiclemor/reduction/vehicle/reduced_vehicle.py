@@ -11,7 +11,7 @@ from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
-from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.features import PLANAR, Features, needed_parameters
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
@@ -23,6 +23,7 @@ from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.sizes import require, shaped
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
@@ -89,6 +90,27 @@ class ReducedVehicle(ShortRepr):
     lifted_features: Features | None = None
     reach: TrainingReach = NOTHING_KNOWN
 
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if kernels would read or write beyond these arrays."""
+        own, lifted, reach = self.features, self.lifted_features or self.features, self.reach
+        k, n, inputs = own.states, len(self.shape.kept), len(self.model.inputs)
+        require((own.inputs, lifted.inputs, lifted.states) == (inputs, inputs, k), "features")
+        shaped("parameters", (self.parameters, len(self.parameters)))
+        needed = max(needed_parameters(own), needed_parameters(lifted))
+        require(len(self.parameters) >= needed, "parameters")
+        shaped("coefficients", (self.coefficients, len(own.terms), k + PLANAR))
+        shaped("lifting", (self.lifting, len(lifted.terms), n))
+        shaped("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
+        shaped("error_scale", (self.error_scale, k + PLANAR))
+        modes = len(self.transient.rates)
+        require(not modes or self.transient.left.shape[1:] == (n,), "transient")
+        require(modes <= n, "modes")
+        require(reach.inputs.shape[1] in (0, inputs), "reach")
+        require(0 <= own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
+        if len(reach.lasted):
+            known = len(reach.lasted), len(reach.decaying), len(reach.left)
+            require(known == (2 * lifted.lateral, modes, n), "lasted")
+
     @property
     def effective_rank(self) -> int:
         """Number of integrated states, heading and place included."""
@@ -128,8 +150,8 @@ class ReducedVehicle(ShortRepr):
             self.solver,
             self.tolerance,
             self.encoded,
-            lambda run, inputs, _: self._lifted(run, inputs),
-            judge=self._judged,
+            self._lifted,
+            self._judged,
             slopes=self.lift.slopes,
             names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
         )

@@ -58,6 +58,9 @@ class VehicleShape:
 
     model: DynamicModel
 
+    def check_sizes(self) -> None:
+        """There are none."""
+
     @cached_property
     def kept(self) -> np.ndarray:
         """Numbers of the states that make the shape."""

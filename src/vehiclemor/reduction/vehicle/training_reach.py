@@ -15,6 +15,7 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.trust import inputs_beyond
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING, PARTS, STILL
 from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.sizes import shaped
 
 # A run may last so many times as long as any training run, and this (s) where none has been.
 LONGER, SHORTEST = 1.05, 0.1
@@ -74,6 +75,14 @@ class TrainingReach:
     starts: np.ndarray
     begun: np.ndarray
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the amplitudes or the starts don't fit one another."""
+        modes, n, starts = len(self.decaying), len(self.left), len(self.begun)
+        shaped("lasted", (self.lasted, len(self.lasted), LEVELS))
+        shaped("steered", (self.decaying, modes), (self.steered, modes))
+        shaped("starts", (self.left, n), (self.starts, starts, n), (self.begun, starts))
+        shaped("reach", (self.inputs, 3, *self.inputs.shape[1:2]))
 
     def driven(self, maneuver: Maneuver) -> tuple[float, float]:
         """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
