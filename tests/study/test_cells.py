@@ -33,7 +33,7 @@ def make_cell(model, maneuver, method, given, training="matched", **factors):
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
     evaluation.kept_reference.cache_clear()
-    evaluation._kept_fit.cache_clear()
+    evaluation._kept.cache_clear()
 
 
 @pytest.fixture(scope="module")

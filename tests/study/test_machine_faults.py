@@ -27,9 +27,9 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.fixture(autouse=True)
 def _nothing_kept():
-    evaluate._kept_fit.cache_clear()
+    evaluate._kept.cache_clear()
     yield
-    evaluate._kept_fit.cache_clear()
+    evaluate._kept.cache_clear()
 
 
 @pytest.fixture

@@ -108,7 +108,7 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     seen, trained = [], []
     evaluate.kept_reference.cache_clear()
     # What an earlier test has fitted would not be fitted again.
-    evaluate._kept_fit.cache_clear()
+    evaluate._kept.cache_clear()
 
     def recorded(function):
         def run(self, maneuver, *arguments, **named):

@@ -25,7 +25,7 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.input_range import input_range
 from vehiclemor.study.linear_algebra import one_thread
-from vehiclemor.study.method_settings import Settings, default_settings, for_method
+from vehiclemor.study.method_settings import default_settings, for_method
 from vehiclemor.study.result import (
     Outcome,
     errors_dataset,
@@ -61,6 +61,8 @@ class Fit(NamedTuple):
         What differs from it in the model that is reduced.
     settings
         As text.
+    function
+        The method's own, which may be written anew under the same name.
     """
 
     model: Model
@@ -68,6 +70,7 @@ class Fit(NamedTuple):
     method: str
     settings: str
     training: tuple[Scenario, ...]
+    function: Callable
 
 
 @dataclass
@@ -108,10 +111,7 @@ def evaluate(
 def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -> xr.Dataset:
     refused = refusal(model, experiment)
     solve = kept_reference if kept else recent_reference
-    if kept or refused:
-        fitted = Fitted(refused or kept_fit(model, experiment))
-    else:
-        fitted = recent_fit(model, experiment)
+    fitted = Fitted(refused) if refused else _kept(_wanted(model, experiment))
     outcomes: list[Outcome | Failure] = []
     for scenario in experiment.test:
         outcome: Any = refused
@@ -196,8 +196,9 @@ kept_reference = lru_cache(maxsize=1024)(reference_run)
 
 def _wanted(model: Model, experiment: Experiment) -> Fit:
     settings = _text(experiment.settings)
-    car = experiment.test[0].parameters
-    return Fit(model, car, experiment.method, settings, experiment.training)
+    car, method = experiment.test[0].parameters, experiment.method
+    function = component("method", method).fit
+    return Fit(model, car, method, settings, experiment.training, function)
 
 
 def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
@@ -205,46 +206,35 @@ def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     return _fit(_wanted(model, experiment))
 
 
-def recent_fit(model: Model, experiment: Experiment) -> Fitted:
-    """As `fresh_fit`, but what was lately fitted alike is used again."""
-    method: Method = component("method", experiment.method)
-    try:
-        return _recent_fit(_wanted(model, experiment), method.fit)
-    except _FitError as bug:
-        return Fitted(bug.args[0])
-
-
-@lru_cache(maxsize=RECENT)
-def _recent_fit(fit: Fit, _: Callable) -> Fitted:
-    """Found by the method's function too, which may be written anew under the same name."""
-    return Fitted(_unless_bug(_fit(fit)))
-
-
-def _unless_bug(fitted: ReducedModel | Failure) -> ReducedModel | Failure:
-    """A fit to be kept; what is raised is not: a bug may be mended before the next try."""
-    if isinstance(fitted, Failure) and fitted.status == "error":
-        raise _FitError(fitted)
-    return fitted
-
-
 def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
-    """As `fresh_fit`, but what was fitted before is used again, integrated as the settings say."""
-    return _shared_fit(_wanted(model, experiment), experiment.settings)
+    """As `fresh_fit`, but what was fitted before is used again."""
+    return _kept(_wanted(model, experiment)).reduced
 
 
-def _shared_fit(fit: Fit, settings: Settings) -> ReducedModel | Failure:
-    online = {name: value for name, value in settings.items() if name in ONLINE}
+# More than the fits of a study of protocols, some of which take a minute.
+@lru_cache(maxsize=128)
+def _kept(fit: Fit) -> Fitted:
+    """A fit; one that differs from another in its integration alone shares what that has fitted."""
+    settings = json.loads(fit.settings)
     defaults = default_settings(fit.model, fit.method)
-    common = settings | {name: defaults[name] for name in online}
-    try:
-        fitted: Any = _kept_fit(fit._replace(settings=_text(common)))
-        if isinstance(fitted, Failure) or not online:
-            return fitted
-        if not all(hasattr(fitted, name) for name in online):
-            return _kept_fit(fit)
-    except _FitError as bug:
-        return bug.args[0]
-    return replace(fitted, **online)
+    online = {name: value for name, value in settings.items() if name in ONLINE}
+    common = _text(settings | {name: defaults[name] for name in online})
+    if common != fit.settings:
+        found: Any = _kept(fit._replace(settings=common)).reduced
+        if isinstance(found, Failure):
+            return Fitted(found)
+        if all(hasattr(found, name) for name in online):
+            return Fitted(replace(found, **online))
+
+    def other(name: str, given: Any) -> ReducedModel:
+        content, function = _text(given.model_dump()), component("method", name).fit
+        shared = _kept(fit._replace(method=name, settings=content, function=function)).reduced
+        if isinstance(shared, Failure):
+            # Fitted again it fails as it does alone.
+            return fitted(component("method", name), *_given(fit), given)
+        return shared
+
+    return Fitted(_fit(fit, other))
 
 
 def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
@@ -261,24 +251,6 @@ def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
 def _given(fit: Fit) -> tuple[Model, list[TrainingRun]]:
     """The model that a method is fitted to, and what it learns from."""
     return with_parameters(fit.model, fit.car), [training_run(fit.model, s) for s in fit.training]
-
-
-# More than the fits of a study of protocols, some of which take a minute.
-@lru_cache(maxsize=128)
-def _kept_fit(fit: Fit) -> ReducedModel | Failure:
-    def other(name: str, given: Any) -> ReducedModel:
-        settings = given.model_dump()
-        found = _shared_fit(fit._replace(method=name, settings=_text(settings)), settings)
-        if isinstance(found, Failure):
-            # Fitted again it fails as it does alone.
-            return fitted(component("method", name), *_given(fit), given)
-        return found
-
-    return _unless_bug(_fit(fit, other))
-
-
-class _FitError(Exception):
-    """Carries the failure of a fit that is not kept."""
 
 
 def _text(content: Mapping[str, object]) -> str:
