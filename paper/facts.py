@@ -123,7 +123,7 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     if kind == "predictive":
         rows = predictive_comparison(folder, jobs)
         rows = rows[rows["kind"] == "method"].dropna(axis=1, how="all")
-        return rows.set_index(["model", "method"]).to_xarray()
+        return rows.set_index(["model", "label"]).to_xarray()
     return run_studies(source, folder, jobs)[source]
 
 

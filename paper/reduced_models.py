@@ -51,8 +51,8 @@ def chosen(name: str, results: Path) -> Choice:
     """What validation has chosen in a model's protocol."""
     protocol = load_protocol(name)
     dataset = run_protocol(protocol, results)
-    row = dataset.isel(row=int(dataset["winner"].values.argmax()))
-    training = next(c.training for c in protocol.contestants if c.label == row["row"].item())
+    row = dataset.isel(label=int(dataset["winner"].values.argmax()))
+    training = next(c.training for c in protocol.contestants if c.label == row["label"].item())
     method, settings = str(row["method"].item()), json.loads(str(row["settings"].item()))
     return Choice(protocol, method, settings, training)
 

@@ -84,11 +84,11 @@ def test_a_study_is_compared_by_method_start_and_output(place, said):
     assert status == 0
     assert "start dropped: tire force, N" in text
     status, text = said("compare", place / "mine.toml", "--json")
-    rows = {(r["method"], r["start"], r["output"]): r for r in json.loads(text)}
+    rows = {(r["label"], r["start"], r["output"]): r for r in json.loads(text)}
     data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
     assert len(rows) == 3 * 2 * data.sizes["output"]
     for (method, start, output), row in rows.items():
-        errors = data["rms_error"].sel({"method": method, "start": start, "output": output})
+        errors = data["rms_error"].sel({"label": method, "start": start, "output": output})
         # What a method doesn't have makes no further runs.
         assert row["runs"] == (6 if method == "mine" else 3)
         assert row["failed"] == 0
@@ -104,11 +104,11 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     said("compare", place / "mine.toml")
     data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
     data["status"] = data["status"].astype(object)
-    there = {"method": "mine", "start": "dropped", "frequency_factor": 1.3, "fastest": 20.0}
-    before = {(r["method"], r["start"], r["output"]): r for r in grid_rows(data)}
+    there = {"label": "mine", "start": "dropped", "frequency_factor": 1.3, "fastest": 20.0}
+    before = {(r["label"], r["start"], r["output"]): r for r in grid_rows(data)}
     data["status"].loc[there] = "diverged"
     data["rms_error"].loc[there] = np.inf
-    after = {(r["method"], r["start"], r["output"]): r for r in grid_rows(data)}
+    after = {(r["label"], r["start"], r["output"]): r for r in grid_rows(data)}
     row = after["mine", "dropped", "tire_force"]
     assert (row["failed"], row["failures"], row["runs"]) == (1, "1 diverged", 6)
     assert np.isfinite(row["largest"])
@@ -120,7 +120,7 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     data["remark"] = data["remark"].astype(object)
     data["remark"].loc[there | {"frequency_factor": 1.0}] = "not driven; not to be trusted on Mars"
     data["remark"].loc[there | {"frequency_factor": 0.8}] = "not driven"
-    now = {(r["method"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
+    now = {(r["label"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
     more = {key[:2] for key, count in now.items() if count != before[key]["warned"]}
     assert more == {("mine", "dropped")}
     (table,) = error_tables(data).values()
@@ -137,7 +137,7 @@ def test_a_protocol_is_judged_by_its_own_targets(place, said):
     assert re.search(r"failure rate below +0.01\*? +0.53 +missed", text)
     rows = vm.compare(str(place / "road.toml"), place / "results")
     assert set(rows["study"]) == {"predictive-road"}
-    assert set(rows["method"][rows["kind"] == "target"]) == {"mine"}
+    assert set(rows["label"][rows["kind"] == "target"]) == {"mine"}
 
 
 def test_figures_of_a_study_and_a_protocol(place, capsys):
@@ -166,7 +166,7 @@ def check_texts_of(figure):
 def varied(**dimensions):
     """Errors that a study could have over any dimensions, of two methods."""
     outputs = ["second_euler_angle", "spindle_y"]
-    names = [*dimensions, "method"]
+    names = [*dimensions, "label"]
     sizes = [len(values) for values in dimensions.values()]
     rng = np.random.default_rng(3)
     errors = 10.0 ** rng.uniform(-6.0, -2.0, (*sizes, 2, 2))
@@ -176,7 +176,7 @@ def varied(**dimensions):
         "status": (names, np.full(errors.shape[:-1], "ok", dtype=object)),
     }
     units = {"output_unit": ("output", ["rad", "m"])}
-    coordinates = {**dimensions, "method": ["pod", "my_own_method"], "output": outputs, **units}
+    coordinates = {**dimensions, "label": ["pod", "my_own_method"], "output": outputs, **units}
     attributes = {"title": "what varies", "model": "double_wishbone", "configuration": "{}"}
     return xr.Dataset(variables, coordinates, attributes)
 
@@ -217,7 +217,7 @@ def test_curves_show_every_error_once(place):
     lines = {line.get_label(): line for line in axis.lines if line.get_xdata().size}
     assert set(lines) == {"POD, rank 2", "POD, rank 3", "my own method"}
     for rank_ in (2, 3):
-        place = {"method": "pod", "rank": rank_, "output": "second_euler_angle"}
+        place = {"label": "pod", "rank": rank_, "output": "second_euler_angle"}
         line = lines[f"POD, rank {rank_}"]
         np.testing.assert_array_equal(line.get_ydata(), dataset["rms_error"].sel(place))
         np.testing.assert_allclose(line.get_xdata(), [-20.0, 0.0, 20.0, 40.0], atol=1e-12)

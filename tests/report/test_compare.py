@@ -176,15 +176,15 @@ def test_counts_of_a_vehicle(results_folder, model, reduced, share, yaw):
 def test_errors_of_a_vehicle_by_groups_of_quantities(results_folder):
     table = errors.quantity_table("high_fidelity_vehicle", results_folder)
     assert set(table["group"]) == {"coordinate", "speed", "output", "constraint"}
-    exact = table[table["method"] == "replay"]
+    exact = table[table["label"] == "replay"]
     assert (exact[exact["group"] != "constraint"]["rms"] == 0.0).all()
     # The full model drifts by rounding, a projection leaves the constraints.
     drift = table[(table["group"] == "constraint") & (table["unit"] == "m")]
-    drift = drift.set_index(["method", "start"])["rms"]
+    drift = drift.set_index(["label", "start"])["rms"]
     assert (drift["full_order"] < 1e-9).all()
     assert (drift["pod"] > 1e-6).all()
     # Every unit has its largest error and names whose it is.
-    one = table[(table["method"] == "pod") & (table["start"] == "dropped")]
+    one = table[(table["label"] == "pod") & (table["start"] == "dropped")]
     assert set(one[one["group"] == "speed"]["unit"]) == {"m/s", "rad/s"}
     assert one["quantity"].str.len().min() > 0
 
@@ -231,7 +231,7 @@ def test_map_is_drawn_from_any_grid(tmp_path):
     meshes = [axis.collections[0].get_array() for axis in figure.axes[:2]]
     errors = dataset["rms_error"].sel({"output": "spindle_y"}).squeeze()
     for mesh, method in zip(meshes, ("pod", "replay"), strict=True):
-        expected = errors.sel({"method": method}).transpose("amplitude_factor", "frequency_factor")
+        expected = errors.sel(label=method).transpose("amplitude_factor", "frequency_factor")
         # Colours end at the least error above 0, which replay undercuts at the nominal input.
         shown = np.maximum(expected.values, errors.where(errors > 0.0).min().item())
         np.testing.assert_array_equal(np.asarray(mesh), shown)

@@ -15,7 +15,7 @@ from vehiclemor.report.published import load_published
 
 # Not met by the results as they are.
 MISSED_ANYWAY = {"dw_fig11_shorter_period_reduces_deviation"}
-AT_R3 = {"method": "pod", "rank": 3}
+AT_R3 = {"label": "pod", "rank": 3}
 
 
 def changed(results, study, change):
@@ -48,7 +48,7 @@ def visible(output, rank=3):
     """A largest error that is seen, of one output from the start that is judged."""
 
     def change(dataset):
-        place = {"method": "pod", "rank": rank, "start": "equilibrium", "output": output}
+        place = {"label": "pod", "rank": rank, "start": "equilibrium", "output": output}
         dataset["max_error"].loc[place] = 2.0 * VISIBLE * dataset["signal_range"].loc[place]
 
     return change
@@ -56,7 +56,7 @@ def visible(output, rank=3):
 
 def diverged(rank):
     def change(dataset):
-        place = {"method": "pod", "rank": rank, "start": "equilibrium"}
+        place = {"label": "pod", "rank": rank, "start": "equilibrium"}
         dataset["status"].loc[place] = "diverged"
 
     return change
@@ -64,7 +64,7 @@ def diverged(rank):
 
 def one_rounding(error):
     def change(dataset):
-        place = {"method": "pod_uncut", "rank": 6, "rounding_seed": 7, "output": ANGLE}
+        place = {"label": "pod_uncut", "rank": 6, "rounding_seed": 7, "output": ANGLE}
         dataset["max_error"].loc[place] = error
 
     return change
@@ -87,7 +87,7 @@ def amplitude_worse(dataset):
 
 
 def coarse_subspace(dataset):
-    place = {"method": "pod", "rank": 3, "start": "equilibrium", "output": "pitch"}
+    place = {"label": "pod", "rank": 3, "start": "equilibrium", "output": "pitch"}
     dataset["floor_rms_error"].loc[place] = 2.0 * VISIBLE * dataset["signal_range"].loc[place]
 
 

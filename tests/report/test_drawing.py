@@ -102,8 +102,8 @@ def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(results,
     assert "leaves the axes" not in legend
     assert notes == []
     lines = {line.get_label(): line for line in figure.axes[0].lines}
-    for label in data["method"].values:
-        run = data.sel({"method": label}).squeeze()
+    for label in data["label"].values:
+        run = data.sel(label=label).squeeze()
         run = run.sel(frequency_factor=1.0) if "frequency_factor" in run.dims else run
         status = str(run["status"].item())
         mark = "*" if run["in_training"] else ""

@@ -34,12 +34,12 @@ def grid_of(entry):
     errors = 10.0 ** np.random.default_rng(1).uniform(-3.0, 0.5, shape)
     errors[3, 3] = 4.4e-4
     errors[3, 3, methods.index("replay")] = 0.0
-    dimensions = ("amplitude_factor", "frequency_factor", "method", "output")
+    dimensions = ("amplitude_factor", "frequency_factor", "label", "output")
     units = ["m" if output in ("lateral_position", "spindle_y") else "rad" for output in outputs]
     places = {
         "amplitude_factor": AMPLITUDE,
         "frequency_factor": FREQUENCY,
-        "method": methods,
+        "label": methods,
         "output": list(outputs),
         "output_unit": ("output", units),
     }
@@ -58,13 +58,13 @@ def protocol_results(small, name):
     rows = [(label, c.method, c.role) for c in protocol.contestants for label in c.row_labels]
     outputs = sorted({*protocol.definition.bounds, *protocol.definition.reported})
     labels, methods, roles = map(list, zip(*rows, strict=True))
-    places = {"row": len(rows), "output": len(outputs)}
+    places = {"label": len(rows), "output": len(outputs)}
     found = small.isel({d: np.arange(n) % small.sizes[d] for d, n in places.items()})
-    found = found.assign_coords(row=labels, output=outputs).copy(deep=True)
+    found = found.assign_coords(label=labels, output=outputs).copy(deep=True)
     by_row = {"method": methods, "role": roles, "settings": ["{}"] * len(rows)}
     by_row["contestant"] = [label.rsplit(" ", 1)[0] for label in labels]
     by_row["winner"] = np.arange(len(rows)) == roles.index("contender")
-    found = found.assign({name: ("row", values) for name, values in by_row.items()})
+    found = found.assign({name: ("label", values) for name, values in by_row.items()})
     rng = np.random.default_rng(2)
     for variable in ("rms_error", "max_error"):
         found[variable][:] = 10.0 ** rng.uniform(-6.0, 1.0, found[variable].shape)
@@ -82,7 +82,7 @@ def unseen(results):
     runs = results["figures-2-4"].sel(start="equilibrium").isel(amplitude_factor=0, drop=True)
     parts = [runs.assign_coords(amplitude_factor=factor) for factor in (-1.2, 0.5, 0.0)]
     dataset = xr.concat(parts, "amplitude_factor", coords="different", compat="equals")
-    manifold = dataset.sel({"method": ["pod_state"]}).assign_coords(method=["slow_manifold"])
+    manifold = dataset.sel(label=["pod_state"]).assign_coords(label=["slow_manifold"])
     return {"unseen-inputs": dataset, "unseen-inputs-trained": manifold}
 
 
@@ -149,7 +149,7 @@ def test_wheels_are_round(drawn):
 
 
 def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, results):
-    run = results["figures-2-4"].sel({"method": "pod", "start": "equilibrium", "output": "pitch"})
+    run = results["figures-2-4"].sel({"label": "pod", "start": "equilibrium", "output": "pitch"})
     axis = drawn["4"].axes[0]
     marks = [
         line.get_ydata()[0]
@@ -221,7 +221,7 @@ def test_pareto_figures_are_drawn_where_their_study_is_stored(
         ("figures-2-4", {"start": "dropped"}, "histories"),
         ("figures-2-4", {"start": "dropped"}, "paths"),
         ("figures-2-4", {"start": "dropped"}, "errors"),
-        ("figures-6-7", {"rank": 3, "method": "full_order"}, "histories"),
+        ("figures-6-7", {"rank": 3, "label": "full_order"}, "histories"),
         ("figure-13-frequency", {}, "errors"),
     ],
 )
@@ -234,7 +234,7 @@ def test_pictures_of_results(results, study, place, kind):
 
 
 def test_a_picture_shows_both_runs_and_their_difference(results):
-    run = results["figures-6-7"].sel({"method": "pod", "rank": 3}).squeeze(drop=False)
+    run = results["figures-6-7"].sel({"label": "pod", "rank": 3}).squeeze(drop=False)
     figure = plot_result(run)
     upper, lower = figure.axes[0], figure.axes[2]
     angle = run.sel(output="second_euler_angle")
@@ -262,14 +262,14 @@ def test_what_cannot_be_drawn_is_said(results, study, kind, words):
 
 def test_errors_need_a_method_and_outputs(results):
     study = results["figure-11"].isel(rank=0)
-    alone = study.sel({"method": ["full_order"]})
+    alone = study.sel({"label": ["full_order"]})
     for lacking in (alone, study.isel(output=slice(0)), study.drop_vars("signal_range")):
         with pytest.raises(InputError):
             plot_result(lacking, None, "errors")
 
 
 def test_errors_over_settings_have_whole_ticks_and_a_line_for_each_input(results):
-    study = results["figure-14"].sel({"method": ["pod"]})
+    study = results["figure-14"].sel({"label": ["pod"]})
     assert all(
         tick.is_integer() for tick in plot_result(study, None, "errors").axes[0].get_xticks()
     )

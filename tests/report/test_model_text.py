@@ -17,7 +17,7 @@ def test_perturbed_errors_are_of_their_start_and_failures_are_named(monkeypatch,
             ("perturbed", "pod", "equilibrium", "ok", 5e-6),
             ("perturbed", "path_map", "equilibrium", "unreachable", float("nan")),
         ],
-        columns=["kind", "method", "start", "status", "rms_second_euler_angle"],
+        columns=["kind", "label", "start", "status", "rms_second_euler_angle"],
     ).assign(effective_rank=3, message="", rms_spindle_y=0.0)
     text = model.model_text("double_wishbone", table, tmp_path)
     found = [line.split()[-2:] for line in text.splitlines() if line.split()[1:2] == ["3"]]

@@ -85,16 +85,16 @@ def test_the_file_is_whole_and_loads_nothing(read):
 def test_hostile_titles_are_texts(read):
     assert not list(read.iter("script"))
     assert HOSTILE in texts(read, "h2")
-    assert any(row["method"] == HOSTILE for row in table(read, "cell"))
+    assert any(row["label"] == HOSTILE for row in table(read, "cell"))
 
 
 def test_every_run_is_listed_with_its_error_status_and_cell(made, read):
     dataset = dataset_of(made[0], "hostile")
-    rows = {(row["method"], row["frequency factor"]): row for row in table(read, "cell")}
+    rows = {(row["label"], row["frequency factor"]): row for row in table(read, "cell")}
     assert len(rows) == 6
-    for method in dataset["method"].values:
+    for method in dataset["label"].values:
         for factor in dataset["frequency_factor"].values:
-            run = dataset.sel({"method": method, "frequency_factor": factor}).squeeze()
+            run = dataset.sel({"label": method, "frequency_factor": factor}).squeeze()
             row = rows[str(method), factor]
             for output, unit in (("spindle_y", "m"), ("second_euler_angle", "rad")):
                 words = f"RMS error of {output} ({unit})".replace("_", " ")
@@ -112,8 +112,8 @@ def test_provenance_and_settings_stand_there(made, read):
 
 def test_a_protocol_shows_its_contestants_and_targets(made, read):
     dataset = dataset_of(made[0], "predictive-unseen")
-    expected = {row["method"]: row for row in method_rows(dataset, protocol_of(dataset))}
-    rows = {row["method"]: row for row in table(read, "ratio equal")}
+    expected = {row["label"]: row for row in method_rows(dataset, protocol_of(dataset))}
+    rows = {row["label"]: row for row in table(read, "ratio equal")}
     for name in ("misses", "score", "seconds"):
         assert float(rows["fixed basis"][name]) == expected["fixed basis"][name]
     targets = table(read, "threshold source")
@@ -125,8 +125,8 @@ def test_a_large_grid_is_summed_up(made, monkeypatch):
     monkeypatch.setattr(page, "MOST_ROWS", 5)
     dataset = dataset_of(made[0], "hostile")
     (table,) = page.error_tables(dataset).values()
-    errors = dataset["rms_error"].sel({"method": "pod", "output": "spindle_y"})
-    row = table.set_index("method").loc["pod"]
+    errors = dataset["rms_error"].sel({"label": "pod", "output": "spindle_y"})
+    row = table.set_index("label").loc["pod"]
     found = [row[f"RMS error of spindle_y (m): {w}"] for w in ("count", "min", "median", "max")]
     assert found == [3, errors.min(), errors.median(), errors.max()]
 

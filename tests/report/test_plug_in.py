@@ -42,9 +42,9 @@ def test_costs_have_a_row_for_every_case_and_start(tables):
 
 def test_errors_have_every_method_and_output(tables):
     errors = tables["errors"]
-    assert set(errors["method"]) >= METHODS
-    replayed = errors[(errors["method"] == "replay") & (errors["study"] == f"{CAR}-perturbed")]
-    full = errors[errors["method"] == "full_order"]
+    assert set(errors["label"]) >= METHODS
+    replayed = errors[(errors["label"] == "replay") & (errors["study"] == f"{CAR}-perturbed")]
+    full = errors[errors["label"] == "full_order"]
     for output in tabled_outputs(component("model", CAR)):
         # The reference is more accurate than the integrator that is compared.
         assert 0.0 < full[f"rms_{output}"].max() < 1e-3 * replayed[f"rms_{output}"].max()
@@ -63,7 +63,7 @@ def test_comparison_names_every_method(folder, capsys):
         assert words in printed
     assert main(["compare", CAR, "--json", "--out", str(folder)]) == 0
     rows = json.loads(capsys.readouterr().out)
-    unseen = {row["method"]: row for row in rows if row["kind"] == "method"}
+    unseen = {row["label"]: row for row in rows if row["kind"] == "method"}
     assert {"replay", "pod", "fixed basis", "strongest 2e-3"} <= set(unseen)
     assert unseen["replay"]["score"] > 1.0
     # More accurate with a tighter tolerance, whatever the model.
@@ -88,7 +88,7 @@ def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
     mine = EntryPoint("mine", known["fixed_basis"].value, registry.GROUPS["method"])
     entries = {"method": {**known, "mine": mine}}
     monkeypatch.setattr(registry, "_entries", lambda kind: entries.get(kind) or real(kind))
-    table = study_tables(CAR, [nominal(CAR, tmp_path)], tmp_path).set_index("method")
+    table = study_tables(CAR, [nominal(CAR, tmp_path)], tmp_path).set_index("label")
     for output in tabled_outputs(component("model", CAR)):
         errors = table[f"rms_{output}"]
         assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])

@@ -28,7 +28,7 @@ grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" 
     for mass in (900.0, 1100.0):
         own = {"roll_inertia": 250.0, "sprung_mass": mass, "initial_speed": 25.0}
         alone = vm.simulate(vm.model(CAR, own), "pod", rank=4, start="dropped")
-        here = found.sel({"parameters.sprung_mass": mass, "method": "pod"}).squeeze()
+        here = found.sel({"parameters.sprung_mass": mass, "label": "pod"}).squeeze()
         for name in ("rms_error", "floor_rms_error", "signal_range"):
             np.testing.assert_array_equal(here[name], alone[name])
 

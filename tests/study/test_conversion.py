@@ -31,8 +31,8 @@ def test_a_table_has_a_row_for_each_point(study, tmp_path, to):
     read = {"csv": lambda p: pd.read_csv(p, keep_default_na=False), "parquet": pd.read_parquet}
     table = read[to](path)
     assert len(table) == 8
-    point = {"parameters.tie_rod_inner.z": -0.09, "rank": 3, "method": "pod"}
-    row = table.query("`parameters.tie_rod_inner.z` == -0.09 and rank == 3 and method == 'pod'")
+    point = {"parameters.tie_rod_inner.z": -0.09, "rank": 3, "label": "pod"}
+    row = table.query("`parameters.tie_rod_inner.z` == -0.09 and rank == 3 and label == 'pod'")
     here = found.sel(point).squeeze()
     assert row["status"].item() == "ok"
     assert row["cell_key"].item() == here["cell_key"].item()

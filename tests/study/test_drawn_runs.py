@@ -132,7 +132,7 @@ def test_299_runs_without_a_miss_prove_less_than_1_percent():
 
 def ladder(name, order, scores, factor=1.0):
     return [
-        {"method": f"{name} {s}", "score": s, "seconds": factor * s ** (-1.0 / order)}
+        {"label": f"{name} {s}", "score": s, "seconds": factor * s ** (-1.0 / order)}
         for s in scores
     ]
 
@@ -141,7 +141,7 @@ def ladder(name, order, scores, factor=1.0):
 def test_a_power_law_is_interpolated_exactly(error):
     rows = ladder("a", 3.0, [1.0, 0.1, 0.01])
     # A row that is slower and less accurate than another is no part of the curve.
-    rows.append({"method": "slip", "score": 0.5, "seconds": 50.0})
+    rows.append({"label": "slip", "score": 0.5, "seconds": 50.0})
     found = at_error([rows], error, "seconds")
     np.testing.assert_allclose(found.seconds, error ** (-1.0 / 3.0), rtol=1e-12)
     assert "slip" not in found.rows

@@ -39,7 +39,7 @@ def raised(request, monkeypatch):
 def test_what_a_fit_raises_is_a_result_in_a_grid(raised, tmp_path):
     path = small_study(tmp_path, "", "full_order", "fixed_basis")
     cells = run_studies(str(path), tmp_path)["small"].squeeze()
-    broken, full = cells.sel({"method": "fixed_basis"}), cells.sel({"method": "full_order"})
+    broken, full = cells.sel(label="fixed_basis"), cells.sel(label="full_order")
     status, message = raised
     assert broken["status"].item() == status
     assert message in broken["message"].item()
@@ -51,10 +51,10 @@ def test_what_a_fit_raises_is_a_result_in_a_protocol(raised, tmp_path, protocol_
     path = tmp_path / "mine.toml"
     path.write_text(f'title = "mine"\nprotocols = {json.dumps([str(tmp_path / "small.toml")])}\n')
     rows = run_studies(str(path), tmp_path)["predictive-small"]
-    broken = rows.sel(row="fixed basis")
+    broken = rows.sel(label="fixed basis")
     assert set(broken["status"].values) == {raised[0]}
     assert all(raised[1] in message for message in broken["message"].values)
-    assert set(rows["status"].sel(row="newton 1e-12").values) == {"ok"}
+    assert set(rows["status"].sel(label="newton 1e-12").values) == {"ok"}
 
 
 def test_what_is_wrong_with_a_file_ends_the_study():

@@ -39,7 +39,7 @@ def run(tmp_path):
 
     def statuses(method: str, **options) -> list[str]:
         cells = run_studies(str(path), tmp_path / "out", **options)["small"].squeeze()
-        return list(cells["status"].sel({"method": method}).values)
+        return list(cells["status"].sel(label=method).values)
 
     return statuses
 

@@ -74,14 +74,14 @@ def done(tmp_path_factory, protocol_text):
 
 def test_all_full_order_candidates_are_kept_and_one_of_every_other(done):
     _, _, dataset = done
-    assert list(dataset["row"].values) == ["newton 1e-12", "newton 1e-6", "replay", "fixed basis"]
-    trained = dataset["row"].values == "fixed basis"
+    assert list(dataset["label"].values) == ["newton 1e-12", "newton 1e-6", "replay", "fixed basis"]
+    trained = dataset["label"].values == "fixed basis"
     assert set(dataset["status"].values[~trained].ravel()) == {"ok"}
     # Beyond the inputs of its training it is not silent.
     assert set(dataset["status"].values[trained].ravel()) <= {"ok", "untrusted"}
-    chosen = json.loads(str(dataset["settings"].sel(row="fixed basis").item()))
+    chosen = json.loads(str(dataset["settings"].sel(label="fixed basis").item()))
     assert chosen["rank"] == 4
-    candidates = json.loads(str(dataset["validation"].sel(row="fixed basis").item()))
+    candidates = json.loads(str(dataset["validation"].sel(label="fixed basis").item()))
     assert [c["settings"]["rank"] for c in candidates] == [1, 3, 4]
     assert [c["chosen"] for c in candidates] == [False, False, True]
 
@@ -147,8 +147,8 @@ def no_timing(protocol, rows, *_):
     shape = len(rows), len(protocol.sets["test"])
     return xr.Dataset(
         {
-            **{name: (("row", "scenario"), np.ones(shape)) for name in SECONDS},
-            "offline_seconds": ("row", np.ones(shape[0])),
+            **{name: (("label", "scenario"), np.ones(shape)) for name in SECONDS},
+            "offline_seconds": ("label", np.ones(shape[0])),
         }
     )
 
@@ -190,7 +190,7 @@ def test_the_best_candidate_that_is_stable_everywhere_is_chosen():
 def test_the_comparison_marks_the_winner_and_judges_it(done):
     folder, study, _ = done
     rows = predictive_comparison(folder, study=study)
-    methods = rows[rows["kind"] == "method"].set_index("method")
+    methods = rows[rows["kind"] == "method"].set_index("label")
     assert methods.index[methods["winner"].astype(bool)].tolist() == ["fixed basis"]
     assert np.isnan(methods.loc["replay", "ratio_equal"])
     assert methods.loc["newton 1e-6", "equal_rows"] == "newton 1e-6"
@@ -228,9 +228,9 @@ def test_a_failed_run_is_a_row_with_its_reason(done):
     _, _, dataset = done
     broken = dataset.assign(status=dataset["status"].astype(object).copy())
     first = judged_part(dataset)["scenario"].values[0]
-    broken["status"].loc[{"row": "fixed basis", "scenario": first}] = "diverged"
+    broken["status"].loc[{"label": "fixed basis", "scenario": first}] = "diverged"
     rows = method_rows(broken, protocol_of(dataset))
-    row = next(r for r in rows if r["method"] == "fixed basis")
+    row = next(r for r in rows if r["label"] == "fixed basis")
     assert row["score"] == np.inf
     assert (row["runs"], row["misses"], row["silent"], row["flagged"]) == (5, 1, 0, 1)
     assert row["stable_share"] == 0.8
@@ -242,7 +242,7 @@ def test_a_method_that_refuses_the_model_is_reported(tmp_path, protocol_text):
     refused = '[[contestants]]\nlabel = "mine"\nmethod = "slow_manifold"\n'
     newton = protocol_text[protocol_text.index("[[contestants]]") :].split("\n\n", maxsplit=1)[0]
     dataset = run_studies(study_of(tmp_path, f"{head}{newton}\n\n{refused}"), tmp_path)
-    statuses = dataset["predictive-small0"]["status"].sel(row="mine").values
+    statuses = dataset["predictive-small0"]["status"].sel(label="mine").values
     assert set(statuses) == {"rejected"}
 
 

@@ -127,7 +127,7 @@ def study(tmp_path_factory):
 
 def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys):
     file, folder, dataset = study
-    trained = dataset["in_training"].squeeze(drop=True).sel({"method": "replay"})
+    trained = dataset["in_training"].squeeze(drop=True).sel(label="replay")
     assert trained.to_series().to_dict() == {0.9: False, 1.0: True}
     assert dataset["in_training"].sum() == 1
     text = study_text(study_comparison(str(file), folder))

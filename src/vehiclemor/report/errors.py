@@ -41,7 +41,7 @@ def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 
         if dataset.attrs["model"] == model
     ]
     table = pd.concat(parts, ignore_index=True)
-    first = ["study", "method", "start"]
+    first = ["study", "label", "start"]
     return table.reindex(columns=[*first, *(c for c in table.columns if c not in first)])
 
 
@@ -65,8 +65,8 @@ def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
     study = of_paper(model) or nominal(model, results)
     dataset = next(iter(run_studies(study, results, jobs).values()))
     rows: list[dict[str, object]] = []
-    for label, start in itertools.product(dataset["method"].values, dataset["start"].values):
-        point = dataset.sel({"method": label, "start": start}).squeeze(drop=True)
+    for label, start in itertools.product(dataset["label"].values, dataset["start"].values):
+        point = dataset.sel({"label": label, "start": start}).squeeze(drop=True)
         groups = {
             "coordinate": point["rms_coordinate_error"].to_series(),
             "speed": point["rms_speed_error"].to_series(),
@@ -79,7 +79,7 @@ def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
             groups["constraint"] = (squares.mean("time", skipna=False) ** 0.5).to_series()
             units["constraint"] = units["output"].loc[drifts]
             groups["output"] = groups["output"].drop(drifts)
-        place = {"method": label, "start": start, "status": str(point["status"].item())}
+        place = {"label": label, "start": start, "status": str(point["status"].item())}
         for group, errors in groups.items():
             for unit, part in errors.groupby(units[group].loc[errors.index]):
                 worst = part.idxmax() if part.notna().all() else ""

@@ -43,7 +43,7 @@ COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
 # Columns of tables, as `compare --json` names them.
 VERDICT = "item verdict variant start published bound reproduced unit measure reason"
 TARGET = "item bound measured unit verdict reason threshold_source"
-CONTESTANT = "method role winner misses silent flagged score seconds ratio_equal offline_seconds"
+CONTESTANT = "label role winner misses silent flagged score seconds ratio_equal offline_seconds"
 NOTE = (
     "misses: runs outside of a bound; silent: of these with the status ok; flagged: runs of which "
     "the model says that it has left what it knows; score: largest error over its bound; "
@@ -109,7 +109,7 @@ def write_report(
         made = partial(_paper, folder, jobs)
         sections += attempt_apart("comparison with the paper", left_out, made)
     for name, dataset in found.items():
-        section = _protocol if "row" in dataset.dims else _study
+        section = _protocol if "scenario_set" in dataset.coords else _study
         made = attempt_apart(name, left_out, partial(section, name, dataset, left_out))
         sections += [part._replace(attributes=dataset.attrs) for part in made]
         if not made and not studies:
@@ -204,9 +204,9 @@ def error_tables(dataset: xr.Dataset) -> dict[str, pd.DataFrame]:
     outputs, dims = shown_outputs(dataset), dataset["status"].dims
     heads = {f"rms_{o}": f"RMS error of {o} ({unit_of(dataset, o)})" for o in outputs}
     table = flat(dataset, tuple(outputs)).rename(columns=heads)
-    axes = [str(d) for d in dims if d != "method" and dataset.sizes[d] > 1]
+    axes = [str(d) for d in dims if d != "label" and dataset.sizes[d] > 1]
     if len(table) > MOST_ROWS:
-        by = ["method", *(["start"] if "start" in axes else [])]
+        by = ["label", *(["start"] if "start" in axes else [])]
         good = table[table["status"] == "ok"].groupby(by, sort=False)[[*heads.values()]]
         extremes = good.agg(["count", "min", "median", "max"]).reset_index()
         extremes.columns = [": ".join(filter(None, names)) for names in extremes]
@@ -222,7 +222,7 @@ def error_tables(dataset: xr.Dataset) -> dict[str, pd.DataFrame]:
         table[sampled] = dataset[sampled].sel(sample=table["sample"]).values
         axes.append(sampled)
     counts = [name for name in COUNTS if name in table]
-    shown = table[["method", *dict.fromkeys(axes), *heads.values(), *counts]]
+    shown = table[["label", *dict.fromkeys(axes), *heads.values(), *counts]]
     shown = shown.set_axis([str(key).removeprefix(PARAMETER) for key in shown], axis="columns")
     return {"Every run": shown.assign(status=table["status"] + marks + told, cell=cells)}
 

@@ -62,9 +62,9 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
             raise unknown("dimension of the result", key, grid)
     words = []
     # A grid has methods; what has none, such as a timing, is refused where it is drawn.
-    for dimension in grid if "method" in grid and (chosen or kind != "errors") else ():
+    for dimension in grid if "label" in grid and (chosen or kind != "errors") else ():
         values = dataset[dimension].values.tolist()
-        if dimension == "method" and dimension not in chosen:
+        if dimension == "label" and dimension not in chosen:
             continue
         default = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
         value = chosen.get(dimension, default)

@@ -97,7 +97,7 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
 
 def _methods(grid: Grid) -> dict[str, str]:
     """Key of each cell -> label of its method."""
-    labels = grid.dimensions["method"]
+    labels = grid.dimensions["label"]
     keys = [np.unique(grid.keys[..., place]).astype(str).tolist() for place in range(len(labels))]
     return {key: label for label, own in zip(labels, keys, strict=True) for key in own}
 

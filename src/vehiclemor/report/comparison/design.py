@@ -37,5 +37,5 @@ def design_rows(claim: Claim) -> list[Row]:
                     f"{own['seen']}; {when}",
                     study["threshold"],
                 )
-                rows.append(claim_row(claim, f"{study['study']}: {own['method']}", finding))
+                rows.append(claim_row(claim, f"{study['study']}: {own['label']}", finding))
     return rows

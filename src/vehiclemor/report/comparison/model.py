@@ -69,10 +69,10 @@ def model_text(name: str, rows: pd.DataFrame, folder: Path) -> str:
                 r
                 for r in records
                 if r["kind"] == "perturbed"
-                and (r["method"], r["start"]) == (row["method"], row["start"])
+                and (r["label"], r["start"]) == (row["label"], row["start"])
             ]
             told = notes.marks("" if row["status"] == "ok" else row["message"])
-            cells = [f"{row['method']} {told}".rstrip(), str(int(row["effective_rank"]))]
+            cells = [f"{row['label']} {told}".rstrip(), str(int(row["effective_rank"]))]
             cells += [cell for c in columns for cell in (power(row[c]), _largest(same, c))]
             lines.append(Line(cells, heading=heading))
             heading = ""

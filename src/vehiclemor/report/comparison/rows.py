@@ -128,18 +128,18 @@ def error_rows(number: Number, nominal: xr.Dataset) -> list[Row]:
 
 
 def _error_row(number: Number, nominal: xr.Dataset, label: str, variant: str, start: str) -> Row:
-    point = nominal.sel({"method": label})
+    point = nominal.sel(label=label)
     reproduced, status = float(point["rms_error"]), str(point["status"].item())
     if "iterations" in nominal:
         counts = f"{int(point['iterations'])} iterations"
     else:
-        full = nominal["rhs_calls"].sel({"method": "full_order"})
+        full = nominal["rhs_calls"].sel(label="full_order")
         counts = f"{int(point['rhs_calls'])} evaluations against {int(full)} of the full model"
     failed = "" if status == "ok" else f"{status}: {point['message'].item()}; "
     within = status == "ok" and reproduced <= number.value
     return number_row(number, variant, start, reproduced, within)._replace(
         floor=float(point["floor_rms_error"]),
-        replay=float(nominal["rms_error"].sel({"method": "replay"})),
+        replay=float(nominal["rms_error"].sel(label="replay")),
         measure=NOMINAL_ERROR,
         reason=f"{failed}{PARAMETERS}; {counts}",
     )

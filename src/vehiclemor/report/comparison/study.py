@@ -59,7 +59,7 @@ def study_comparison(
     """
     rows: list[Row] = []
     for dataset in run_studies(study, folder, jobs, seed=seed).values():
-        rows += protocol_rows(dataset) if "row" in dataset.dims else grid_rows(dataset)
+        rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
     return pd.DataFrame(rows)
 
 
@@ -88,9 +88,9 @@ def grid_rows(dataset: xr.Dataset) -> list[Row]:
     small = dataset.assign(told)[kept].load()
     rows: list[Row] = []
     for start in dataset["start"].values:
-        for method in small["method"].values:
-            part = _different(small.sel({"start": start, "method": method}))
-            place = {**head, "start": str(start), "method": str(method)}
+        for method in small["label"].values:
+            part = _different(small.sel(start=start, label=method))
+            place = {**head, "start": str(start), "label": str(method)}
             rows += [place | row for row in _rows_of_method(part, count)]
     return rows
 
@@ -100,7 +100,7 @@ def _grid_words(dataset: xr.Dataset) -> str:
     words = []
     for name in map(str, dataset["status"].dims):
         values = [f"{v:g}" if isinstance(v, float) else str(v) for v in dataset[name].values]
-        if name not in ("method", "start") and (len(values) > 1 or values != ["1"]):
+        if name not in ("label", "start") and (len(values) > 1 or values != ["1"]):
             every = ", ".join(values) if len(values) <= 8 else f"{values[0]} to {values[-1]}"
             words.append(f"{name} {every}" + (f" ({len(values)})" if len(values) > 8 else ""))
     for name, values in dataset.coords.items():
@@ -203,7 +203,7 @@ def _grid_text(rows: list[Row]) -> str:
 
 def _error_cells(row: Row, notes: Footnotes) -> list[str]:
     trained = f"trained on {row['trained']:.0f} of its {row['runs']:.0f} runs"
-    name = f"  {row['method']} {notes.marks(trained if row['trained'] else '')}".rstrip()
+    name = f"  {row['label']} {notes.marks(trained if row['trained'] else '')}".rstrip()
     cells = [name, *(power(row[name]) for name in ("median", "largest", "floor"))]
     lost = f"{row['failed']:.0f} failed" if row["failed"] else ""
     place = row["largest_at"].replace(PARAMETER, "")
@@ -212,6 +212,6 @@ def _error_cells(row: Row, notes: Footnotes) -> list[str]:
 
 
 def _cost_cells(row: Row) -> list[str]:
-    cells = [f"  {row['method']}", f"{row['runs']:.0f}", row["failures"] or "0"]
+    cells = [f"  {row['label']}", f"{row['runs']:.0f}", row["failures"] or "0"]
     cells += [f"{row['warned']:.0f}", fixed(row["evaluations"], 0), fixed(1e6 * row["seconds"], 1)]
     return [*cells, short(row["offline_seconds"]) if row["offline_seconds"] else "-"]

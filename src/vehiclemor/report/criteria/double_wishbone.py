@@ -171,7 +171,7 @@ def six_states_follow(results: Results, label: str) -> Finding:
     """Figure 14: with r = 6 it follows, whichever two of the six directions rounding chooses."""
     if label == "replay":
         return not_visible(at_point(results["figure-14"], label, rank=6), (ANGLE,))
-    spread = results["figure-14-spread"].sel({"method": label, "output": ANGLE})
+    spread = results["figure-14-spread"].sel(label=label, output=ANGLE)
     share = (spread["max_error"] / spread["signal_range"]).squeeze(drop=True)
     six, four = share.sel(rank=6).values, share.sel(rank=4).values
     text = (

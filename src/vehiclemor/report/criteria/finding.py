@@ -56,12 +56,12 @@ class Finding:
 def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
     """One method at one place of the grid."""
     # A dictionary: `method` is also the name of an argument of `sel`.
-    return without_single(dataset.sel({"method": label, **place}))
+    return without_single(dataset.sel(label=label, **place))
 
 
 def without_single(dataset: xr.Dataset) -> xr.Dataset:
     """Without dimensions of the grid that have one value; a model may have a single output."""
-    single = [d for d in dataset["status"].dims if dataset.sizes[d] == 1 and d != "method"]
+    single = [d for d in dataset["status"].dims if dataset.sizes[d] == 1 and d != "label"]
     return dataset.squeeze(single, drop=True)
 
 

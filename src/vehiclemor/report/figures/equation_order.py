@@ -24,9 +24,9 @@ def figure_equation_order(results: Results) -> Figure:
     numbers = rms_numbers(str(dataset.attrs["model"]))
     for panel, (axis, output) in enumerate(zip(axes.flat, OUTPUTS, strict=True)):
         for method in VARIANTS:
-            chosen = dataset["rms_error"].sel({"method": method, "output": output})
+            chosen = dataset["rms_error"].sel(label=method, output=output)
             _draw_sorted(axis, method, chosen.squeeze(drop=True).values)
-        nominal = results["figures-6-7"].sel({"method": "pod", "rank": 3, "output": output})
+        nominal = results["figures-6-7"].sel(label="pod", rank=3, output=output)
         least_squares = float(nominal["rms_error"].squeeze())
         axis.axhline(least_squares, color="#009E73", linestyle="--", label="least squares")
         line: Style = {"color": "black", "linewidth": 0.8, "label": "published"}

@@ -102,7 +102,7 @@ def _draw(
 
 def _errors(dataset: xr.Dataset, method: str, output: str, axes: tuple[str, str]) -> np.ndarray:
     """RMS errors (upwards, across)."""
-    chosen = dataset["rms_error"].sel({"method": method, "output": output})
+    chosen = dataset["rms_error"].sel(label=method, output=output)
     return chosen.squeeze(drop=True).transpose(*reversed(axes)).values
 
 

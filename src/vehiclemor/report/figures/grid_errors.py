@@ -58,9 +58,9 @@ def figure_grid_errors(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure | 
     bands from the smallest to the largest error.
     """
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-    methods = [str(m) for m in dataset["method"].values]
+    methods = [str(m) for m in dataset["label"].values]
     methods = [m for m in methods if not m.startswith("full_order")] or methods
-    sizes = {str(d): dataset.sizes[d] for d in dataset["status"].dims if d != "method"}
+    sizes = {str(d): dataset.sizes[d] for d in dataset["status"].dims if d != "label"}
     sizes = {name: size for name, size in sizes.items() if size > 1}
     if not sizes:
         return None
@@ -70,7 +70,7 @@ def figure_grid_errors(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure | 
     others = [d for d in sizes if d not in (axis, starts)]
     if set(FACTORS) <= set(numbers):
         return _map(dataset, errors, (outputs, methods), FACTORS)
-    found = {m: errors.sel({"method": m}, drop=True) for m in methods}
+    found = {m: errors.sel(label=m, drop=True) for m in methods}
     # Name of a line -> its text, its errors.
     lines = {k: line for m in methods for k, line in _lines(m, found[m], others).items()}
     if len(lines) > max(LINES, len(methods)):
@@ -206,7 +206,7 @@ def _map(
 ) -> Figure:
     """Errors over two axes, the largest over all others."""
     outputs, methods = shown
-    rest = [str(d) for d in errors.dims if d not in (*axes, "output", "method")]
+    rest = [str(d) for d in errors.dims if d not in (*axes, "output", "label")]
     largest = dataset.assign(rms_error=errors.max(rest))
     texts = {m: method_text(m) for m in methods}
     written = math.prod(dataset.sizes[d] for d in axes) <= WRITTEN

@@ -102,7 +102,7 @@ def figure_histories(
 
 def _panel(dataset: xr.Dataset, methods: Mapping[str, str], start: str, output: str) -> Panel:
     """One output from one start, in the unit that suits all starts."""
-    known = [method for method in methods if method in dataset["method"].values]
+    known = [method for method in methods if method in dataset["label"].values]
     runs = dataset.sel(start=start) if "start" in dataset.dims else dataset
     shown = styles(known)
     points = {m: at_point(runs, m) for m in known}

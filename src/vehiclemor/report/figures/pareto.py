@@ -79,7 +79,7 @@ def _draw_reduced(axis: Axes, row: Row, look: tuple[str, str], top: float) -> No
     failed = not np.isfinite(row["score"])
     if not np.isfinite(row["seconds"]):
         return
-    words = f"{row['method']}{' (fails)' if failed else ''}{' (chosen)' if winner else ''}"
+    words = f"{row['label']}{' (fails)' if failed else ''}{' (chosen)' if winner else ''}"
     place = row["seconds"] * 1e6, top / 1.5 if failed else row["score"]
     # Hollow, so that one shows through the other; bars: between the quartiles of the rounds.
     axis.errorbar(

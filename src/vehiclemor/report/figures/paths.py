@@ -58,11 +58,11 @@ def figure_replayed_paths(
     figure, axes = panels(2 if beside_replay else 1, 1, size, sharex=True)
     upper, lower = axes[0, 0], axes[-1, 0]
     runs = dataset["outputs"].sel(start="equilibrium", output=output).squeeze(drop=True)
-    replay = runs.sel({"method": "replay"})
+    replay = runs.sel(label="replay")
     # Wide dots above the lines that coincide with it.
     looks = styles(methods) | {"replay": REPLAY | {"linewidth": 3.0, "zorder": 3.0}}
     for method, text in methods.items():
-        run = runs.sel({"method": method})
+        run = runs.sel(label=method)
         upper.plot(run.time, run, label=text, **looks[method])
         if beside_replay and method not in ("full_order", "replay"):
             lower.plot(run.time, 1e3 * (run - replay), label=text, **looks[method])

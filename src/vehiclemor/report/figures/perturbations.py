@@ -48,13 +48,13 @@ def _draw_curves(axis: Axes, chosen: xr.Dataset, methods: Mapping[str, str], fac
     where.tick(axis.xaxis)
     places = where.at
     for method, style in styles(methods).items():
-        errors = chosen["rms_error"].sel({"method": method}).squeeze(drop=True).values
+        errors = chosen["rms_error"].sel(label=method).squeeze(drop=True).values
         shown = np.where(errors > 0.0, errors, np.nan)
         marked = {"label": methods[method], "marker": MARKERS.get(method, "^")}
         axis.semilogy(places, shown, markersize=3, **marked, **style)
         draw_edges(axis, places, errors[:, None], style["color"])
     if "pod" in methods:
-        floor = chosen["floor_rms_error"].sel({"method": "pod"}).squeeze(drop=True).values
+        floor = chosen["floor_rms_error"].sel(label="pod").squeeze(drop=True).values
         if np.isfinite(floor).any():
             axis.semilogy(places, floor, label="best approximation, control periods", **FLOOR)
     scale_errors(axis)

@@ -77,7 +77,7 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
 
 
 def _drawn(dataset: xr.Dataset, kind: str) -> Figure:
-    if not dataset.sizes.get("output") or "row" in dataset.dims:
+    if not dataset.sizes.get("output") or "scenario_set" in dataset.coords:
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     figure = DRAWINGS[kind](dataset)
     figure.suptitle(figure.get_suptitle() or _title(dataset), fontsize="medium", wrap=True)
@@ -131,9 +131,9 @@ def shown_outputs(dataset: xr.Dataset) -> list[str]:
 
 def _points(dataset: xr.Dataset) -> dict[str, xr.Dataset]:
     """Label of each method -> its run or errors."""
-    if "method" in dataset.dims:
-        return {str(label): at_point(dataset, label) for label in dataset["method"].values}
-    given = dataset.coords.get("method")
+    if "label" in dataset.dims:
+        return {str(label): at_point(dataset, label) for label in dataset["label"].values}
+    given = dataset.coords.get("label")
     label = _configuration(dataset).get("method", "run") if given is None else given.item()
     return {str(label): without_single(dataset)}
 
@@ -226,7 +226,7 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
     """RMS errors: over the grid where there is one, else of all outputs of one point."""
     if not {"rms_error", "signal_range"} <= set(dataset):
         raise InputError("no errors in this result: it was not compared with full order")
-    if "method" not in dataset.dims:
+    if "label" not in dataset.dims:
         (label,) = _points(dataset)
         dataset = dataset.expand_dims(method=[label])
     if sample_axis(dataset):

@@ -30,11 +30,11 @@ def figure_samples(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure:
     """RMS errors of all samples: over what was sampled, or beside each other for each method."""
     sample = sample_axis(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-    rest = [str(d) for d in errors.dims if d not in (sample, "method", "output")]
+    rest = [str(d) for d in errors.dims if d not in (sample, "label", "output")]
     errors = errors.max(rest)
-    methods = [str(m) for m in dataset["method"].values if not str(m).startswith("full_order")]
-    methods = methods or [str(m) for m in dataset["method"].values]
-    sampled = _sampled(dataset, sample, errors.sel({"method": methods}))
+    methods = [str(m) for m in dataset["label"].values if not str(m).startswith("full_order")]
+    methods = methods or [str(m) for m in dataset["label"].values]
+    sampled = _sampled(dataset, sample, errors.sel(label=methods))
     columns = sampled or [""]
     height = 2.4 * len(outputs) + 0.9
     size = (max(5.0, 1.2 + 2.4 * len(columns)), height)
@@ -44,7 +44,7 @@ def figure_samples(dataset: xr.Dataset, outputs: Sequence[str]) -> Figure:
         for column, name in enumerate(columns):
             panel = grid[row, column]
             for number, method in enumerate(methods):
-                values = errors.sel({"method": method, "output": output}).values
+                values = errors.sel(label=method, output=output).values
                 order = (0.5 + np.arange(values.size) * 0.6180339887) % 1.0
                 places = number + 0.6 * (order - 0.5)
                 places = places_of(dataset, name).at if name else places

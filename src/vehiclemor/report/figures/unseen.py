@@ -51,7 +51,7 @@ def figure_unseen(
 
 
 def _point(results: Results, method: str, amplitude: float) -> xr.Dataset:
-    dataset = next(d for d in results.values() if method in d["method"].values)
+    dataset = next(d for d in results.values() if method in d["label"].values)
     return at_point(dataset, method, amplitude_factor=amplitude)
 
 

@@ -53,11 +53,11 @@ def _on(curve: Sequence[Row], error: float, clock: str) -> Equal:
     if not curve or not error >= curve[-1]["score"] * (CONTINUED if len(curve) > 1 else 1.0):
         return Equal(math.nan)
     if error >= curve[0]["score"]:
-        return Equal(curve[0][clock], (curve[0]["method"],))
+        return Equal(curve[0][clock], (curve[0]["label"],))
     further = (pair for pair in pairwise(curve) if error >= pair[1]["score"])
     loose, tight = next(further, (curve[-2], curve[-1]))
     if tight["score"] <= 0.0:
-        return Equal(tight[clock], (tight["method"],))
+        return Equal(tight[clock], (tight["label"],))
     part = math.log(error / loose["score"]) / math.log(tight["score"] / loose["score"])
     seconds = loose[clock] * (tight[clock] / loose[clock]) ** part
-    return Equal(seconds, (loose["method"], tight["method"]))
+    return Equal(seconds, (loose["label"], tight["label"]))

@@ -76,7 +76,7 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     are earned against the first of them.
     """
     part = judged_part(dataset)
-    rows = [_method_row(dataset, part, str(label), protocol) for label in part["row"].values]
+    rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
     full = [row for row in rows if row["role"] == FULL_ORDER and math.isfinite(row["score"])]
     ladders = [
         [row for row in full if row["contestant"] == name]
@@ -88,10 +88,10 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
 
 
 def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: ProtocolFile) -> Row:
-    part, bounds = judged.sel(row=label), protocol.bounds
+    part, bounds = judged.sel(label=label), protocol.bounds
     found = outcomes(part, bounds)
     beyond = np.isin(dataset["scenario_set"].values, OUTSIDE)
-    outside = outcomes(dataset.isel(scenario=beyond).sel(row=label), bounds)
+    outside = outcomes(dataset.isel(scenario=beyond).sel(label=label), bounds)
     # What has come to its end, trusted or not, is timed.
     ok = np.isfinite(found.scores)
     runs, misses = part.sizes["scenario"], int(found.missed.sum())
@@ -100,10 +100,10 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
     row: Row = {
         "kind": "method",
         "model": protocol.model,
-        "method": label,
+        "label": label,
         "contestant": str(part["contestant"].item()),
         "role": str(part["role"].item()),
-        "component": str(part["method"].item()),
+        "method": str(part["method"].item()),
         "rank": int(part["effective_rank"]),
         "settings": str(part["settings"].item()),
         "bounds": json.dumps({o: (b.bound, b.reason) for o, b in bounds.items()}),
@@ -187,7 +187,7 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
         "equal_rows": ", ".join(equal["seconds"].rows),
         "ratio_equal": ratios["seconds"],
         "ratio_equal_loop": ratios.get("loop_seconds", math.nan),
-        "within": best["method"] if best else "",
+        "within": best["label"] if best else "",
         "ratio_within": ratio(best, row),
         "break_even": row["offline_seconds"] / saved if saved > 0.0 else math.inf,
     }

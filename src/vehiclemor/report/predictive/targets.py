@@ -56,7 +56,7 @@ def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row])
     if protocol.straight is not None:
         rows.append(_straight_row(dataset, protocol.straight, winner))
     rows += [_ratio_row(target, winner, methods) for target in protocol.targets]
-    name = {"kind": "target", "model": protocol.model, "method": winner["method"]}
+    name = {"kind": "target", "model": protocol.model, "label": winner["label"]}
     return [name | {"id": row["item"].replace(" ", "_")} | row for row in rows]
 
 
@@ -73,7 +73,7 @@ def _at_most(item: str, bound: float, measured: float, reason: str, unit: str = 
 def _straight_row(dataset: xr.Dataset, straight: Straight, winner: Row) -> Row:
     """Largest value of an output in the scenarios without steering."""
     here = [str(s).startswith(f"{straight.maneuver},") for s in dataset["scenario"].values]
-    part = dataset.isel(scenario=here).sel(row=winner["method"], output=straight.output)
+    part = dataset.isel(scenario=here).sel(label=winner["label"], output=straight.output)
     measured = float(part["largest_output"].max(skipna=False)) if any(here) else math.nan
     reason = f"first 10 s of {straight.maneuver}, {sum(here)} runs"
     item = f"largest {straight.output} without steering"
@@ -88,13 +88,13 @@ def _ratio_row(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:
     else:
         name = winner["within"] if target.against == "within bounds" else target.against
         names, beside = [name], ""
-        factor = ratio(next((row for row in methods if row["method"] == name), None), winner)
+        factor = ratio(next((row for row in methods if row["label"] == name), None), winner)
     found = " and ".join(filter(None, names))
     reason = f"against {found}" if found else "no full-order row is as accurate"
     reason += beside + (f"; the aim is {target.aim:g}" if target.aim else "")
     row = _at_least(f"speed-up, {target.against}", target.ratio, factor, reason)
-    timed = [r for r in methods if r["method"] in {winner["method"], *names}]
-    scattered = scatter({r["method"]: r["spread"] for r in timed})
+    timed = [r for r in methods if r["label"] in {winner["label"], *names}]
+    scattered = scatter({r["label"]: r["spread"] for r in timed})
     if scattered:
         row |= {"verdict": NOT_COMPARABLE, "reason": f"{scattered}; {reason}"}
     return row

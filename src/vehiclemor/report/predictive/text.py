@@ -91,7 +91,7 @@ def _error_table(winner: Row, notes: Footnotes) -> str:
         values = (winner[column], winner[column.replace("worst_", "most_", 1)])
         name = f"  {label_of(output).short}{' max' if kind == 'max' else ''} {notes.marks(reason)}"
         lines.append(Line([name, *map(short, (bound, *values))]))
-    heading = f"  errors of {winner['method']}"
+    heading = f"  errors of {winner['label']}"
     return table_text([heading, "bound", "worst", "99 %"], lines)
 
 
@@ -105,12 +105,12 @@ def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:
     shown = [row for row in reduced if row["winner"] or row["misses"] <= HOPELESS * row["runs"]]
     lost = [row for row in reduced if row not in shown]
     heads = ["", "miss", "sil.", "flag", "valid.", "score", "us", "loop", "x", "xl", "off."]
-    full = [row for row in rows if row["role"] == FULL_ORDER and row["method"] in against]
+    full = [row for row in rows if row["role"] == FULL_ORDER and row["label"] in against]
     table = table_text(heads, [Line(_costs(row, notes)) for row in (*full, *shown)])
     if not lost:
         return table
     words = ", ".join(
-        f"{row['method']} {row['misses']:.0f} ({short(row['score'])})" for row in lost
+        f"{row['label']} {row['misses']:.0f} ({short(row['score'])})" for row in lost
     )
     return f"{table}\n{wrapped(f'Miss more (worst score): {words}.', 2, 4)}"
 
@@ -118,7 +118,7 @@ def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:
 def _costs(row: Row, notes: Footnotes) -> list[str]:
     share = f"{100 * row['stable_share']:.0f} % of the runs come to their end: "
     told = notes.marks(share + row["failure"] if row["failure"] else "")
-    cells = [f"{'*' if row['winner'] else ' '} {row['method']} {told}".rstrip()]
+    cells = [f"{'*' if row['winner'] else ' '} {row['label']} {told}".rstrip()]
     cells += [f"{row[name]:.0f}" for name in ("misses", "silent", "flagged")]
     cells += [short(row["validation_score"]), short(row["score"])]
     cells += [fixed(1e6 * row.get(clock, math.nan), 0) for clock in ("seconds", "loop_seconds")]

@@ -46,7 +46,7 @@ class Grid:
     model
         With the study's own parameters.
     dimensions
-        Name -> values of every grid dimension, the labels of `method` last.
+        Name -> values of every grid dimension, `label` of the methods last.
     samples
         Name of what is sampled -> values on the dimension `sample`.
     """
@@ -61,11 +61,6 @@ class Grid:
     def sizes(self) -> Place:
         """Number of values of every dimension."""
         return tuple(len(entry) for entry in self.dimensions.values())
-
-    @property
-    def cells(self) -> Cells:
-        """Place -> experiment, made when it is asked for."""
-        return Cells(self)
 
     @cached_property
     def unique(self) -> UniqueCells:
@@ -85,7 +80,7 @@ class Grid:
     def cell(self, place: Place) -> Experiment:
         """The experiment at a place."""
         point = self.point(place)
-        study, label = self.definition, point["method"]
+        study, label = self.definition, point["label"]
         entry, names = study.labelled[label], self._settings[label]
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
         settings = _complete(self.model, entry.method, tuple(given.items()), entry.preset)
@@ -101,7 +96,7 @@ class Grid:
         """Raise `VehiclemorError` if a run can't be made, or no settings of a method fit."""
         names = {name for found in self._settings.values() for name in found}
         runs = [
-            range(1 if name in names or name == "method" else size)
+            range(1 if name in names or name == "label" else size)
             for name, size in zip(self.dimensions, self.sizes, strict=True)
         ]
         for place in itertools.product(*runs):
@@ -138,7 +133,7 @@ class Grid:
 
     def _own_places(self, method: int) -> list[range]:
         """Indices of every dimension at which the experiments of a method differ."""
-        own = self._settings[self.dimensions["method"][method]]
+        own = self._settings[self.dimensions["label"][method]]
         others = set().union(*self._settings.values()) - own
         sizes = [1 if d in others else len(found) for d, found in self.dimensions.items()]
         return [*map(range, sizes[:-1]), range(method, method + 1)]
@@ -159,22 +154,6 @@ class Grid:
             first = first or found
         if first is not None:
             raise InputError(first.message)
-
-
-class Cells(Mapping[Place, Experiment]):
-    """Experiments of a grid by their places."""
-
-    def __init__(self, grid: Grid) -> None:
-        self._grid = grid
-
-    def __getitem__(self, place: Place) -> Experiment:
-        return self._grid.cell(place)
-
-    def __iter__(self) -> Iterator[Place]:
-        return itertools.product(*map(range, self._grid.sizes))
-
-    def __len__(self) -> int:
-        return self._grid.keys.size
 
 
 class UniqueCells(Mapping[str, Experiment]):
@@ -243,7 +222,7 @@ def _dimensions(
     dimensions.setdefault("start", list(study.start or [model.starts[0]]))
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
-    dimensions["method"] = list(study.labelled)
+    dimensions["label"] = list(study.labelled)
     return dimensions
 
 

@@ -79,6 +79,7 @@ def _coordinates(grid: Grid) -> dict[str, Any]:
     """Values of the dimensions, and of what is sampled; with meanings."""
     found = {name: (name, values) for name, values in grid.dimensions.items()}
     found |= {name: ("sample", values) for name, values in grid.samples.items()}
+    found["method"] = "label", [entry.method for entry in grid.definition.methods]
     return {
         name: (dimension, values, described(grid.model, name))
         for name, (dimension, values) in found.items()

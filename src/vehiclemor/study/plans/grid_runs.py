@@ -54,7 +54,7 @@ def scenarios(model: Model, run: Run) -> tuple[tuple[Scenario, ...], Scenario]:
 
 def run_at(study: StudyFile, point: Mapping[str, Any]) -> Run:
     """The run at a point: name of a dimension, and `maneuver` -> value."""
-    entry = study.labelled[point["method"]]
+    entry = study.labelled[point["label"]]
     car = {
         name.removeprefix(PARAMETER): value
         for name, value in point.items()

@@ -24,7 +24,7 @@ def protocol_dataset(
     found: dict[str, list[xr.Dataset]],
     measured: tuple[xr.Dataset, dict[str, list[str]]],
 ) -> xr.Dataset:
-    """Results of all rows on the dimensions `row`, `scenario` and `output`.
+    """Results of all rows on the dimensions `label`, `scenario` and `output`.
 
     `scenario_set` tells which set a scenario is of, `apart` why a drawn one is not judged;
     `validation` of a row is the JSON list of its candidates' settings and validation results.
@@ -41,7 +41,7 @@ def protocol_dataset(
 
     labels = [row.label for row in rows]
     parts = [
-        xr.concat(datasets, dim="row", combine_attrs="drop").assign_coords(
+        xr.concat(datasets, dim="label", combine_attrs="drop").assign_coords(
             scenario_set=("scenario", [purpose] * datasets[0].sizes["scenario"]),
             apart=("scenario", apart.get(purpose, [""] * datasets[0].sizes["scenario"])),
         )
@@ -53,7 +53,7 @@ def protocol_dataset(
     dataset = xr.concat(rest, dim="scenario", combine_attrs="drop").merge(parts[0][fixed])
     # How the files store text holds for their own longest words only.
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
-    dataset = dataset.assign_coords(row=labels)
+    dataset = dataset.assign_coords(label=labels)
     per_row: dict[str, list[Any]] = {
         "role": [row.contestant.role for row in rows],
         "contestant": [row.contestant.label for row in rows],
@@ -68,13 +68,13 @@ def protocol_dataset(
         "validation_score": [row.validation[row.candidate].score for row in rows],
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
-    dataset = dataset.assign(variables(per_row, "row"))
+    dataset = dataset.assign(variables(per_row, "label"))
     judged = dataset["scenario_set"].values == judged_set(found)
     places = np.flatnonzero(judged)[: timed.sizes["scenario"]]
     for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
         online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
         online[:, places] = timed[name].values
-        dataset[name] = (("row", "scenario"), online, dict(timed[name].attrs))
+        dataset[name] = (("label", "scenario"), online, dict(timed[name].attrs))
     return dataset.assign_attrs(
         attributes(
             protocol.definition.title,

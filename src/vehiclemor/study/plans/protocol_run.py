@@ -46,7 +46,7 @@ def run_protocol(
     Returns
     -------
     xarray.Dataset
-        On the dimensions `row`, `scenario` and `output`, stored as
+        On the dimensions `label`, `scenario` and `output`, stored as
         `studies/predictive-<protocol>.nc` too.
     """
     workers = Workers(protocol.study, folder, jobs, elsewhere)
