@@ -410,11 +410,12 @@ def test_sizes_that_dont_fit_are_refused(file, word, change, contents, tmp_path)
 
 # Texts of one feature.
 TEXTS = [
-    *(HARM, "_x[99999]", "p[99999]", "p[-1]", "p[True]", "p[p[0]]", "p[0:1]", "z9", "u9", "term"),
+    *(HARM, "_x[0]", "p[99999]", "p[-1]", "p[False]", "p[p[0]]", "p[0:1]", "z9", "u9", "term"),
     *("z0\n    _result[99999] = z0", "z0; _result[0] = z0", "z0 # )", "z0, z1", "z0,)) or ((z0"),
     *("z1 = z0", "(z0 := 1.0)", "*z0", "lambda: z0", "f'{z0}'", "z0.real", "z0 < z1", "z0 % 2.0"),
-    *("1.0 if 0.0 < z0 < 1.0 else 0.0", "1", "1j", "\uff5a0", "math.system(z0)", "math.sin(x=z0)"),
-    *("math.sin(z0, z0)", "execute(p[0], p[0], p[0], p[0])", "", 3),
+    *("1.0 if 0.0 < z0 < 1.0 else 0.0", "1.0 if z0 in z0 else 0.0", "math.system(z0)"),
+    *("1", "1j", "\uff5a0", "math.sin(z0, x=z0)"),
+    *("math.sin(z0, z0)", "execute(p[0], p[0], p[0], p[0])", "", 3, "z0 \\\n + z0", "not z0"),
     *("-" * 60_000 + "u0", "z0 + " * 145 + "z0"),
 ]
 
