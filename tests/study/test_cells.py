@@ -72,7 +72,7 @@ def test_another_geometry_gives_another_key_and_result(cell):
 def test_a_method_that_a_setting_does_not_concern_is_computed_once():
     grid = expand("figures-6-7", load_studies("figures-6-7")["figures-6-7"])
     labels = grid.dimensions["label"]
-    assert len(grid.cells) == 2 * len(labels)
+    assert grid.keys.size == 2 * len(labels)
     shared = {"full_order", "full_order_strongest", "replay"}
     assert len(grid.unique) == len(shared) + 2 * (len(labels) - len(shared))
 

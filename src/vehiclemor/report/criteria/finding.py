@@ -56,7 +56,7 @@ class Finding:
 def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
     """One method at one place of the grid."""
     # A dictionary: `method` is also the name of an argument of `sel`.
-    return without_single(dataset.sel(label=label, **place))
+    return without_single(dataset.sel({"label": label, **place}))
 
 
 def without_single(dataset: xr.Dataset) -> xr.Dataset:

@@ -38,7 +38,7 @@ def figure_pareto(results: Results, *, titled: bool = False) -> Figure:
     _draw_full_order(axis, [row for row in rows if row["role"] == FULL_ORDER])
     styles = zip(cycle(COLORS), cycle(MARKERS), strict=False)
     for row in rows:
-        if row["component"] == "replay":
+        if row["method"] == "replay":
             axis.axhline(row["score"], color="#666666", linestyle=":", label="replay (no time)")
         elif row["role"] != FULL_ORDER:
             _draw_reduced(axis, row, next(styles), top)

@@ -180,7 +180,7 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
     best = min(within, key=lambda other: other["seconds"], default=None)
     equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS if clock in row}
     # A recording that is played again is no solution of anything.
-    solves = row["component"] != "replay"
+    solves = row["method"] != "replay"
     ratios = {c: e.seconds / row[c] if solves and row[c] else math.nan for c, e in equal.items()}
     saved = equal["seconds"].seconds - row["seconds"]
     return {
