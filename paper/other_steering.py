@@ -20,7 +20,7 @@ from vehiclemor.errors import VehiclemorError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.study.evaluate import kept_fit, model_of
-from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol import load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, start_of
 
 # Largest nominal steering of the lane change, and the contestant with its chosen candidate.
@@ -96,7 +96,7 @@ def maneuver(model: Any, name: str, duration: float, signal: Signal) -> Maneuver
 
 def main(name: str, count: int, seed: int) -> None:
     """Draw, run, and print how many runs of each kind miss, are silent, and are flagged."""
-    protocol, (amplitude, label, candidate) = load_protocol(name), VEHICLES[name]
+    protocol, (amplitude, label, candidate) = load_protocol(protocol_names()[name]), VEHICLES[name]
     contestant = next(c for c in protocol.contestants if c.label == label)
     experiment = contestant.experiment(protocol.model, candidate, protocol.sets["validation"])
     model, bounds = cast("Any", model_of(experiment)), protocol.definition.bounds

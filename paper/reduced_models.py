@@ -24,9 +24,9 @@ from vehiclemor.files import make_folder
 from vehiclemor.online.model_file import content
 from vehiclemor.online.rom import ReducedOrderModel, reduce
 from vehiclemor.online.saved import load, shipped_folder
-from vehiclemor.resources import checkout_data, data_names
+from vehiclemor.resources import checkout_data
 from vehiclemor.study.method_settings import Settings
-from vehiclemor.study.plans.protocol import Protocol, load_protocol
+from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.scenario import Scenario, parameters_of, start_of
@@ -49,7 +49,7 @@ class Choice(NamedTuple):
 
 def chosen(name: str, results: Path) -> Choice:
     """What validation has chosen in a model's protocol."""
-    protocol = load_protocol(name)
+    protocol = load_protocol(protocol_names()[name])
     dataset = run_protocol(protocol, results)
     row = dataset.isel(label=int(dataset["winner"].values.argmax()))
     training = next(c.training for c in protocol.contestants if c.label == row["label"].item())
@@ -59,7 +59,7 @@ def chosen(name: str, results: Path) -> Choice:
 
 def shipped(name: str) -> Choice:
     """What the file of a model says that it was made of."""
-    rom, protocol = load(path_of(name)), load_protocol(name)
+    rom, protocol = load(path_of(name)), load_protocol(protocol_names()[name])
     settings, method = dict(rom.settings), rom.method
     training = next(c.training for c in protocol.contestants if c.method == method)
     return Choice(protocol, method, settings, training)
@@ -112,7 +112,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Make the reduced models that ship.")
     parser.add_argument("--check", action="store_true", help="compare with a fit, write nothing")
     parser.add_argument("--results", type=Path, default=RESULTS, help="results folder")
-    parser.add_argument("models", nargs="*", default=data_names("protocols"), metavar="MODEL")
+    parser.add_argument("models", nargs="*", default=[*protocol_names()], metavar="MODEL")
     given = parser.parse_args()
     if not given.check and checkout_data() is None:
         raise VehiclemorError("the package does not run from a checkout: pip install -e . there")

@@ -55,7 +55,8 @@ def _summaries(kind: str, attribute: str) -> dict[str, str]:
 def studies() -> dict[str, str]:
     """Studies that come with the package: name -> one line."""
     from vehiclemor.resources import data_names
-    from vehiclemor.study.plans.study_file import StudyFile, study_path
+    from vehiclemor.study.plans.loading import study_path
+    from vehiclemor.study.plans.study_file import StudyFile
     from vehiclemor.toml_files import read_toml
 
     return {name: read_toml(study_path(name), StudyFile).title for name in data_names("studies")}
@@ -71,7 +72,7 @@ def describe(
     Parameters
     ----------
     name
-        Registered name, name or TOML file of a study, or `study-schema`, `protocol-schema`,
+        Registered name, name or TOML file of a study, or `study-schema`,
         `parameter-schema` for the keys of such a file.
     parameters, parameter_file
         As of `model()`.

@@ -37,11 +37,6 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
     return _fitting(_parsed(path), schema, path)
 
 
-def has_table(path: Path, name: str) -> bool:
-    """Whether a TOML file has a key of that name: what tells whose file it is."""
-    return name in _parsed(path)
-
-
 def _parsed(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))

@@ -11,8 +11,8 @@ from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
 from vehiclemor.report.description.schema import SCHEMAS
 from vehiclemor.resources import data_names, handbook_folder
+from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.study_file import load_studies
 from vehiclemor.toml_files import FileSchema
 
 
@@ -69,8 +69,8 @@ def test_a_study_shows_its_grid():
     members = {row["study"]: row["grid points"] for row in vm.describe("paper")["studies"]}
     assert members["figure-13-frequency"] == 31 * 5
     assert vm.describe("paper")["grid points"] == sum(members.values())
-    protocol = load_protocol("independent_suspension_vehicle").definition
-    runs = vm.describe("predictive")["protocol independent_suspension_vehicle"]["runs"]
+    protocol = load_protocol("predictive-independent_suspension_vehicle").definition
+    runs = vm.describe("predictive-independent_suspension_vehicle")["runs"]
     assert f"{protocol.drawn.runs} drawn" in runs
     assert f"{sum(g.scenarios for g in protocol.validation)} validation" in runs
 

@@ -161,7 +161,7 @@ training = [{ maneuver = "sine_travel", points = [[1.0, 1.2]] }]
 validation = [{ maneuver = "sine_travel", points = [[1.3, 1.0]] }]
 test = [{ maneuver = "sine_travel", points = [[0.9, 1.0]] }]
 bounds = { spindle_y = { measure = "rms", bound = 1e-4 } }
-contestants = [{ label = "newton", method = "full_order", role = "full order" }]
+methods = [{ label = "newton", method = "full_order", role = "full order" }]
 """
 # Part of the file -> what stands in its place, and what the line must say.
 STUDIES = {
@@ -199,9 +199,9 @@ STUDIES = {
         ("[grid", "not a valid TOML file"),
     ],
     STUDY: [
-        ('title = "mine"\nprotocols = ["double_wishbon"]', "unknown protocol"),
-        ('title = "mine"\nprotocols = ["absent.toml"]', "absent.toml"),
-        ('title = "x"\nmodel = "x"\nprotocols = ["double_wishbone"]', "nothing else"),
+        ('title = "mine"\nstudies = ["double_wishbon"]', "unknown study"),
+        ('title = "mine"\nstudies = ["absent.toml"]', "absent.toml"),
+        ('title = "x"\nmodel = "x"\nstudies = ["double_wishbone"]', "nothing else"),
     ],
 }
 PROTOCOLS = {
@@ -220,12 +220,12 @@ PROTOCOLS = {
         ('test = [{ maneuver = "sine"', "unknown maneuver"),
     ],
     'role = "full order"': [
-        ('role = "umpire"', "contestants.0.role"),
+        ('role = "umpire"', "methods.0.role"),
         ("candidates = [{ rank = 3 }]", "unknown setting of full_order"),
         ('candidates = [{ preset = "best" }]', "unknown preset"),
         ("candidates = [{}, {}]", "the same candidate twice"),
-        ("candidates = []", "contestants.0.candidates"),
-        ('train_on = ["lane_change"]', "training of"),
+        ("candidates = []", "methods.0.candidates"),
+        ('training = ["lane_change"]', "training of"),
     ],
     "title =": [
         ('targets = [{ against = "me", ratio = 2.0 }]\ntitle =', "target is against"),
@@ -259,5 +259,5 @@ def test_a_protocol_that_cant_be(fails, tmp_path, old, new, word):
     assert old in PROTOCOL
     path, study = tmp_path / "wrong.toml", tmp_path / "study.toml"
     path.write_text(PROTOCOL.replace(old, new, 1))
-    study.write_text(f'title = "mine"\nprotocols = {json.dumps([str(path)])}\n')
+    study.write_text(f'title = "mine"\nstudies = {json.dumps([str(path)])}\n')
     fails(["run", study, "--out", tmp_path / "out"], "wrong.toml", word)

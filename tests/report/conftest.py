@@ -12,7 +12,7 @@ bounds.spindle_y = { measure = "rms", bound = 7.57e-5 }
 training = [{ maneuver = "sine_travel", points = [[1.0, 1.2]] }]
 validation = [{ maneuver = "sine_travel", points = [[1.3, 1.0]] }]
 test = [{ maneuver = "sine_travel", points = [[0.9, 1.0], [1.1, 0.8]] }]
-contestants = [
+methods = [
     { label = "newton", method = "full_order", role = "full order" },
     { label = "fixed basis", method = "fixed_basis", candidates = [{ rank = 3 }] },
 ]
@@ -26,7 +26,7 @@ def small_protocol(tmp_path_factory):
     folder = tmp_path_factory.mktemp("protocol")
     (folder / "unseen.toml").write_text(PROTOCOL)
     path = folder / "mine.toml"
-    path.write_text(f'title = "x"\nprotocols = ["{folder / "unseen.toml"}"]\n')
+    path.write_text(f'title = "x"\nstudies = ["{folder / "unseen.toml"}"]\n')
     return path
 
 

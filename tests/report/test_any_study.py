@@ -41,7 +41,7 @@ training = [{ maneuver = "quarter_car_road" }]
 validation = [{ maneuver = "quarter_car_road", frequency = [1.2] }]
 targets = [{ against = "equal accuracy", ratio = 2.0 }]
 failure_rate = 0.01
-contestants = [
+methods = [
     { label = "full order", method = "full_order", role = "full order" },
     { label = "replay", method = "replay", role = "baseline" },
     { label = "mine", method = "quarter_car_modes", candidates = [{ fastest = 1000.0 }] },
@@ -59,8 +59,7 @@ def place(plug_in_package, tmp_path_factory):
     folder = tmp_path_factory.mktemp("mine")
     (folder / "mine.toml").write_text(STUDY)
     (folder / "road.toml").write_text(PROTOCOL)
-    (folder / "judged.toml").write_text(f'title = "j"\nprotocols = ["{folder / "road.toml"}"]\n')
-    members = ", ".join(f'"{folder / name}.toml"' for name in ("mine", "judged"))
+    members = ", ".join(f'"{folder / name}.toml"' for name in ("mine", "road"))
     (folder / "both.toml").write_text(f'title = "both"\nstudies = [{members}]\n')
     return folder
 
@@ -136,7 +135,7 @@ def test_a_protocol_is_judged_by_its_own_targets(place, said):
     assert status == 1
     assert re.search(r"failure rate below +0.01\*? +0.53 +missed", text)
     rows = vm.compare(str(place / "road.toml"), place / "results")
-    assert set(rows["study"]) == {"predictive-road"}
+    assert set(rows["study"]) == {"road"}
     assert set(rows["label"][rows["kind"] == "target"]) == {"mine"}
 
 

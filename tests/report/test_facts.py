@@ -4,7 +4,7 @@ import facts
 import fragments
 import pytest
 
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.loading import load_studies
 
 
 def test_studies_run_afresh_give_the_facts(results, results_folder):

@@ -49,12 +49,12 @@ def grid_of(entry):
 @pytest.fixture(scope="session")
 def unseen_travels(small_protocol, tmp_path_factory):
     """Results of the small protocol."""
-    return run_studies(str(small_protocol), tmp_path_factory.mktemp("unseen"))["predictive-unseen"]
+    return run_studies(str(small_protocol), tmp_path_factory.mktemp("unseen"))["unseen"]
 
 
 def protocol_results(small, name):
     """Results that a protocol could have: as many rows and outputs, of those of a small one."""
-    protocol = load_protocol(name.removeprefix("predictive-"))
+    protocol = load_protocol(name)
     rows = [(label, c.method, c.role) for c in protocol.contestants for label in c.row_labels]
     outputs = sorted({*protocol.definition.bounds, *protocol.definition.reported})
     labels, methods, roles = map(list, zip(*rows, strict=True))

@@ -111,7 +111,7 @@ def test_provenance_and_settings_stand_there(made, read):
 
 
 def test_a_protocol_shows_its_contestants_and_targets(made, read):
-    dataset = dataset_of(made[0], "predictive-unseen")
+    dataset = dataset_of(made[0], "unseen")
     expected = {row["label"]: row for row in method_rows(dataset, protocol_of(dataset))}
     rows = {row["label"]: row for row in table(read, "ratio equal")}
     for name in ("misses", "score", "seconds"):
@@ -147,7 +147,7 @@ def test_the_paper_is_judged(made, monkeypatch):
 
 def test_a_damaged_file_is_named_and_left_out(made, tmp_path):
     (tmp_path / "studies").mkdir()
-    shutil.copy(made[0] / "studies" / "predictive-unseen.nc", tmp_path / "studies")
+    shutil.copy(made[0] / "studies" / "unseen.nc", tmp_path / "studies")
     (tmp_path / "studies" / "broken.nc").write_bytes(b"nothing")
     text = vm.write_report(out=tmp_path / "c.html", results=tmp_path).read_text(encoding="utf-8")
     assert "broken.nc" in texts(parsed(text), "p")[1]

@@ -27,18 +27,18 @@ boxes = [{ maneuver = "sine_travel", frequency = [0.7, 2.0], amplitude = [0.5, 1
 runs = 2
 boxes = [{ maneuver = "sine_travel", frequency = [0.7, 2.0], amplitude = [1.3, 1.4] }]
 
-[[contestants]]
+[[methods]]
 label = "newton"
 method = "full_order"
 role = "full order"
 candidates = [{ tolerance = 1e-12 }, { tolerance = 1e-6 }]
 
-[[contestants]]
+[[methods]]
 label = "replay"
 method = "replay"
 role = "baseline"
 
-[[contestants]]
+[[methods]]
 label = "fixed basis"
 method = "fixed_basis"
 candidates = [{ rank = 1 }, { rank = 3 }, { rank = 4 }]

@@ -15,7 +15,7 @@ from vehiclemor.study.experiment import make_experiment
 from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.grid_results import flattened
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario

@@ -26,7 +26,7 @@ from vehiclemor.errors import InputError, MachineError
 from vehiclemor.study import cluster as engine
 from vehiclemor.study.cell_file import ENDING
 from vehiclemor.study.plans.grid import expand
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.workers import LARGEST, WAITING, Timed, evaluate_and_store, in_batches

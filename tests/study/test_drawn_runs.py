@@ -18,8 +18,8 @@ from vehiclemor.report.predictive.rates import upper_bound
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.drawn_runs import drawn, drawn_sets
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.protocol_file import Bound, Box, Draw
 from vehiclemor.study.plans.sensitive import _lifted, reasons
+from vehiclemor.study.plans.study_file import Bound, Box, Draw
 
 SEEDS = (1, 1, 0)
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
@@ -53,7 +53,7 @@ def test_drawn_runs_follow_from_seed_version_and_purpose(protocol):
 )
 def test_the_test_set_of_every_commit_and_machine(name, first, digest):
     """A change here is another test set: it needs another version in the protocol."""
-    protocol = load_protocol(name)
+    protocol = load_protocol(f"predictive-{name}")
     assert protocol.test_set == "predictive-1, seed 20261122"
     sets = drawn_sets(protocol)
     assert len(sets["drawn"]) == 299
@@ -84,7 +84,7 @@ def test_an_audit_draws_other_runs_and_stands_apart(protocol_text, tmp_path):
     path.write_text(protocol_text)
     own, audit = load_protocol(str(path)), load_protocol(str(path), seed=7)
     assert not set(drawn_sets(own)["drawn"]) & set(drawn_sets(audit)["drawn"])
-    assert (own.study, audit.study) == ("predictive-small", "predictive-small-seed-7")
+    assert (own.study, audit.study) == ("small", "small-seed-7")
     with pytest.raises(InputError, match="seed"):
         vm.run_study("figure-12", seed=7, out=tmp_path)
 

@@ -49,8 +49,8 @@ def test_what_a_fit_raises_is_a_result_in_a_grid(raised, tmp_path):
 def test_what_a_fit_raises_is_a_result_in_a_protocol(raised, tmp_path, protocol_text):
     (tmp_path / "small.toml").write_text(protocol_text)
     path = tmp_path / "mine.toml"
-    path.write_text(f'title = "mine"\nprotocols = {json.dumps([str(tmp_path / "small.toml")])}\n')
-    rows = run_studies(str(path), tmp_path)["predictive-small"]
+    path.write_text(f'title = "mine"\nstudies = {json.dumps([str(tmp_path / "small.toml")])}\n')
+    rows = run_studies(str(path), tmp_path)["small"]
     broken = rows.sel(label="fixed basis")
     assert set(broken["status"].values) == {raised[0]}
     assert all(raised[1] in message for message in broken["message"].values)

@@ -17,8 +17,8 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.protocol_file import SpeedTarget
 from vehiclemor.study.plans.protocol_results import judged_part
+from vehiclemor.study.plans.study_file import SpeedTarget
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import training_run
 from vehiclemor.study.store import read_cell
@@ -42,7 +42,7 @@ def study_of(folder, *texts):
         path.write_text(text)
         names.append(str(path))
     study = folder / "mine.toml"
-    study.write_text(f'title = "mine"\nprotocols = {json.dumps(names)}\n')
+    study.write_text(f'title = "mine"\nstudies = {json.dumps(names)}\n')
     return str(study)
 
 
@@ -69,7 +69,7 @@ def done(tmp_path_factory, protocol_text):
     """Folder, study and combined dataset of the small protocol."""
     folder = tmp_path_factory.mktemp("predictive")
     study = study_of(folder, protocol_text)
-    return folder, study, run_studies(study, folder)["predictive-small0"]
+    return folder, study, run_studies(study, folder)["small0"]
 
 
 def test_all_full_order_candidates_are_kept_and_one_of_every_other(done):
@@ -89,9 +89,9 @@ def test_all_full_order_candidates_are_kept_and_one_of_every_other(done):
 def test_the_choice_does_not_read_the_test_set(done, tmp_path, protocol_text):
     folder, _, dataset = done
     head = protocol_text[: protocol_text.index("[[test]]")]
-    tail = protocol_text[protocol_text.index("[[contestants]]") :]
+    tail = protocol_text[protocol_text.index("[[methods]]") :]
     study = study_of(tmp_path, head + OTHER_TEST + OUTSIDE + tail)
-    other = run_studies(study, tmp_path)["predictive-small0"]
+    other = run_studies(study, tmp_path)["small0"]
     np.testing.assert_array_equal(other["settings"], dataset["settings"])
     np.testing.assert_array_equal(other["validation"], dataset["validation"])
     assert_same(files(folder, "validation"), files(tmp_path, "validation"))
@@ -158,7 +158,7 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
 ):
     folder, study, dataset = done
     written = {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")}
-    again = run_studies(study, folder)["predictive-small0"]
+    again = run_studies(study, folder)["small0"]
     assert {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")} == written
     xr.testing.assert_identical(again, dataset)
     monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
@@ -170,14 +170,14 @@ def test_a_protocol_that_was_renamed_is_the_same(done, tmp_path, monkeypatch):
     folder, _, dataset = done
     place = shutil.copytree(folder, tmp_path / "place")
     (place / "small0.toml").rename(place / "renamed.toml")
-    (place / "mine.toml").write_text(f'title = "mine"\nprotocols = ["{place}/renamed.toml"]\n')
+    (place / "mine.toml").write_text(f'title = "mine"\nstudies = ["{place}/renamed.toml"]\n')
     for name in ("workers.evaluate", "timing.timed_tests"):
         monkeypatch.setattr(f"vehiclemor.study.{name}", None)
-    again = run_studies(str(place / "mine.toml"), place)["predictive-renamed"]
+    again = run_studies(str(place / "mine.toml"), place)["renamed"]
     xr.testing.assert_equal(again, dataset)
     for name in ("test_set", "content"):
         assert again.attrs[name] == dataset.attrs[name]
-    assert (place / "studies" / "predictive-renamed.nc").exists()
+    assert (place / "studies" / "renamed.nc").exists()
 
 
 def test_the_best_candidate_that_is_stable_everywhere_is_chosen():
@@ -238,21 +238,21 @@ def test_a_failed_run_is_a_row_with_its_reason(done):
 
 
 def test_a_method_that_refuses_the_model_is_reported(tmp_path, protocol_text):
-    head = protocol_text[: protocol_text.index("[[contestants]]")]
-    refused = '[[contestants]]\nlabel = "mine"\nmethod = "slow_manifold"\n'
-    newton = protocol_text[protocol_text.index("[[contestants]]") :].split("\n\n", maxsplit=1)[0]
+    head = protocol_text[: protocol_text.index("[[methods]]")]
+    refused = '[[methods]]\nlabel = "mine"\nmethod = "slow_manifold"\n'
+    newton = protocol_text[protocol_text.index("[[methods]]") :].split("\n\n", maxsplit=1)[0]
     dataset = run_studies(study_of(tmp_path, f"{head}{newton}\n\n{refused}"), tmp_path)
-    statuses = dataset["predictive-small0"]["status"].sel(label="mine").values
+    statuses = dataset["small0"]["status"].sel(label="mine").values
     assert set(statuses) == {"rejected"}
 
 
 def test_several_protocols_from_python(tmp_path, protocol_text):
-    end = protocol_text.index("[[contestants]]", protocol_text.index("[[contestants]]") + 1)
+    end = protocol_text.index("[[methods]]", protocol_text.index("[[methods]]") + 1)
     one, other = protocol_text[:end], protocol_text[:end].replace("runs = 5", "runs = 4")
     study = study_of(tmp_path, one, other)
     told = []
     dataset = vm.run_study(study, out=tmp_path, progress=lambda *part: told.append(part))
-    assert set(dataset["study"].values) == {"predictive-small0", "predictive-small1"}
+    assert set(dataset["study"].values) == {"small0", "small1"}
     # Progress never goes back, that of the times neither.
     assert sum("rounds" in work for work in {work for work, _, _ in told}) == 2
     for work in {work for work, _, _ in told}:

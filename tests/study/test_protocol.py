@@ -7,13 +7,12 @@ from vehiclemor.errors import FileError
 from vehiclemor.reduction.methods import replay
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
-from vehiclemor.resources import data_names
 from vehiclemor.simulation import input_polynomials
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate
 from vehiclemor.study import scenario as scenario_module
-from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.plans.protocol import load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -26,12 +25,11 @@ def scenario(maneuver, start, speed):
 
 @pytest.fixture(scope="module")
 def protocols():
-    return {name: load_protocol(name) for name in data_names("protocols")}
+    return {model: load_protocol(study) for model, study in protocol_names().items()}
 
 
 def test_the_study_names_every_protocol(protocols):
-    (study,) = load_studies("predictive").values()
-    assert sorted(study.protocols) == sorted(protocols)
+    assert sorted(load_studies("predictive")) == sorted(protocol_names().values())
 
 
 @pytest.mark.parametrize("name", VEHICLES)

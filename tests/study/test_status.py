@@ -96,9 +96,9 @@ def test_seconds_left_are_those_of_each_method_without_its_first_use(study, tmp_
 def test_a_protocol_is_told_of_up_to_its_choice(tmp_path, protocol_text, capsys):
     (tmp_path / "small.toml").write_text(protocol_text)
     path = tmp_path / "mine.toml"
-    path.write_text(f'title = "mine"\nprotocols = ["{tmp_path / "small.toml"}"]\n')
-    assert "predictive-small: 0 of 6 cells done, 6 to do" in told(capsys, path, tmp_path)
-    assert "tested" in vm.status(path, tmp_path)["predictive-small"].later
+    path.write_text(f'title = "mine"\nstudies = ["{tmp_path / "small.toml"}"]\n')
+    assert "small: 0 of 6 cells done, 6 to do" in told(capsys, path, tmp_path)
+    assert "tested" in vm.status(path, tmp_path)["small"].later
 
 
 def test_a_file_in_the_place_of_the_results_is_one_line(study, capsys):

@@ -15,7 +15,7 @@ from vehiclemor.cli.app import app, main
 from vehiclemor.report.citation import citations
 from vehiclemor.report.figures import saving
 from vehiclemor.report.published import load_published
-from vehiclemor.study.plans.study_file import study_path
+from vehiclemor.study.plans.loading import study_path
 
 README, HANDBOOK = ROOT / "README.md", ROOT / "paper" / "handbook"
 FIRST_STEPS, PLUG_IN = HANDBOOK / "first-steps.md", HANDBOOK / "my-plug-in.md"

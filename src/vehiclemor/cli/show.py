@@ -24,7 +24,7 @@ def show(
     Parameters
     ----------
     name
-        A model, method, maneuver or study, a study's TOML file, or study-schema, protocol-schema,
+        A model, method, maneuver or study, a study's TOML file, or study-schema,
         parameter-schema: the keys of such a file.
     parameter
         name=value: a parameter of a model, SI units; may be given several times.

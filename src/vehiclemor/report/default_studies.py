@@ -15,11 +15,11 @@ from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.shown import default_rank, tabled_outputs
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.method_settings import complete_settings, default_settings
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.plans.protocol import PREFIX, protocol_names
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.
@@ -64,12 +64,10 @@ def perturbed(name: str, results: Path) -> str:
 
 def unseen(name: str, results: Path) -> str:
     """Study of inputs that no method has seen: the package's protocol, or one by default."""
-    study = f"predictive-{name}"
-    if study in data_names("studies"):
-        return study
-    protocol = write_text(results / "studies" / f"{name}.toml", _protocol(build(name)))
-    text = f'title = "Unseen inputs: {name}"\nprotocols = [{json.dumps(str(protocol))}]\n'
-    return str(write_text(results / "studies" / f"{study}.toml", text))
+    if name in protocol_names():
+        return protocol_names()[name]
+    path = results / "studies" / f"{PREFIX}{name}.toml"
+    return str(write_text(path, _protocol(build(name))))
 
 
 def methods(model: Model) -> dict[str, tuple[str, str]]:
@@ -155,6 +153,6 @@ def _protocol(model: Model) -> str:
         own = {"preset": preset, **smaller_rank(model, method)}
         chosen = [own | entry for entry in candidates]
         words = label.replace("full_order_", "").replace("_", " ")
-        lines += ["", "[[contestants]]", f'label = "{words}"', f'method = "{method}"']
+        lines += ["", "[[methods]]", f'label = "{words}"', f'method = "{method}"']
         lines += [f'role = "{role}"', f"candidates = [{', '.join(map(_inline, chosen))}]"]
     return "\n".join(lines) + "\n"

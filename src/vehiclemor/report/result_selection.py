@@ -11,7 +11,8 @@ from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names
 from vehiclemor.study.combined import combined_path
 from vehiclemor.study.netcdf_file import read_dataset
-from vehiclemor.study.plans.study_file import FACTORS, owner, studies_and_files
+from vehiclemor.study.plans.loading import owner, studies_and_files
+from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,9 +16,10 @@ from vehiclemor.study.cluster import LOCAL, reached
 from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, combined
+from vehiclemor.study.plans.loading import owner, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import StudyFile, owner, studies_and_files
+from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import cell_path
 from vehiclemor.study.workers import Workers
@@ -53,8 +54,7 @@ def run_studies(
     Returns
     -------
     dict
-        Study name -> combined dataset, stored too, see `combined_path`; of a protocol the name is
-        `predictive-<protocol>`.
+        Study name -> combined dataset, stored too, see `combined_path`.
     """
     count("jobs", jobs, most=MOST_JOBS)
     if seed is not None:
@@ -62,10 +62,10 @@ def run_studies(
     if jobs > 1 and scheduler not in ("", LOCAL):
         raise InputError("jobs: a scheduler at an address has its own workers")
     files = studies_and_files(study)
-    protocols = [load_protocol(name, seed) for _, d in files.values() for name in d.protocols]
+    protocols = [load_protocol(str(path), seed) for path, d in files.values() if d.bounds]
     if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
         raise InputError(f"seed: {study} draws no test runs")
-    grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
+    grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.bounds]
     with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
         for path, grid in grids:

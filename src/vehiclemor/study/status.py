@@ -14,9 +14,9 @@ from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.combined import Owner, combined_path
 from vehiclemor.study.plans.grid import Grid, expand
+from vehiclemor.study.plans.loading import owner, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import validation_experiments
-from vehiclemor.study.plans.study_file import owner, studies_and_files
 from vehiclemor.study.store import cell_end
 
 # What differs from run to run of one reason.
@@ -85,13 +85,13 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
         raise FileError(f"{folder}: not a folder")
     found: dict[str, StudyStatus] = {}
     for name, (path, definition) in studies_and_files(study).items():
-        for protocol in map(load_protocol, definition.protocols):
-            of = owner(protocol.study, protocol.path, protocol.definition, folder)
-            cells = {e.key: e.method for e in validation_experiments(protocol)}
-            found[protocol.study] = _status(cells, of, folder, "then the chosen ones are tested")
-        if not definition.protocols:
+        later = ""
+        if definition.bounds:
+            experiments = validation_experiments(load_protocol(str(path)))
+            cells, later = {e.key: e.method for e in experiments}, "then the chosen ones are tested"
+        else:
             cells = _methods(expand(name, definition))
-            found[name] = _status(cells, owner(name, path, definition, folder), folder)
+        found[name] = _status(cells, owner(name, path, definition, folder), folder, later)
     return found
 
 

@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from vehiclemor.study.plans.drawn_runs import drawn
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
 from vehiclemor.simulation.input_polynomials import extent_of
-from vehiclemor.study.plans.boxes import drawn
 from vehiclemor.study.plans.protocol import load_protocol
 
 CAR = "independent_suspension_vehicle"
@@ -25,7 +25,7 @@ def shipped(name):
 def missed(rom, run, full):
     """Largest error of a run, in parts of the bounds of its model's protocol."""
     found = 0.0
-    for output, bound in load_protocol(rom.model.name).definition.bounds.items():
+    for output, bound in load_protocol(f"predictive-{rom.model.name}").definition.bounds.items():
         error = (run.outputs - full.outputs)[:, rom.output_names.index(output)]
         size = np.abs(error).max() if bound.measure == "max" else np.sqrt(np.mean(error**2))
         found = max(found, size / bound.bound)
@@ -80,11 +80,11 @@ def test_a_pulse_between_two_output_times_is_told_of_when_it_comes(size, hold):
 
 @pytest.mark.parametrize("name", [CAR, "high_fidelity_vehicle"])
 def test_steering_of_the_protocol_is_within_what_is_known(name):
-    rom, protocol = shipped(name), load_protocol(name)
+    rom, protocol = shipped(name), load_protocol(f"predictive-{name}")
     reach = getattr(rom.reduced, "fast", rom.reduced).reach
     known = [*protocol.sets["training"], *protocol.sets["validation"]]
     plan = protocol.definition.drawn
-    drawn_runs = drawn(protocol.model, plan, "any", "drawn", known)
+    drawn_runs = drawn(protocol.model, plan, (7, 1, 0), known)
     for scenario in (*protocol.sets["validation"], *drawn_runs):
         assert reach.driven(scenario.maneuver)[0] <= 1.0
 

@@ -26,10 +26,10 @@ from vehiclemor.online.parts import Reader, Writer
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.online.saved import shipped_folder
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.study import netcdf_file
 from vehiclemor.study.netcdf_file import write_dataset
+from vehiclemor.study.plans.protocol import protocol_names
 from vehiclemor.study.scenario import start_of
 
 CAR = "independent_suspension_vehicle"
@@ -474,7 +474,7 @@ def test_texts_that_are_deep_or_long_are_refused_soon(text, saved):
     refused_untouched(saved)
 
 
-SHIPPED = data_names("protocols")
+SHIPPED = [*protocol_names()]
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -19,7 +19,7 @@ from vehiclemor.report.shown import (
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.study.method_settings import complete_settings
-from vehiclemor.study.plans.study_file import load_studies
+from vehiclemor.study.plans.loading import load_studies
 
 PLAIN = standard_problems.DEFINITION
 BUILT_IN = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")

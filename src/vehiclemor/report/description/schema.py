@@ -6,12 +6,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from vehiclemor.parameters import ParameterFile
-from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.study_file import StudyFile
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "study-schema": StudyFile,
-    "protocol-schema": ProtocolFile,
     "parameter-schema": ParameterFile,
 }
 WORDS = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}

@@ -1,15 +1,8 @@
 """A study: what it runs, and how many cells its grid has."""
 
 from vehiclemor.registry import component
-from vehiclemor.study.plans.protocol import SETS, protocol_path
-from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.study.plans.study_file import (
-    Sampling,
-    load_studies,
-    read_study,
-    study_path,
-    values,
-)
+from vehiclemor.study.plans.loading import load_studies, study_path
+from vehiclemor.study.plans.study_file import SETS, Sampling, StudyFile, values
 from vehiclemor.toml_files import read_toml
 
 # Values of an axis that are printed.
@@ -19,7 +12,7 @@ SHOWN = 40
 def study_description(name: str) -> dict[str, object]:
     """Grid and methods of a study, its members if it is a collection, or its protocols."""
     path = study_path(name)
-    study = read_study(path)
+    study = read_toml(path, StudyFile)
     head: dict[str, object] = {"study": path.stem, "summary": study.title, "file": str(path)}
     if study.studies:
         rows = [
@@ -27,8 +20,8 @@ def study_description(name: str) -> dict[str, object]:
             for member, content in load_studies(name).items()
         ]
         return {**head, "grid points": sum(row["grid points"] for row in rows), "studies": rows}
-    if study.protocols:
-        return head | {f"protocol {name}": _protocol(name) for name in study.protocols}
+    if study.bounds:
+        return head | _test(study)
     grid = {key: values(entry) for key, entry in study.grid.items()}
     return {
         **head,
@@ -71,14 +64,13 @@ def _sampling(plan: Sampling | None) -> list[dict[str, object]]:
     ]
 
 
-def _protocol(name: str) -> dict[str, object]:
-    """What a protocol trains, chooses by and tests; scenarios are counted."""
-    protocol = read_toml(protocol_path(name), ProtocolFile)
-    counted = {s: sum(g.scenarios for g in getattr(protocol, s)) for s in SETS}
-    draws = {"drawn": protocol.drawn, "drawn outside": protocol.drawn_outside}
+def _test(study: StudyFile) -> dict[str, object]:
+    """What a study with bounds trains, chooses by and tests; scenarios are counted."""
+    counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
+    draws = {"drawn": study.drawn, "drawn outside": study.drawn_outside}
     counted |= {name: draw.runs for name, draw in draws.items() if draw}
     return {
-        "model": protocol.model,
+        "model": study.model,
         "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
-        "contestants": [entry.label for entry in protocol.contestants],
+        "methods": list(study.labelled),
     }

@@ -27,7 +27,8 @@ from vehiclemor.report.figures.curves import PATH
 from vehiclemor.report.figures.lines import Results
 from vehiclemor.report.shown import main_outputs
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.plans.study_file import StudyFile, studies_and_files
+from vehiclemor.study.plans.loading import studies_and_files
+from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
@@ -137,18 +138,16 @@ def find(name: str, results: Path) -> list[Entry]:
 def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
     """What a study lets be drawn: of a protocol the errors over the times."""
     file = path.stem if data_folder() in path.parents else str(path)
-    if study.protocols:
+    if study.bounds:
         return [
             Entry(
-                name=f"{member}-pareto",
+                name=f"{name}-pareto",
                 draw="pareto",
-                studies=[protocol],
-                datasets=[f"predictive-{member}"],
+                studies=[file],
+                datasets=[name],
                 caption=f"{study.title}: worst error on unseen inputs over the time of a call.",
                 options={"titled": True},
             )
-            for protocol in study.protocols
-            if (member := Path(protocol).stem)
         ]
     kinds = {"errors": "errors over what is varied"}
     if study.keep == "trajectories":

@@ -106,7 +106,7 @@ def _model(dataset: xr.Dataset) -> str:
 def _title(dataset: xr.Dataset) -> str:
     """Title of the result; of one run with its input and how it has ended."""
     title = str(dataset.attrs.get("title", _model(dataset)))
-    (test,) = _configuration(dataset).get("test", [None])
+    test, *_ = _configuration(dataset).get("test") or [None]
     if test:
         factors = "".join(
             f", {k} {test[k]:g}" for k in ("frequency", "amplitude") if test[k] != 1.0
@@ -228,7 +228,7 @@ def figure_errors(dataset: xr.Dataset) -> Figure:
         raise InputError("no errors in this result: it was not compared with full order")
     if "label" not in dataset.dims:
         (label,) = _points(dataset)
-        dataset = dataset.expand_dims(method=[label])
+        dataset = dataset.expand_dims(label=[label])
     if sample_axis(dataset):
         return figure_samples(dataset, shown_outputs(dataset))
     return figure_grid_errors(dataset, shown_outputs(dataset)) or _errors_of_a_point(dataset)

@@ -14,8 +14,8 @@ from vehiclemor.report.predictive.targets import Row, error_columns, ratio, targ
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import judged_part, judged_set
+from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
 
 STUDY = "predictive"
@@ -56,12 +56,12 @@ def protocol_rows(dataset: xr.Dataset) -> list[Row]:
     return [{**row, "study": str(dataset.attrs["study"])} for row in rows]
 
 
-def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
+def protocol_of(dataset: xr.Dataset) -> StudyFile:
     """The protocol of a combined dataset."""
-    return ProtocolFile.model_validate_json(dataset.attrs["configuration"])
+    return StudyFile.model_validate_json(dataset.attrs["configuration"])
 
 
-def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
+def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
     """One row for each contestant, full-order integrators as measures.
 
     `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
@@ -87,7 +87,7 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     return rows
 
 
-def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: ProtocolFile) -> Row:
+def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: StudyFile) -> Row:
     part, bounds = judged.sel(label=label), protocol.bounds
     found = outcomes(part, bounds)
     beyond = np.isin(dataset["scenario_set"].values, OUTSIDE)
@@ -162,7 +162,7 @@ def _failure(part: xr.Dataset) -> str:
     return ""
 
 
-def _errors(part: xr.Dataset, protocol: ProtocolFile) -> Row:
+def _errors(part: xr.Dataset, protocol: StudyFile) -> Row:
     """Worst and 99 % errors by output, of the runs that have come to their end."""
     found: Row = {}
     for name, (output, measure) in error_columns(protocol).items():

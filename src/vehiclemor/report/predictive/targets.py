@@ -8,12 +8,12 @@ import xarray as xr
 from vehiclemor.report.criteria.finding import OWN
 from vehiclemor.report.labels import unit_of
 from vehiclemor.report.verdicts import NOT_COMPARABLE, judged, scatter
-from vehiclemor.study.plans.protocol_file import ProtocolFile, SpeedTarget, Straight
+from vehiclemor.study.plans.study_file import SpeedTarget, Straight, StudyFile
 
 Row = dict[str, Any]
 
 
-def error_columns(protocol: ProtocolFile) -> dict[str, tuple[str, str]]:
+def error_columns(protocol: StudyFile) -> dict[str, tuple[str, str]]:
     """Name of a column of errors -> (output, measure): the bounded outputs, then the reported."""
     bounded = {
         f"{bound.measure}_{output}": (output, bound.measure)
@@ -32,7 +32,7 @@ def chosen(rows: list[Row]) -> Row | None:
     return next((row for row in rows if row["winner"]), None)
 
 
-def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row]) -> list[Row]:
+def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) -> list[Row]:
     """What the chosen one must reach: misses, warnings, ratios, the straight line."""
     winner = chosen(methods)
     if winner is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.protocol import Contestant
-from vehiclemor.study.plans.protocol_file import Bound
+from vehiclemor.study.plans.study_file import Bound
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,8 +14,8 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.plans.protocol import DRAWN, Protocol
-from vehiclemor.study.plans.protocol_file import Box, Draw
+from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.plans.study_file import DRAWN, Box, Draw
 from vehiclemor.study.scenario import Scenario, own_speed
 
 # Decimals of drawn factors and speeds: what a table prints is what was run.

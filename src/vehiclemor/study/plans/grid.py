@@ -94,6 +94,8 @@ class Grid:
 
     def check(self) -> None:
         """Raise `VehiclemorError` if a run can't be made, or no settings of a method fit."""
+        if self.definition.keep == "trajectories":
+            self._check_size()
         names = {name for found in self._settings.values() for name in found}
         runs = [
             range(1 if name in names or name == "label" else size)
@@ -102,7 +104,6 @@ class Grid:
         for place in itertools.product(*runs):
             check_run(self.model, self._run(place))
         if self.definition.keep == "trajectories":
-            self._check_size()
             known = [component("maneuver", name) for name in self.dimensions.get("maneuver", ())]
             if any(not np.array_equal(known[0].times, other.times) for other in known[1:]):
                 raise InputError('maneuvers of other output times need keep = "metrics"')

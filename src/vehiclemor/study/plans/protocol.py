@@ -1,4 +1,4 @@
-"""Protocols: training, validation and test scenarios of a model, and who competes on them."""
+"""Studies with bounds: training, validation and test scenarios of a model, and who competes."""
 
 import itertools
 from dataclasses import dataclass
@@ -8,19 +8,27 @@ from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import choice, component
+from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, make_experiment
 from vehiclemor.study.method_settings import Settings, complete_settings
-from vehiclemor.study.plans.protocol_file import Box, ContestantEntry, Draw, Group, ProtocolFile
-from vehiclemor.study.plans.study_file import named_file
+from vehiclemor.study.plans.loading import study_path
+from vehiclemor.study.plans.study_file import (
+    DRAWN,
+    SETS,
+    Box,
+    Draw,
+    Group,
+    MethodEntry,
+    StudyFile,
+)
 from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml
 
-SETS = ("training", "validation", "test", "outside")
-# Drawn from boxes.
-DRAWN = ("drawn", "drawn_outside")
 FULL_ORDER, CONTENDER = "full order", "contender"
+# Of the names of the package's own; the model follows.
+PREFIX = "predictive-"
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,7 @@ class Contestant:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A protocol file with all names resolved.
+    """A study with bounds, with all names resolved.
 
     Attributes
     ----------
@@ -66,7 +74,7 @@ class Protocol:
     """
 
     path: Path
-    definition: ProtocolFile
+    definition: StudyFile
     model: Model
     sets: dict[str, tuple[Scenario, ...]]
     contestants: tuple[Contestant, ...]
@@ -76,7 +84,7 @@ class Protocol:
     def study(self) -> str:
         """Name of its results; an audit's are apart."""
         audit = "" if self.seed == self.definition.seed else f"-seed-{self.seed}"
-        return f"predictive-{self.path.stem}{audit}"
+        return f"{self.path.stem}{audit}"
 
     @property
     def test_set(self) -> str:
@@ -84,13 +92,14 @@ class Protocol:
         return f"predictive-{self.definition.version}, seed {self.seed}"
 
 
-def protocol_path(protocol: str) -> Path:
-    """Path of a protocol: a name from the package's data, or a TOML file."""
-    return named_file("protocol", "protocols", protocol)
+def protocol_names() -> dict[str, str]:
+    """Model -> name of the study with bounds that the package has of it."""
+    known = (name for name in data_names("studies") if name.startswith(PREFIX))
+    return {name.removeprefix(PREFIX): name for name in known}
 
 
-def load_protocol(protocol: str, seed: int | None = None) -> Protocol:
-    """A protocol by the name of a file of the package's data, or by the path of a TOML file.
+def load_protocol(study: str, seed: int | None = None) -> Protocol:
+    """A study with bounds, by name or TOML file.
 
     Parameters
     ----------
@@ -102,8 +111,10 @@ def load_protocol(protocol: str, seed: int | None = None) -> Protocol:
     VehiclemorError
         If the file or anything that it names is wrong.
     """
-    path = protocol_path(protocol)
-    definition = read_toml(path, ProtocolFile)
+    path = study_path(study)
+    definition = read_toml(path, StudyFile)
+    if not definition.bounds:
+        raise FileError(f"{path}: has no bounds")
     try:
         return _resolved(path, definition, definition.seed if seed is None else seed)
     except PlugInError:
@@ -112,7 +123,7 @@ def load_protocol(protocol: str, seed: int | None = None) -> Protocol:
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(path: Path, definition: ProtocolFile, seed: int) -> Protocol:
+def _resolved(path: Path, definition: StudyFile, seed: int) -> Protocol:
     model = build(definition.model)
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
     if definition.straight:
@@ -122,7 +133,7 @@ def _resolved(path: Path, definition: ProtocolFile, seed: int) -> Protocol:
     sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
     _check_boxes(model, definition)
-    contestants = tuple(_contestant(model, e, sets) for e in definition.contestants)
+    contestants = tuple(_contestant(model, e, sets) for e in definition.methods)
     labels = [label for contestant in contestants for label in contestant.row_labels]
     for label in labels:
         if labels.count(label) > 1:
@@ -133,7 +144,7 @@ def _resolved(path: Path, definition: ProtocolFile, seed: int) -> Protocol:
     return Protocol(path, definition, model, sets, contestants, seed)
 
 
-def _scenarios(model: Model, key: str, definition: ProtocolFile) -> tuple[Scenario, ...]:
+def _scenarios(model: Model, key: str, definition: StudyFile) -> tuple[Scenario, ...]:
     """Scenarios of one set, checked against the model."""
     found: list[Scenario] = []
     for number, group in enumerate(getattr(definition, key), start=1):
@@ -175,7 +186,7 @@ def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
             seen[run] = key
 
 
-def _check_boxes(model: Model, definition: ProtocolFile) -> None:
+def _check_boxes(model: Model, definition: StudyFile) -> None:
     """Raise `InputError` if a corner of a box is no scenario of the model."""
     for purpose in DRAWN:
         draw: Draw | None = getattr(definition, purpose)
@@ -199,24 +210,25 @@ def _check_corners(model: Model, box: Box) -> None:
 
 def _contestant(
     model: Model,
-    entry: ContestantEntry,
+    entry: MethodEntry,
     sets: dict[str, tuple[Scenario, ...]],
 ) -> Contestant:
     method: Method = component("method", entry.method)
-    where = f"contestant {entry.label!r}"
+    label = entry.label or entry.method
+    where = f"method {label!r}"
     candidates: list[Settings] = []
     for given in entry.candidates:
-        settings: dict[str, object] = dict(given)
-        preset = str(settings.pop("preset", "recommended"))
+        settings: dict[str, object] = {"preset": entry.preset, **entry.settings, **given}
+        preset = str(settings.pop("preset"))
         complete = complete_settings(model, entry.method, settings, preset)
         # Of a method that refuses the model all candidates are empty.
         if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)
     known = {scenario.maneuver.name for scenario in sets["training"]}
-    for name in entry.train_on:
+    learned = [entry.training] if isinstance(entry.training, str) else entry.training
+    learned = [name for name in learned if name]
+    for name in learned:
         choice(f"maneuver in the training of {where}", name, known)
-    training = tuple(
-        s for s in sets["training"] if not entry.train_on or s.maneuver.name in entry.train_on
-    )
-    return Contestant(entry.label, entry.method, entry.role, tuple(candidates), training)
+    training = tuple(s for s in sets["training"] if not learned or s.maneuver.name in learned)
+    return Contestant(label, entry.method, entry.role, tuple(candidates), training)

@@ -21,11 +21,11 @@ from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
 from vehiclemor.study.plans.drawn_runs import drawn_sets
-from vehiclemor.study.plans.protocol import CONTENDER, DRAWN, FULL_ORDER, Contestant, Protocol
-from vehiclemor.study.plans.protocol_file import ProtocolFile
+from vehiclemor.study.plans.loading import owner
+from vehiclemor.study.plans.protocol import CONTENDER, FULL_ORDER, Contestant, Protocol
 from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.sensitive import reasons, second_run
-from vehiclemor.study.plans.study_file import owner
+from vehiclemor.study.plans.study_file import DRAWN, StudyFile
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.store import result_path
@@ -46,8 +46,7 @@ def run_protocol(
     Returns
     -------
     xarray.Dataset
-        On the dimensions `label`, `scenario` and `output`, stored as
-        `studies/predictive-<protocol>.nc` too.
+        On the dimensions `label`, `scenario` and `output`, stored as `studies/NAME.nc` too.
     """
     workers = Workers(protocol.study, folder, jobs, elsewhere)
     of = owner(protocol.study, protocol.path, protocol.definition, folder)
@@ -83,7 +82,7 @@ def run_protocol(
 
 def validate(
     model: Model,
-    definition: ProtocolFile,
+    definition: StudyFile,
     contestants: Sequence[Contestant],
     validation: tuple[Scenario, ...],
     workers: Workers,

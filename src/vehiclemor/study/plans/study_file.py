@@ -1,20 +1,16 @@
-"""Study files: the grid of a study declared in TOML, validated on loading."""
+"""Study files, `data/studies/*.toml`: methods and scenarios, validated on loading.
 
-import hashlib
+The scenarios of a study are a grid, a product of axes; or, where it has bounds, a training set, a
+validation set and a test set, which are lists or drawn from boxes.
+"""
+
 import math
-import os
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from vehiclemor.errors import FileError
-from vehiclemor.registry import choice
-from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.combined import Owner
-from vehiclemor.study.plans.protocol_file import ProtocolFile
-from vehiclemor.toml_files import FileSchema, Line, has_table, read_toml
+from vehiclemor.toml_files import FileSchema, Line
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
@@ -22,6 +18,14 @@ TEXTS = ("maneuver", "start", "training")
 PARAMETER = "parameters."
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
+# Of the test sets of every study that gives none.
+SEED = 20261122
+# Sets of scenarios that a study with bounds lists, and those that it draws.
+SETS = ("training", "validation", "test", "outside")
+DRAWN = ("drawn", "drawn_outside")
+# Keys that go with bounds alone; and of a method.
+OF_TESTS = (*SETS[1:], *DRAWN, "reported", "sensitive", "targets", "failure_rate", "straight")
+OF_ENTRIES = {"candidates", "role"}
 
 
 class Span(FileSchema):
@@ -66,6 +70,108 @@ class Sampling(FileSchema):
 
 Car = dict[str, float | list[float]]
 Training = str | Annotated[list[str], Field(min_length=1)]
+Settings = dict[str, int | float | str]
+
+
+class Bound(FileSchema):
+    """Largest allowed error of an output: its RMS, or its largest absolute value."""
+
+    measure: Literal["rms", "max"]
+    bound: float = Field(gt=0.0, allow_inf_nan=False, description="in the output's unit")
+    reason: str = Field("ours", min_length=1, description="where the number comes from")
+
+
+class Group(FileSchema):
+    """Scenarios of one maneuver: every point, from every start.
+
+    Points are rows (frequency, amplitude) or (frequency, amplitude, speed); without them they are
+    all combinations of the three lists.
+    """
+
+    maneuver: str = Field(description="registered name")
+    start: list[str] = Field(
+        default_factory=list, description="initial conditions; the model's first by default"
+    )
+    points: list[list[float]] = Field(
+        default_factory=list, description="[frequency, amplitude] or [frequency, amplitude, speed]"
+    )
+    frequency: list[float] = Field(default_factory=list, description="factors, 1 by default")
+    amplitude: list[float] = Field(default_factory=list, description="factors, 1 by default")
+    speed: list[float] = Field(default_factory=list, description="m/s, the model's own by default")
+
+    @property
+    def scenarios(self) -> int:
+        """How many scenarios it is."""
+        lists = (self.frequency, self.amplitude, self.speed)
+        points = len(self.points) or math.prod(len(entry) or 1 for entry in lists)
+        return points * (len(self.start) or 1)
+
+    @model_validator(mode="after")
+    def _either(self) -> "Group":
+        if self.points and (self.frequency or self.amplitude or self.speed):
+            raise ValueError("give points or lists of factors, not both")
+        if any(len(point) not in (2, 3) for point in self.points):
+            raise ValueError("a point is [frequency, amplitude] or [frequency, amplitude, speed]")
+        return self
+
+
+Groups = Annotated[list[Group], Field(min_length=1)]
+# Told apart by their form, as axes are.
+Learned = Annotated[
+    Annotated[Training, Tag("names")] | Annotated[Groups, Tag("runs")],
+    Discriminator(lambda value: "runs" if _is_listed(value) else "names"),
+]
+Range = Annotated[list[float], Field(min_length=2, max_length=2)]
+Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class Box(FileSchema):
+    """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
+
+    maneuver: str = Field(description="registered name")
+    share: Limit = Field(1.0, description="of the runs, against the other boxes' shares")
+    frequency: Range = Field([1.0, 1.0], description="factors, from and to")
+    amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
+    both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
+    speed: Range | None = Field(None, description="m/s, the model's own by default")
+    start: list[str] = Field(
+        default_factory=list, description="initial conditions, equally likely; the model's first"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Box":
+        ranges = (self.frequency, self.amplitude, self.speed)
+        for low, high in filter(None, ranges):
+            if not (math.isfinite(low) and low <= high < math.inf):
+                raise ValueError("a range is [from, to] with finite numbers in order")
+        if self.frequency[0] <= 0.0:
+            raise ValueError("frequency factors are positive")
+        return self
+
+
+class Draw(FileSchema):
+    """Runs drawn from boxes."""
+
+    runs: int = Field(ge=1, le=100_000, description="how many")
+    boxes: list[Box] = Field(min_length=1, description="what they are drawn from")
+
+
+class SpeedTarget(FileSchema):
+    """How many times faster than a full-order integrator the winner must be."""
+
+    against: str = Field(
+        description="equal accuracy, within bounds, or the label of a full-order row"
+    )
+    ratio: float = Field(gt=0.0, description="least ratio of the times")
+    aim: float = Field(0.0, description="ratio that is aimed at")
+
+
+class Straight(FileSchema):
+    """Scenarios without steering, in which the car must stay on its line."""
+
+    maneuver: str = Field(description="registered name")
+    output: str = Field(description="its lateral position")
+    bound: float = Field(gt=0.0, description="largest value in the first 10 s, in its unit")
 
 
 class MethodEntry(FileSchema):
@@ -74,25 +180,36 @@ class MethodEntry(FileSchema):
     method: str = Field(description="registered name")
     label: Line = Field("", description="name of its results; the method's by default")
     preset: str = Field("recommended", description="preset that its settings differ from")
-    settings: dict[str, int | float | str] = Field(
+    settings: Settings = Field(
         default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
     )
-    training: Training = Field("", description="as of the study, whose it is by default")
+    training: Training = Field(
+        "",
+        description="as of the study, whose it is by default; of a training set the maneuvers that "
+        "are learned from",
+    )
+    candidates: list[Settings] = Field(
+        default=[{}],
+        min_length=1,
+        description="with bounds: further settings, and `preset` beside them; validation chooses",
+    )
+    role: Literal["full order", "baseline", "contender"] = Field(
+        "contender",
+        description="with bounds: of full order every candidate has a result; of the contenders "
+        "one is chosen",
+    )
 
 
 class StudyFile(FileSchema):
     """Schema of `data/studies/*.toml`.
 
-    Either a grid of one model, or a collection that names other studies, or protocols (see
-    `study/plans/protocol.py`).
+    A grid of one model, or a test: with `bounds`, sets of scenarios; or a collection that names
+    other studies.
     """
 
     title: Line = Field(description="one line")
     studies: list[str] = Field(
         default_factory=list, description="of a collection: names of studies, or TOML files"
-    )
-    protocols: list[str] = Field(
-        default_factory=list, description="names of protocols, or TOML files: see protocol-schema"
     )
     model: str = Field("", description="registered name; needed for a grid")
     parameters: Car = Field(
@@ -103,11 +220,11 @@ class StudyFile(FileSchema):
     start: list[str] = Field(
         default_factory=list, description="initial conditions; the model's first by default"
     )
-    training: Training = Field(
+    training: Learned = Field(
         "matched",
         description="input that is trained on: matched (the tested one), nominal (the model's own "
         "maneuver), the name of a maneuver, protocol (the training of the model's protocol), set, "
-        "or a list of these",
+        "or a list of these; with bounds: the runs that methods learn from",
     )
     training_set: list[list[float]] = Field(
         default_factory=list,
@@ -125,8 +242,42 @@ class StudyFile(FileSchema):
         None, description="points of a dimension `sample` beside those of the grid"
     )
     methods: list[MethodEntry] = Field(
-        default_factory=list, description="each is run at every point of the grid"
+        default_factory=list, description="each is run in every scenario"
     )
+    bounds: dict[str, Bound] = Field(
+        default_factory=dict, description="of a test: output -> largest allowed error"
+    )
+    reported: list[str] = Field(
+        default_factory=list, description="outputs whose RMS errors are printed beside the bounded"
+    )
+    validation: list[Group] = Field(
+        default_factory=list, description="what candidates are chosen by"
+    )
+    test: list[Group] = Field(
+        default_factory=list, description="listed test runs; judged if none are drawn"
+    )
+    outside: list[Group] = Field(
+        default_factory=list, description="beyond what was trained: reported, not judged"
+    )
+    version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
+    seed: int = Field(SEED, ge=0, description="of the drawn runs")
+    drawn: Draw | None = Field(None, description="test set: drawn from boxes")
+    drawn_outside: Draw | None = Field(
+        None, description="the same beyond the boxes: whether models warn"
+    )
+    sensitive: dict[str, Limit] = Field(
+        default_factory=dict,
+        description="output -> largest value of the full order's run in the first 10 s; beyond it "
+        "(spin, rollover) a drawn run is not judged",
+    )
+    targets: list[SpeedTarget] = Field(default_factory=list, description="speed that is aimed at")
+    failure_rate: float | None = Field(
+        None, gt=0.0, le=1.0, description="rate of misses that the runs must exclude at 95 %"
+    )
+    flagged_misses: int = Field(
+        3, ge=0, description="runs outside of the bounds that the chosen model may have flagged"
+    )
+    straight: Straight | None = Field(None, description="whether a car drives straight on")
 
     @property
     def labelled(self) -> dict[str, MethodEntry]:
@@ -136,7 +287,8 @@ class StudyFile(FileSchema):
     @property
     def training_words(self) -> str:
         """What is trained on, in one line."""
-        return self.training if isinstance(self.training, str) else ", ".join(self.training)
+        words = [self.training] if isinstance(self.training, str) else self.training
+        return ", ".join(w if isinstance(w, str) else w.maneuver for w in words)
 
     @property
     def points(self) -> int:
@@ -165,11 +317,9 @@ class StudyFile(FileSchema):
 
     @model_validator(mode="after")
     def _complete(self) -> "StudyFile":
-        if self.protocols and (self.studies or self.model or self.grid or self.methods):
-            raise ValueError("a study of protocols names them and nothing else")
-        if self.studies and (self.model or self.grid or self.methods):
-            raise ValueError("a collection names studies and nothing else")
-        if self.studies or self.protocols:
+        if self.studies:
+            if self.model or self.grid or self.methods:
+                raise ValueError("a collection names studies and nothing else")
             return self
         for name in ("model", "methods"):
             if not getattr(self, name):
@@ -178,10 +328,28 @@ class StudyFile(FileSchema):
         doubles = {label for label in labels if labels.count(label) > 1}
         if doubles:
             raise ValueError(f"label {sorted(doubles)[0]!r} is used twice")
+        if self.bounds:
+            self._check_test()
+            return self
+        given = [name for name in OF_TESTS if name in self.model_fields_set]
+        given += [f"methods.{n}" for e in self.methods for n in OF_ENTRIES & e.model_fields_set]
+        given += ["[[training]]"] * _is_listed(self.training)
+        if given:
+            raise ValueError(f"{given[0]} is of a study with bounds")
         self._set_once()
         if self.points > MOST_POINTS:
             raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
         return self
+
+    def _check_test(self) -> None:
+        for name in SETS[:2]:
+            if not _is_listed(getattr(self, name)):
+                raise ValueError(f"a study with bounds needs [[{name}]]")
+        if not (self.test or self.drawn):
+            raise ValueError("there is nothing to test: neither test nor drawn is given")
+        for name in ("grid", "sampling", "maneuver", "start", "training_set", "parameters"):
+            if getattr(self, name):
+                raise ValueError(f"a study with bounds has no {name}")
 
     def _set_once(self) -> None:
         own = {f"{PARAMETER}{name}" for name in self.parameters}
@@ -208,80 +376,6 @@ def values(entry: Axis) -> list[int | float | str]:
     return list(entry)
 
 
-def named_file(kind: str, folder: str, name: str) -> Path:
-    """Path of a TOML file, given by itself or by the name of one in a folder of the data.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
-    if name.endswith(".toml"):
-        return Path(name)
-    return data_folder() / folder / f"{choice(kind, name, data_names(folder))}.toml"
-
-
-def study_path(study: str) -> Path:
-    """Path of a study: a name from the package's data, or a TOML file."""
-    return named_file("study", "studies", study)
-
-
-def read_study(path: Path) -> StudyFile:
-    """A study file; of a protocol's file the study of it alone."""
-    if not has_table(path, "contestants"):
-        return read_toml(path, StudyFile)
-    title = read_toml(path, ProtocolFile).title
-    return StudyFile.model_validate({"title": title, "protocols": [str(path)]})
-
-
-def load_studies(study: str) -> dict[str, StudyFile]:
-    """Study name -> definition; a collection gives all of its members."""
-    return {name: definition for name, (_, definition) in studies_and_files(study).items()}
-
-
-def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
-    """As `load_studies`, with the files."""
-    path = study_path(study)
-    definition = read_study(path)
-    if not definition.studies:
-        return {path.stem: (path, definition)}
-    members: dict[str, tuple[Path, StudyFile]] = {}
-    for member in definition.studies:
-        file = study_path(member)
-        content = read_study(file)
-        if content.studies:
-            raise FileError(f"{path}: studies.{member} is a collection itself")
-        if content in (other for _, other in members.values()):
-            raise FileError(f"{path}: studies.{member}: the same study is in it already")
-        # As its combined dataset is named, see `combined_path`.
-        double = file.stem in members
-        members[f"{file.stem}-{content_hash(content)}" if double else file.stem] = file, content
-    return members
-
-
-def owner(study: str, path: Path, definition: FileSchema, folder: Path) -> Owner:
-    """Whose a combined dataset in a results folder is.
-
-    Parameters
-    ----------
-    study
-        Name of its results.
-    """
-    return Owner(study, _as_stored(path, folder), content_hash(definition))
-
-
-def content_hash(definition: FileSchema) -> str:
-    """Short hash of what a file says."""
-    text = definition.model_dump_json(exclude_defaults=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:8]
-
-
-def _as_stored(path: Path, folder: Path) -> str:
-    """How results in a folder name the file that they come from: the package's own by its name."""
-    if data_folder() in path.parents:
-        return path.stem
-    try:
-        return os.path.relpath(path.resolve(), folder.resolve())
-    except ValueError:
-        # Another drive, where there are drives.
-        return str(path.resolve())
+def _is_listed(value: object) -> bool:
+    """Whether what is given are scenarios, not names of them."""
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict | Group)

@@ -8,10 +8,9 @@ from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol
+from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, check
 
 # One of `NAMED`, the name of a maneuver, or what is run.
@@ -91,7 +90,7 @@ def _checked(model: Model, scenario: Scenario) -> Scenario:
 
 def _of_protocol(model: str, method: str) -> tuple[Scenario, ...]:
     """What a method learns from in a model's own protocol; nothing if it does not compete."""
-    if model not in data_names("protocols"):
+    if model not in protocol_names():
         return ()
     contestants = _protocol_of(model).contestants
     of_method = (c.training for c in contestants if c.method == method and c.role == CONTENDER)
@@ -100,6 +99,6 @@ def _of_protocol(model: str, method: str) -> tuple[Scenario, ...]:
 
 @cache
 def _protocol_of(model: str) -> Protocol:
-    if model not in data_names("protocols"):
+    if model not in protocol_names():
         raise InputError(f"{model} has no protocol: give a list of maneuvers as training")
-    return load_protocol(model)
+    return load_protocol(protocol_names()[model])

@@ -1,0 +1,78 @@
+"""Study files by name or path: the study itself, or the members of a collection."""
+
+import hashlib
+import os
+from pathlib import Path
+
+from vehiclemor.errors import FileError
+from vehiclemor.registry import choice
+from vehiclemor.resources import data_folder, data_names
+from vehiclemor.study.combined import Owner
+from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.toml_files import FileSchema, read_toml
+
+
+def study_path(study: str) -> Path:
+    """Path of a study: a name from the package's data, or a TOML file.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if study.endswith(".toml"):
+        return Path(study)
+    return data_folder() / "studies" / f"{choice('study', study, data_names('studies'))}.toml"
+
+
+def load_studies(study: str) -> dict[str, StudyFile]:
+    """Study name -> definition; a collection gives all of its members."""
+    return {name: definition for name, (_, definition) in studies_and_files(study).items()}
+
+
+def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
+    """As `load_studies`, with the files."""
+    path = study_path(study)
+    definition = read_toml(path, StudyFile)
+    if not definition.studies:
+        return {path.stem: (path, definition)}
+    members: dict[str, tuple[Path, StudyFile]] = {}
+    for member in definition.studies:
+        file = study_path(member)
+        content = read_toml(file, StudyFile)
+        if content.studies:
+            raise FileError(f"{path}: studies.{member} is a collection itself")
+        if content in (other for _, other in members.values()):
+            raise FileError(f"{path}: studies.{member}: the same study is in it already")
+        # As its combined dataset is named, see `combined_path`.
+        double = file.stem in members
+        members[f"{file.stem}-{content_hash(content)}" if double else file.stem] = file, content
+    return members
+
+
+def owner(study: str, path: Path, definition: FileSchema, folder: Path) -> Owner:
+    """Whose a combined dataset in a results folder is.
+
+    Parameters
+    ----------
+    study
+        Name of its results.
+    """
+    return Owner(study, _as_stored(path, folder), content_hash(definition))
+
+
+def content_hash(definition: FileSchema) -> str:
+    """Short hash of what a file says."""
+    text = definition.model_dump_json(exclude_defaults=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def _as_stored(path: Path, folder: Path) -> str:
+    """How results in a folder name the file that they come from: the package's own by its name."""
+    if data_folder() in path.parents:
+        return path.stem
+    try:
+        return os.path.relpath(path.resolve(), folder.resolve())
+    except ValueError:
+        # Another drive, where there are drives.
+        return str(path.resolve())
