@@ -97,7 +97,7 @@ def maneuver(model: Any, name: str, duration: float, signal: Signal) -> Maneuver
 def main(name: str, count: int, seed: int) -> None:
     """Draw, run, and print how many runs of each kind miss, are silent, and are flagged."""
     protocol, (amplitude, label, candidate) = load_protocol(protocol_names()[name]), VEHICLES[name]
-    contestant = next(c for c in protocol.contestants if c.label == label)
+    contestant = next(c for c in protocol.entries if c.label == label)
     experiment = contestant.experiment(protocol.model, candidate, protocol.sets["validation"])
     model, bounds = cast("Any", model_of(experiment)), protocol.definition.bounds
     reduced = cast("Any", kept_fit(model, experiment))

@@ -52,7 +52,7 @@ def chosen(name: str, results: Path) -> Choice:
     protocol = load_protocol(protocol_names()[name])
     dataset = run_protocol(protocol, results)
     row = dataset.isel(label=int(dataset["winner"].values.argmax()))
-    training = next(c.training for c in protocol.contestants if c.label == row["label"].item())
+    training = next(c.training for c in protocol.entries if c.label == row["label"].item())
     method, settings = str(row["method"].item()), json.loads(str(row["settings"].item()))
     return Choice(protocol, method, settings, training)
 
@@ -61,7 +61,7 @@ def shipped(name: str) -> Choice:
     """What the file of a model says that it was made of."""
     rom, protocol = load(path_of(name)), load_protocol(protocol_names()[name])
     settings, method = dict(rom.settings), rom.method
-    training = next(c.training for c in protocol.contestants if c.method == method)
+    training = next(c.training for c in protocol.entries if c.method == method)
     return Choice(protocol, method, settings, training)
 
 

@@ -55,7 +55,7 @@ def unseen_travels(small_protocol, tmp_path_factory):
 def protocol_results(small, name):
     """Results that a protocol could have: as many rows and outputs, of those of a small one."""
     protocol = load_protocol(name)
-    rows = [(label, c.method, c.role) for c in protocol.contestants for label in c.row_labels]
+    rows = [(label, c.method, c.role) for c in protocol.entries for label in c.row_labels]
     outputs = sorted({*protocol.definition.bounds, *protocol.definition.reported})
     labels, methods, roles = map(list, zip(*rows, strict=True))
     places = {"label": len(rows), "output": len(outputs)}

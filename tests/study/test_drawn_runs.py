@@ -63,7 +63,7 @@ def test_the_test_set_of_every_commit_and_machine(name, first, digest):
 
 
 def test_a_method_more_changes_no_test_run(protocol):
-    fewer = replace(protocol, contestants=protocol.contestants[:1])
+    fewer = replace(protocol, entries=protocol.entries[:1])
     assert drawn_sets(fewer) == drawn_sets(protocol)
     # Nor does a list for other ends strike runs from a draw.
     runs = drawn_sets(protocol)["drawn"]

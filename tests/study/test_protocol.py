@@ -73,7 +73,7 @@ def test_another_speed_is_a_state_and_the_own_speed_a_name():
 
 
 def test_full_order_rows_are_named_after_their_tolerances(protocols):
-    contestants = {c.label: c for c in protocols[VEHICLES[0]].contestants}
+    contestants = {c.label: c for c in protocols[VEHICLES[0]].entries}
     names, tolerances = zip(*map(str.split, contestants["ros34pw2"].row_labels), strict=True)
     assert set(names) == {"ros34pw2"}
     used = [settings["tolerance"] for settings in contestants["ros34pw2"].candidates]
@@ -83,7 +83,7 @@ def test_full_order_rows_are_named_after_their_tolerances(protocols):
 
 
 def test_a_contestant_may_learn_from_some_maneuvers_only(protocols):
-    for contestant in protocols[VEHICLES[1]].contestants:
+    for contestant in protocols[VEHICLES[1]].entries:
         if contestant.label == "fixed basis":
             assert {s.maneuver.name for s in contestant.training} == {"rack_lane_change"}
             assert len(contestant.training) < len(protocols[VEHICLES[1]].sets["training"])

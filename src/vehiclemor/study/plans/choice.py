@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.protocol import Contestant
+from vehiclemor.study.plans.protocol import Entry
 from vehiclemor.study.plans.study_file import Bound
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class Row:
-    """A contestant with the candidate that is reported, and the validation of all candidates.
+    """An entry with the candidate that is reported, and the validation of all candidates.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Row:
         Whether it is the contender that validation has chosen.
     """
 
-    contestant: Contestant
+    entry: Entry
     candidate: int
     validation: tuple[Validation, ...]
     winner: bool = False
@@ -63,7 +63,7 @@ class Row:
     @property
     def label(self) -> str:
         """Label of the row."""
-        return self.contestant.row_label(self.candidate)
+        return self.entry.row_label(self.candidate)
 
 
 def validation_of(dataset: xr.Dataset, bounds: Mapping[str, Bound], count: str) -> Validation:

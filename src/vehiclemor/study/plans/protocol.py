@@ -32,7 +32,7 @@ PREFIX = "predictive-"
 
 
 @dataclass(frozen=True)
-class Contestant:
+class Entry:
     """A method with the settings among which it may choose, and what it may learn from."""
 
     label: str
@@ -54,7 +54,7 @@ class Contestant:
         return [self.row_label(candidate) for candidate in range(len(self.candidates))]
 
     def row_label(self, candidate: int) -> str:
-        """Label of a candidate's row; of a full-order contestant every candidate has its own."""
+        """Label of a candidate's row; of a full-order method every candidate has its own."""
         if self.role != FULL_ORDER:
             return self.label
         tolerance = f"{float(self.candidates[candidate].get('tolerance', 0.0)):.1e}"
@@ -77,7 +77,7 @@ class Protocol:
     definition: StudyFile
     model: Model
     sets: dict[str, tuple[Scenario, ...]]
-    contestants: tuple[Contestant, ...]
+    entries: tuple[Entry, ...]
     seed: int
 
     @property
@@ -133,15 +133,15 @@ def _resolved(path: Path, definition: StudyFile, seed: int) -> Protocol:
     sets = {key: _scenarios(model, key, definition) for key in SETS}
     _check_apart(sets)
     _check_boxes(model, definition)
-    contestants = tuple(_contestant(model, e, sets) for e in definition.methods)
-    labels = [label for contestant in contestants for label in contestant.row_labels]
+    entries = tuple(_entry(model, e, sets) for e in definition.methods)
+    labels = [label for entry in entries for label in entry.row_labels]
     for label in labels:
         if labels.count(label) > 1:
             raise InputError(f"label {label!r} is used twice")
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
         choice("row that a target is against", target.against, known)
-    return Protocol(path, definition, model, sets, contestants, seed)
+    return Protocol(path, definition, model, sets, entries, seed)
 
 
 def _scenarios(model: Model, key: str, definition: StudyFile) -> tuple[Scenario, ...]:
@@ -208,11 +208,11 @@ def _check_corners(model: Model, box: Box) -> None:
                 check(model, Scenario(corner, (box.start or model.starts)[0], speed))
 
 
-def _contestant(
+def _entry(
     model: Model,
     entry: MethodEntry,
     sets: dict[str, tuple[Scenario, ...]],
-) -> Contestant:
+) -> Entry:
     method: Method = component("method", entry.method)
     label = entry.label or entry.method
     where = f"method {label!r}"
@@ -231,4 +231,4 @@ def _contestant(
     for name in learned:
         choice(f"maneuver in the training of {where}", name, known)
     training = tuple(s for s in sets["training"] if not learned or s.maneuver.name in learned)
-    return Contestant(label, entry.method, entry.role, tuple(candidates), training)
+    return Entry(label, entry.method, entry.role, tuple(candidates), training)

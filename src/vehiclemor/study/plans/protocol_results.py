@@ -55,10 +55,10 @@ def protocol_dataset(
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
     dataset = dataset.assign_coords(label=labels)
     per_row: dict[str, list[Any]] = {
-        "role": [row.contestant.role for row in rows],
-        "contestant": [row.contestant.label for row in rows],
+        "role": [row.entry.role for row in rows],
+        "contestant": [row.entry.label for row in rows],
         "winner": [row.winner for row in rows],
-        "method": [row.contestant.method for row in rows],
+        "method": [row.entry.method for row in rows],
         "settings": [_settings(row) for row in rows],
         "cell_keys": [
             json.dumps({purpose: cells[index].attrs["cell"] for purpose, cells in found.items()})
@@ -101,12 +101,12 @@ def judged_part(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _settings(row: Row) -> str:
-    return json.dumps(row.contestant.candidates[row.candidate], sort_keys=True)
+    return json.dumps(row.entry.candidates[row.candidate], sort_keys=True)
 
 
 def _validation(row: Row) -> str:
     """Every candidate's settings and validation result as JSON text; the chosen one is marked."""
-    pairs = zip(row.contestant.candidates, row.validation, strict=True)
+    pairs = zip(row.entry.candidates, row.validation, strict=True)
     content = [
         {"settings": settings, "chosen": index == row.candidate, **_finite(result)}
         for index, (settings, result) in enumerate(pairs)

@@ -22,7 +22,7 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
 from vehiclemor.study.plans.drawn_runs import drawn_sets
 from vehiclemor.study.plans.loading import owner
-from vehiclemor.study.plans.protocol import CONTENDER, FULL_ORDER, Contestant, Protocol
+from vehiclemor.study.plans.protocol import CONTENDER, FULL_ORDER, Entry, Protocol
 from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.sensitive import reasons, second_run
 from vehiclemor.study.plans.study_file import DRAWN, StudyFile
@@ -54,7 +54,7 @@ def run_protocol(
     rows = validate(
         protocol.model,
         protocol.definition,
-        protocol.contestants,
+        protocol.entries,
         protocol.sets["validation"],
         workers,
     )
@@ -83,41 +83,39 @@ def run_protocol(
 def validate(
     model: Model,
     definition: StudyFile,
-    contestants: Sequence[Contestant],
+    entries: Sequence[Entry],
     validation: tuple[Scenario, ...],
     workers: Workers,
 ) -> list[Row]:
     """Fit every candidate on its training, simulate the validation set, choose.
 
-    Of a full-order contestant every candidate becomes a row.
+    Of a full-order method every candidate becomes a row.
     """
-    experiments = [_candidates(model, contestant, validation) for contestant in contestants]
-    # Most candidates of a contestant share a fit.
+    experiments = [_candidates(model, entry, validation) for entry in entries]
+    # Most candidates of an entry share a fit.
     workers(experiments)
     rows: list[Row] = []
-    for contestant, candidates in zip(contestants, experiments, strict=True):
+    for entry, candidates in zip(entries, experiments, strict=True):
         results = tuple(
             validation_of(workers.result(experiment), definition.bounds, model.evaluations)
             for experiment in candidates
         )
-        every = contestant.role == FULL_ORDER
+        every = entry.role == FULL_ORDER
         chosen = range(len(candidates)) if every else [choose(results)]
-        rows += [Row(contestant, candidate, results) for candidate in chosen]
+        rows += [Row(entry, candidate, results) for candidate in chosen]
     return rows
 
 
 def validation_experiments(protocol: Protocol) -> list[Experiment]:
     """What is computed before anything is chosen."""
     validation = protocol.sets["validation"]
-    found = (_candidates(protocol.model, c, validation) for c in protocol.contestants)
+    found = (_candidates(protocol.model, c, validation) for c in protocol.entries)
     return [experiment for candidates in found for experiment in candidates]
 
 
-def _candidates(
-    model: Model, contestant: Contestant, validation: tuple[Scenario, ...]
-) -> list[Experiment]:
-    candidates = range(len(contestant.candidates))
-    return [contestant.experiment(model, candidate, validation) for candidate in candidates]
+def _candidates(model: Model, entry: Entry, validation: tuple[Scenario, ...]) -> list[Experiment]:
+    candidates = range(len(entry.candidates))
+    return [entry.experiment(model, candidate, validation) for candidate in candidates]
 
 
 def test(
@@ -125,7 +123,7 @@ def test(
 ) -> dict[str, list[xr.Dataset]]:
     """Results of the chosen candidates: set -> one dataset for each row."""
     experiments = [
-        [row.contestant.experiment(model, row.candidate, scenarios) for scenarios in sets.values()]
+        [row.entry.experiment(model, row.candidate, scenarios) for scenarios in sets.values()]
         for row in rows
     ]
     workers(experiments)
@@ -148,7 +146,7 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
     path
         Of the combined dataset.
     """
-    racing = [i for i, row in enumerate(rows) if row.contestant.role == CONTENDER]
+    racing = [i for i, row in enumerate(rows) if row.entry.role == CONTENDER]
     results = {i: rows[i].validation[rows[i].candidate] for i in racing}
     if not racing:
         return list(rows)
@@ -196,7 +194,7 @@ def _beside(what: str, path: Path) -> Path:
 
 
 def _experiment(protocol: Protocol, row: Row, scenarios: tuple[Scenario, ...]) -> Experiment:
-    return row.contestant.experiment(protocol.model, row.candidate, scenarios)
+    return row.entry.experiment(protocol.model, row.candidate, scenarios)
 
 
 def _timed(

@@ -92,8 +92,8 @@ def _of_protocol(model: str, method: str) -> tuple[Scenario, ...]:
     """What a method learns from in a model's own protocol; nothing if it does not compete."""
     if model not in protocol_names():
         return ()
-    contestants = _protocol_of(model).contestants
-    of_method = (c.training for c in contestants if c.method == method and c.role == CONTENDER)
+    entries = _protocol_of(model).entries
+    of_method = (c.training for c in entries if c.method == method and c.role == CONTENDER)
     return next(of_method, ())
 
 
