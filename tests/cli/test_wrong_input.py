@@ -230,6 +230,7 @@ PROTOCOLS = {
     "title =": [
         ('targets = [{ against = "me", ratio = 2.0 }]\ntitle =', "target is against"),
         ("rounds = 3\ntitle =", "rounds"),
+        ('keep = "metrics"\ntitle =', "keep"),
     ],
     '"for the tests"': [('""', "title: ''")],
     'label = "newton"': [('label = "a\\nb"', r"label: 'a\nb'")],

@@ -43,7 +43,7 @@ targets = [{ against = "equal accuracy", ratio = 2.0 }]
 failure_rate = 0.01
 methods = [
     { label = "full order", method = "full_order", role = "full order" },
-    { label = "replay", method = "replay", role = "baseline" },
+    { method = "replay", role = "baseline" },
     { label = "mine", method = "quarter_car_modes", candidates = [{ fastest = 1000.0 }] },
 ]
 [[test]]

@@ -82,7 +82,7 @@ def protocol_dataset(
             study=protocol.study,
             model=protocol.model.name,
             evaluations=protocol.model.evaluations,
-            configuration=protocol.definition.model_dump_json(),
+            configuration=protocol.definition.model_dump_json(exclude_defaults=True),
             test_set=protocol.test_set if protocol.definition.drawn else "listed",
         )
     )

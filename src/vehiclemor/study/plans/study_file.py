@@ -26,6 +26,8 @@ DRAWN = ("drawn", "drawn_outside")
 # Keys that go with bounds alone; and of a method.
 OF_TESTS = (*SETS[1:], *DRAWN, "reported", "sensitive", "targets", "failure_rate", "straight")
 OF_ENTRIES = {"candidates", "role"}
+# Keys that go without bounds alone.
+OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "parameters", "keep")
 
 
 class Span(FileSchema):
@@ -347,8 +349,8 @@ class StudyFile(FileSchema):
                 raise ValueError(f"a study with bounds needs [[{name}]]")
         if not (self.test or self.drawn):
             raise ValueError("there is nothing to test: neither test nor drawn is given")
-        for name in ("grid", "sampling", "maneuver", "start", "training_set", "parameters"):
-            if getattr(self, name):
+        for name in OF_GRIDS:
+            if name in self.model_fields_set:
                 raise ValueError(f"a study with bounds has no {name}")
 
     def _set_once(self) -> None:
