@@ -15,7 +15,7 @@ from vehiclemor.cli import main
 from vehiclemor.report.comparison.study import grid_rows
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
-from vehiclemor.report.figures.saving import styled
+from vehiclemor.report.figures.theme import styled
 from vehiclemor.report.page import error_tables
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
@@ -213,8 +213,9 @@ def test_curves_show_every_error_once(place):
     dataset["rms_error"][:, 1, 1] = dataset["rms_error"][:, 0, 1]
     figure = plot_result(dataset, None, "errors")
     axis = figure.axes[0]
-    lines = {line.get_label(): line for line in axis.lines if line.get_xdata().size}
-    assert set(lines) == {"POD, rank 2", "POD, rank 3", "my own method"}
+    lines = {line.get_label(): line for line in axis.lines if np.size(line.get_xdata())}
+    own = {"POD, rank 2", "POD, rank 3", "my own method"}
+    assert set(lines) == own | {"published, nominal"}
     for rank_ in (2, 3):
         place = {"label": "pod", "rank": rank_, "output": "second_euler_angle"}
         line = lines[f"POD, rank {rank_}"]

@@ -11,8 +11,8 @@ from tests.report import endings
 from tests.report.figure_texts import check_texts
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
-from vehiclemor.report.figures import result_plot, saving
-from vehiclemor.report.figures.curves import PATH
+from vehiclemor.report.figures import result_plot, theme
+from vehiclemor.report.figures.runs import PATH
 from vehiclemor.study.netcdf_file import read_dataset
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
@@ -59,7 +59,7 @@ def results(tmp_path_factory):
     (folder / "collection.toml").write_text(f'title = "c"\nstudies = {members}\n')
     with pytest.MonkeyPatch.context() as patch:
         endings.register(patch)
-        patch.setattr(saving, "FORMATS", ("png",))
+        patch.setattr(theme, "FORMATS", ("png",))
         # Cells with the status error are told of.
         assert main(["run", str(folder / "collection.toml"), "--out", str(folder)]) == 1
         yield folder

@@ -12,7 +12,7 @@ from vehiclemor.cli import main
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import legend, nominal, unseen
 from vehiclemor.report.errors import study_tables
-from vehiclemor.report.figures import saving
+from vehiclemor.report.figures import theme
 from vehiclemor.report.shown import tabled_outputs, timing_cases
 from vehiclemor.report.tables import model_tables
 
@@ -73,7 +73,7 @@ def test_comparison_names_every_method(folder, capsys):
 
 def test_figures_are_those_of_every_model(folder, tmp_path, capsys, monkeypatch):
     # One picture of each figure is enough here.
-    monkeypatch.setattr(saving, "FORMATS", ("png",))
+    monkeypatch.setattr(theme, "FORMATS", ("png",))
     names = [f"{kind}-{CAR}" for kind in ("histories", "errors", "map", "pareto")]
     arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", ",".join(names)]
     assert main(["figures", *arguments]) == 0

@@ -13,7 +13,7 @@ from tests.plugin.installation import installed
 from tests.texts.markdown import NAMES, ROOT, TEXTS, blocks, console_commands, inline_commands
 from vehiclemor.cli.app import app, main
 from vehiclemor.report.citation import citations
-from vehiclemor.report.figures import saving
+from vehiclemor.report.figures import theme
 from vehiclemor.report.published import load_published
 from vehiclemor.study.plans.loading import study_path
 
@@ -117,7 +117,7 @@ def test_the_example_study_runs(here, capsys):
 
 def test_a_plug_in_is_made_step_by_step(here, capsys, monkeypatch):
     # One picture of each figure is enough here.
-    monkeypatch.setattr(saving, "FORMATS", ("png",))
+    monkeypatch.setattr(theme, "FORMATS", ("png",))
     first, *rest = console_commands(PLUG_IN)
     assert main(first[1:]) == 0
     (code,) = [b.content for b in blocks(PLUG_IN) if b.language == "python" and b.above[:1] != "`"]

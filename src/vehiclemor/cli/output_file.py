@@ -14,7 +14,7 @@ def picture_file(option: str, given: Sequence[Path], default: str) -> Path:
     InputError
         If several were given, or the one can't be written as a picture.
     """
-    from vehiclemor.report.figures.saving import FORMATS
+    from vehiclemor.report.figures.theme import FORMATS
 
     if len(given) > 1:
         raise InputError(f"{option}: one file, not {len(given)}")

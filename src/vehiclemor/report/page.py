@@ -19,10 +19,10 @@ from vehiclemor.registry import names
 from vehiclemor.report.comparison.paper import paper_comparison
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.errors import counted_ends, flat, warned_runs
-from vehiclemor.report.figures.curves import PATH
 from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
-from vehiclemor.report.figures.saving import METADATA, styled
+from vehiclemor.report.figures.runs import PATH
+from vehiclemor.report.figures.theme import METADATA, styled
 from vehiclemor.report.labels import TRAINED, trained_runs, unit_of
 from vehiclemor.report.predictive.rows import protocol_rows
 from vehiclemor.report.result_selection import drawn

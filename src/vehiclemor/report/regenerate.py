@@ -20,79 +20,6 @@ if TYPE_CHECKING:
     from vehiclemor.report.figures.catalogue import Entry
 
 
-def regenerate_figures(
-    results: Path,
-    out: Path,
-    only: Sequence[str] = (),
-    jobs: int = 1,
-    *,
-    style: str = "",
-    dpi: int | None = None,
-) -> tuple[list[Path], dict[str, str]]:
-    """Draw figures, by default all but those `left_out`, and an index of captions.
-
-    Studies that the results folder lacks are run, but for those of minutes: see `left_out`.  Gives
-    the files that were written, and figures that could not be drawn -> why: they stop no other.
-
-    Parameters
-    ----------
-    style, dpi
-        Name or file of a Matplotlib style on top of the package's, and dots an inch of pictures.
-
-    Raises
-    ------
-    InputError, FileError
-        If a name is unknown or a folder can't be written.
-    """
-    from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
-    from vehiclemor.report.figures.saving import FORMATS, styled
-
-    # What is wrong is named before anything is computed.
-    styled(style, dpi)
-    jobs = count("jobs", jobs)
-    missing = left_out(results)
-    wanted = only or [name for name in FIGURES if name not in missing]
-    chosen = {entry.name: entry for name in wanted for entry in find(name, results)}
-    make_folder(out)
-    data: dict[str, xr.Dataset] = {}
-    for entry in chosen.values():
-        for study in entry.studies:
-            if (only or entry.default) and not data.keys() >= set(entry.names):
-                data |= run_studies(study, results, jobs)
-    written: list[Path] = []
-    failed: dict[str, str] = {}
-    index = ["# Figures", "", PARAMETERS, ""]
-    for name, entry in chosen.items():
-        stored = {} if only or entry.default else {n: _stored(results, n) for n in entry.names}
-        pictures = [out / f"figure-{name}.{suffix}" for suffix in FORMATS]
-        with styled(style, dpi):
-            caption = attempt_apart(name, failed, partial(_drawn, entry, data, stored, pictures))
-        index += [f"- figure-{name}: {text}" for text in caption]
-        written += pictures if caption else []
-        if stored and not caption:
-            # Perhaps by other source.
-            failed[name] += f"; vehiclemor figures --only {name} makes its study again"
-    if not only:
-        written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
-    return written, failed
-
-
-def _drawn(
-    entry: Entry, data: dict[str, xr.Dataset], stored: dict[str, Path], files: list[Path]
-) -> str:
-    """Draw a figure of datasets or of those that are stored; its caption and where it is from."""
-    from vehiclemor.report.figures.saving import save_figure
-
-    data = data | {name: read_dataset(path, "study", name) for name, path in stored.items()}
-    figure = entry.draw(data)
-    for path in files:
-        save_figure(figure, path)
-    if not entry.studies:
-        return entry.caption
-    hashes = sorted({str(data[name].attrs["kernel_hash"]) for name in entry.names})
-    return f"{entry.caption} Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
-
-
 def figures(
     only: Sequence[str] = (),
     out: str | Path = "results",
@@ -138,16 +65,73 @@ def figures(
     return written
 
 
+def regenerate_figures(
+    results: Path,
+    out: Path,
+    only: Sequence[str] = (),
+    jobs: int = 1,
+    *,
+    style: str = "",
+    dpi: int | None = None,
+) -> tuple[list[Path], dict[str, str]]:
+    """As `figures`: files that were written, and figures that could not be drawn -> why.
+
+    By default all are drawn but those `left_out`, and an index of captions is written.
+    """
+    from vehiclemor.report.figures.catalogue import FIGURES, PARAMETERS, find
+    from vehiclemor.report.figures.theme import FORMATS, styled
+
+    # What is wrong is named before anything is computed.
+    styled(style, dpi)
+    jobs = count("jobs", jobs)
+    missing = left_out(results)
+    wanted = only or [name for name in FIGURES if name not in missing]
+    chosen = {entry.name: entry for name in wanted for entry in find(name, results)}
+    make_folder(out)
+    data: dict[str, xr.Dataset] = {}
+    for entry in chosen.values():
+        for study in entry.studies if only or entry.default else ():
+            if not data.keys() >= set(entry.names):
+                data |= run_studies(study, results, jobs)
+    written: list[Path] = []
+    failed: dict[str, str] = {}
+    index = ["# Figures", "", PARAMETERS, ""]
+    for name, entry in chosen.items():
+        files = [out / f"figure-{name}.{suffix}" for suffix in FORMATS]
+        with styled(style, dpi):
+            caption = attempt_apart(name, failed, partial(_draw, entry, data, results, files))
+        index += [f"- figure-{name}: {text}" for text in caption]
+        written += files if caption else []
+        if not (caption or only or entry.default):
+            # Perhaps by other source.
+            failed[name] += f"; vehiclemor figures --only {name} makes its study again"
+    if not only:
+        written.append(write_text(out / "figures.md", "\n".join(index) + "\n"))
+    return written, failed
+
+
+def _draw(entry: Entry, data: dict[str, xr.Dataset], results: Path, files: list[Path]) -> str:
+    """Draw a figure of datasets, or of what is stored; its caption and where it is from."""
+    from vehiclemor.report.figures.theme import save_figure
+
+    stored = [name for name in entry.names if name not in data]
+    read = {name: read_dataset(_stored(results, name), "study", name) for name in stored}
+    shown = data | read
+    figure = entry.draw(shown)
+    for path in files:
+        save_figure(figure, path)
+    if not entry.studies:
+        return entry.caption
+    hashes = sorted({str(shown[name].attrs["kernel_hash"]) for name in entry.names})
+    return f"{entry.caption} Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
+
+
 def left_out(results: Path) -> dict[str, str]:
     """Figures that are drawn only where their study is stored, and which study isn't."""
     from vehiclemor.report.figures.catalogue import FIGURES
 
-    return {
-        name: study
-        for name, entry in FIGURES.items()
-        for study in entry.names
-        if not entry.default and not _stored(results, study).exists()
-    }
+    optional = [(name, study) for name, e in FIGURES.items() if not e.default for study in e.names]
+    return {name: study for name, study in optional if not _stored(results, study).exists()}
 
 
 def _stored(results: Path, study: str) -> Path:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 KINDS = ("histories", "paths", "errors")
+# Values of a dimension that an error lists.
+MOST_NAMED = 12
 
 
 def stored_result(name: str, results: Path) -> xr.Dataset:
@@ -68,10 +73,13 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
         if dimension == "label" and dimension not in chosen:
             continue
         default = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
-        value = chosen.get(dimension, default)
-        if value not in values:
-            raise InputError(f"{dimension} {value!r}; it has {', '.join(map(str, values))}")
-        dataset = dataset.isel({dimension: values.index(value)})
+        value: Any = chosen.get(dimension, default)
+        # An array equals no value.
+        places = [k for k, known in enumerate(values) if np.array_equal([known], [value])]
+        if not places:
+            known = ", ".join(map(str, values[:MOST_NAMED])) + ", ..." * (len(values) > MOST_NAMED)
+            raise InputError(f"{dimension} is {quoted(value)}, not one of {known}")
+        dataset = dataset.isel({dimension: places[0]})
         if len(values) > 1:
             words.append(f"{dimension} {value}")
     return dataset, ", ".join(words)

@@ -1,4 +1,4 @@
-"""Which figures there are: those of `figures.toml`, and a set for every registered model."""
+"""Which figures there are: those of `figures.toml`, of every registered model, of any study."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -8,23 +8,8 @@ from pydantic import Field
 
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import (
-    equation_order,
-    error_map,
-    high_fidelity_schematic,
-    histories,
-    pareto,
-    paths,
-    perturbations,
-    result_plot,
-    spectrum,
-    spread,
-    suspension_schematic,
-    unseen,
-    vehicle_schematic,
-)
-from vehiclemor.report.figures.curves import PATH
-from vehiclemor.report.figures.lines import Results
+from vehiclemor.report.figures import errors, paper, pareto, result_plot, runs, schematics
+from vehiclemor.report.figures.theme import Results
 from vehiclemor.report.shown import main_outputs
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
@@ -33,20 +18,36 @@ from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
 DRAWINGS: dict[str, Callable[..., Figure]] = {
-    "suspension schematic": suspension_schematic.figure_suspension,
-    "vehicle schematic": vehicle_schematic.figure_vehicle,
-    "high-fidelity schematic": high_fidelity_schematic.figure_vehicle,
-    "paths": paths.figure_paths,
-    "replayed paths": paths.figure_replayed_paths,
-    "histories": histories.figure_histories,
-    "error curves": perturbations.figure_error_curves,
-    "error map": error_map.figure_error_map,
-    "spread": spread.figure_spread,
-    "spectrum": spectrum.figure_spectrum,
-    "unseen inputs": unseen.figure_unseen,
-    "equation order": equation_order.figure_equation_order,
+    "suspension schematic": schematics.figure_suspension,
+    "vehicle schematic": schematics.figure_vehicle,
+    "high-fidelity schematic": schematics.figure_high_fidelity,
+    "histories": runs.figure_histories,
+    "paths": runs.figure_paths,
+    "errors": errors.figure_errors,
+    "spread": paper.figure_spread,
+    "spectrum": paper.figure_spectrum,
+    "unseen inputs": paper.figure_unseen,
+    "equation order": paper.figure_equation_order,
     "pareto": pareto.figure_pareto,
     "result": result_plot.figure_result,
+}
+MOST_OUTPUTS = 4
+# Kind of the figures that every model has -> drawing, study, caption, its rows of panels.
+OF_A_MODEL: Mapping[str, tuple[str, Callable[[str, Path], str], str, dict[str, object]]] = {
+    "histories": (
+        "histories",
+        default_studies.nominal,
+        "nominal run, as trained",
+        {"rows": ["history"]},
+    ),
+    "errors": (
+        "histories",
+        default_studies.nominal,
+        "errors of the nominal run",
+        {"rows": ["largest error"]},
+    ),
+    "map": ("errors", default_studies.perturbed, "errors at perturbed, untrained inputs", {}),
+    "pareto": ("pareto", default_studies.unseen, "error on unseen inputs over time", {}),
 }
 
 
@@ -100,16 +101,6 @@ PARAMETERS = _FILE.parameters
 FIGURES: Mapping[str, Entry] = {entry.name: entry for entry in _FILE.figures}
 
 
-MOST_OUTPUTS = 4
-# Kind -> drawing, what its panels show, study, caption.
-OF_A_MODEL: Mapping[str, tuple[str, str, Callable[[str, Path], str], str]] = {
-    "histories": ("histories", "history", default_studies.nominal, "nominal run, as trained"),
-    "errors": ("histories", "largest error", default_studies.nominal, "errors of the nominal run"),
-    "map": ("error map", "", default_studies.perturbed, "errors at perturbed, untrained inputs"),
-    "pareto": ("pareto", "", default_studies.unseen, "error on unseen inputs over time"),
-}
-
-
 def find(name: str, results: Path) -> list[Entry]:
     """The figure of a name such as `6`, or `histories-<model>`, or all figures of a study.
 
@@ -123,11 +114,8 @@ def find(name: str, results: Path) -> list[Entry]:
     if name in FIGURES:
         return [FIGURES[name]]
     if name.endswith(".toml") or name in data_names("studies"):
-        return [
-            e
-            for study, found in studies_and_files(name).items()
-            for e in _of_a_study(study, *found)
-        ]
+        members = studies_and_files(name).items()
+        return [entry for member, found in members for entry in _of_a_study(member, *found)]
     kind, _, model = name.partition("-")
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
@@ -137,46 +125,40 @@ def find(name: str, results: Path) -> list[Entry]:
 
 def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
     """What a study lets be drawn: of a protocol the errors over the times."""
+    # Name -> drawing, what is shown, options.
+    found: dict[str, tuple[str, str, dict[str, object]]] = {}
     file = path.stem if data_folder() in path.parents else str(path)
     if study.bounds:
-        return [
-            Entry(
-                name=f"{name}-pareto",
-                draw="pareto",
-                studies=[file],
-                datasets=[name],
-                caption=f"{study.title}: worst error on unseen inputs over the time of a call.",
-                options={"titled": True},
-            )
-        ]
-    kinds = {"errors": "errors over what is varied"}
-    if study.keep == "trajectories":
+        words = "worst error on unseen inputs over the time of a call"
+        found[f"{name}-pareto"] = "pareto", words, {"titled": True}
+    kinds = {} if study.bounds else {"errors": "errors over what is varied"}
+    if kinds and study.keep == "trajectories":
         kinds["histories"] = "outputs and errors over the time"
-        if {output.name for output in component("model", study.model).outputs} >= set(PATH):
+        if {output.name for output in component("model", study.model).outputs} >= set(runs.PATH):
             kinds["paths"] = "paths in the plane"
+    for kind, words in kinds.items():
+        found[f"{name}-{kind}"] = "result", words, {"kind": kind}
     return [
         Entry(
-            name=f"{name}-{kind}",
-            draw="result",
+            name=figure,
+            draw=drawing,
             studies=[file],
+            datasets=[name],
             caption=f"{study.title}: {words}.",
-            options={"kind": kind},
+            options=options,
         )
-        for kind, words in kinds.items()
+        for figure, (drawing, words, options) in found.items()
     ]
 
 
 def _of_a_model(kind: str, model: str, results: Path) -> Entry:
     """One of the figures that every model has, of all registered methods."""
-    drawing, content, study, caption = OF_A_MODEL[kind]
-    outputs = list(main_outputs(component("model", model)))[:MOST_OUTPUTS]
+    drawing, study, caption, rows = OF_A_MODEL[kind]
     methods = default_studies.legend(model)
-    options: dict[str, object] = {"outputs": outputs, "methods": methods}
-    if drawing == "histories":
-        options |= {"rows": [content], "height": 1.4 + 1.8 * len(outputs)}
-    elif drawing == "error map":
-        options["values"] = True
-        options["methods"] = {k: text for k, text in methods.items() if k != "pod_literal"}
+    if kind == "map":
+        methods.pop("pod_literal", None)
+    outputs = list(main_outputs(component("model", model)))[:MOST_OUTPUTS]
+    options: dict[str, object] = {"outputs": outputs, "methods": methods} | rows
     return Entry(
         name=f"{kind}-{model}",
         draw=drawing,

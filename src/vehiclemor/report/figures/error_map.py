@@ -1,82 +1,75 @@
-"""Errors of any model over two dimensions of a study's grid, one column for each method."""
+"""Errors over two dimensions of a study's grid, as cells in colours."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
-from matplotlib.colors import Colormap, LogNorm
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
-from vehiclemor.report.figures.lines import CROSS, Results, Style, letter, panels
-from vehiclemor.report.figures.places import places_of, tick_decades
+from vehiclemor.report.figures.scales import places_of, tick_decades
+from vehiclemor.report.figures.theme import CROSS, Style, letter, panels
 from vehiclemor.report.labels import error_label, readable_unit, unit_of
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.study.plans.study_file import FACTORS
 
-# Most columns; points of a contour in a cell, and cells that it must enclose.
-COLUMNS, FINE, ENCLOSED = 3, 8, 4
+# Columns of maps, cells of a map with their number, points of a contour in a cell, and cells that
+# it must enclose.
+COLUMNS, WRITTEN, FINE, ENCLOSED = 3, 100, 8, 4
 
 
-def figure_error_map(
-    results: Results,
-    *,
-    outputs: Sequence[str],
+def figure_map(
+    dataset: xr.Dataset,
+    errors: xr.DataArray,
     methods: Mapping[str, str],
-    values: bool = False,
-    axes: tuple[str, str] = FACTORS,
+    outputs: Sequence[str],
+    axes: Sequence[str],
 ) -> Figure:
-    """RMS errors over two dimensions, one column for each method; crosses where a run has failed.
+    """Errors over two dimensions (across and upwards), a column for each method.
 
-    Parameters
-    ----------
-    outputs
-        One row of panels each.  A published number is drawn as a white line.
-    methods
-        Label of a method in the study -> title of its column.
-    values
-        Write the error into each cell instead; the colours then leave the nominal input out,
-        whose error is far below all others.
-    axes
-        Dimensions, across and upwards: by default the perturbations.
+    Of few cells each has its number, and colours leave the nominal input out, whose error is far
+    below all others; of many a white line is where the error is the published one.
     """
-    (dataset,) = results.values()
+    errors = errors.transpose("output", "label", *reversed(axes))
     each = -(-len(methods) // COLUMNS)
     columns = -(-len(methods) // each)
-    size = (3.35 * columns, 2.8 * each * len(outputs))
+    size = 3.35 * columns, 2.8 * each * len(outputs) + 0.3
     figure, grid = panels(each * len(outputs), columns, size, sharex=True, sharey=True)
-    published = rms_numbers(str(dataset.attrs["model"]))
     across, up = (places_of(dataset, name).even() for name in axes)
+    written = across.at.size * up.at.size <= WRITTEN
     nominal = np.isclose(up.at, 0.0)[:, None] & np.isclose(across.at, 0.0)
-    nominal &= tuple(axes) == FACTORS
+    nominal &= written and tuple(axes) == FACTORS
     spare: list[Axes] = []
     for row, output in enumerate(outputs):
         block = grid[row * each : (row + 1) * each]
-        errors = np.array([_errors(dataset, method, output, axes) for method in methods])
-        shown = errors[:, ~nominal] if values else errors
-        shown = shown[np.isfinite(shown) & (shown > 0.0)]
+        found = errors.sel(output=output, label=list(methods)).values
+        colored = found[:, ~nominal]
+        colored = colored[np.isfinite(colored) & (colored > 0.0)]
         # A map on which nothing differs from zero, or nothing has come to its end, is still one.
-        shown = shown if shown.size else np.array([1.0, 10.0])
+        colored = colored if colored.size else np.array([1.0, 10.0])
         factor, unit = 1.0, unit_of(dataset, output)
-        if values:
-            factor, unit = readable_unit(float(np.median(shown)), unit)
-        limits = factor * float(shown.min()), factor * float(shown.max())
-        bound = published[output].value if output in published and not values else None
-        for axis, found in zip(block.flat, factor * errors, strict=False):
-            mesh = _draw(axis, (across.at, up.at), found, LogNorm(*limits))
-            if values:
-                _write(axis, (across.at, up.at), found, (mesh.get_cmap(), LogNorm(*limits)))
-            elif bound is not None and np.isfinite(found).all():
-                _outline(axis, across.at, up.at, np.maximum(found, limits[0]), bound)
-        label = error_label(dataset, "RMS error", output, unit)
-        extend = "min" if values and nominal.any() else None
-        bar = figure.colorbar(block[0, 0].collections[0], ax=block, label=label, extend=extend)
+        if written:
+            factor, unit = readable_unit(float(np.median(colored)), unit)
+        limits = factor * float(colored.min()), factor * float(colored.max())
+        published = rms_numbers(str(dataset.attrs["model"])).get(output)
+        for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
+            values = factor * found[number]
+            _draw_cells(axis, (across.at, up.at), values, LogNorm(*limits), written=written)
+            if published and not written and np.isfinite(values).all():
+                outlined = np.maximum(values, limits[0])
+                _outline(axis, (across.at, up.at), outlined, published.value)
+            axis.set_title(letter(row * len(methods) + number, text))
+        bar = figure.colorbar(
+            block[0, 0].collections[0],
+            ax=block,
+            label=error_label(dataset, "RMS error", output, unit),
+            extend="min" if nominal.any() else None,
+        )
         tick_decades(bar.ax.yaxis, *limits)
         for axis in block[:, 0]:
             up.tick(axis.yaxis)
-        for number, text in enumerate(methods.values()):
-            block.flat[number].set_title(f"{letter(row * len(methods) + number)} {text}")
         spare += block.flat[len(methods) :].tolist()
     for axis in grid.flat if each > 1 else grid[-1]:
         across.tick(axis.xaxis)
@@ -87,38 +80,34 @@ def figure_error_map(
     return figure
 
 
-def _draw(
-    axis: Axes, places: tuple[np.ndarray, np.ndarray], values: np.ndarray, norm: LogNorm
-) -> QuadMesh:
-    """Cells in colours; a run that has failed has none, and a cross."""
+def _draw_cells(
+    axis: Axes,
+    places: tuple[np.ndarray, np.ndarray],
+    values: np.ndarray,
+    norm: LogNorm,
+    *,
+    written: bool,
+) -> None:
+    """Cells in colours, with their numbers if `written`; a run that has failed has a cross."""
     cells = np.where(np.isfinite(values), np.maximum(values, norm.vmin or 0.0), np.nan)
     style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
     mesh = axis.pcolormesh(*places, cells, norm=norm, **style)
     j, i = np.nonzero(~np.isfinite(values))
     axis.plot(places[0][i], places[1][j], color="#D55E00", **CROSS)
     axis.grid(visible=False)
-    return mesh
+    for j, i in np.argwhere(np.isfinite(values)) if written else ():
+        # Black or white, whichever has more contrast.
+        lightness = luminance(mesh.get_cmap()(norm(cells[j, i]))[:3])
+        color = "white" if 1.05 / (lightness + 0.05) > (lightness + 0.05) / 0.05 else "black"
+        text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
+        axis.text(float(places[0][i]), float(places[1][j]), two_digits(float(values[j, i])), **text)
 
 
-def _errors(dataset: xr.Dataset, method: str, output: str, axes: tuple[str, str]) -> np.ndarray:
-    """RMS errors (upwards, across)."""
-    chosen = dataset["rms_error"].sel(label=method, output=output)
-    return chosen.squeeze(drop=True).transpose(*reversed(axes)).values
-
-
-def _outline(
-    axis: Axes, frequency: np.ndarray, amplitude: np.ndarray, values: np.ndarray, bound: float
-) -> None:
-    """Where the error has a value: its logarithm is interpolated between the cells."""
-    from scipy.interpolate import RectBivariateSpline
-
-    if np.sum(values < bound) < ENCLOSED:
-        return
-    fine = [np.linspace(a[0], a[-1], FINE * len(a)) for a in (amplitude, frequency)]
-    degrees = {f"k{axis}": min(2, n - 1) for axis, n in zip("xy", values.shape, strict=True)}
-    smooth = RectBivariateSpline(amplitude, frequency, np.log(values), **degrees)(*fine)
-    lines: Style = {"colors": "white", "linewidths": 1.2, "linestyles": "solid"}
-    axis.contour(fine[1], fine[0], smooth, levels=[np.log(bound)], **lines)
+def luminance(color: ArrayLike) -> float:
+    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
+    parts = np.asarray(color, dtype=float)
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def two_digits(value: float) -> str:
@@ -130,25 +119,16 @@ def two_digits(value: float) -> str:
     return f"{value:.{max(0, decimals)}f}"
 
 
-def _write(
-    axis: Axes,
-    places: tuple[np.ndarray, np.ndarray],
-    values: np.ndarray,
-    colors: tuple[Colormap, LogNorm],
+def _outline(
+    axis: Axes, places: tuple[np.ndarray, np.ndarray], values: np.ndarray, bound: float
 ) -> None:
-    """Errors with two digits, in black or white, whichever has more contrast with the cell."""
-    paint, norm = colors
-    for (j, i), value in np.ndenumerate(values):
-        if not np.isfinite(value):
-            continue
-        lightness = luminance(paint(norm(max(value, norm.vmin or 0.0)))[:3])
-        color = "white" if 1.05 / (lightness + 0.05) > (lightness + 0.05) / 0.05 else "black"
-        style: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
-        axis.text(float(places[0][i]), float(places[1][j]), two_digits(float(value)), **style)
+    """Where the error has a value: its logarithm is interpolated between the cells."""
+    from scipy.interpolate import RectBivariateSpline
 
-
-def luminance(color: Sequence[float]) -> float:
-    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
-    parts = np.asarray(color, dtype=float)
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
+    if np.sum(values < bound) < ENCLOSED:
+        return
+    across, up = (np.linspace(a[0], a[-1], FINE * len(a)) for a in places)
+    ky, kx = (min(2, n - 1) for n in values.shape)
+    spline = RectBivariateSpline(places[1], places[0], np.log(values), kx=ky, ky=kx)
+    lines: Style = {"colors": "white", "linewidths": 1.2, "linestyles": "solid"}
+    axis.contour(across, up, spline(up, across), levels=[np.log(bound)], **lines)

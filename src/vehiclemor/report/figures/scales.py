@@ -1,4 +1,4 @@
-"""Where the values of a grid's dimension stand on an axis, and how that axis is labelled."""
+"""Where values stand on an axis: those of a grid's dimension, and the ticks of errors."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -87,3 +87,10 @@ def tick_decades(
         powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
         axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
         axis.set_minor_formatter(NullFormatter())
+
+
+def hide_rounding(axis: Axes) -> None:
+    """A logarithmic axis ends six decades below its largest value."""
+    low, high = axis.get_ylim()
+    if axis.get_yscale() == "log":
+        axis.set_ylim(max(low, 1e-6 * high), high)

@@ -1,0 +1,189 @@
+"""Figures that one question asks for: unseen inputs, rounding, order of equations, spectrum."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from vehiclemor.report.figures.error_map import two_digits
+from vehiclemor.report.figures.errors import draw_band, draw_errors, scale_errors
+from vehiclemor.report.figures.runs import END, Runs, draw_history, draw_paths, runs_of
+from vehiclemor.report.figures.theme import (
+    THIN,
+    Results,
+    Style,
+    legend_below,
+    letter,
+    panels,
+    styles,
+)
+from vehiclemor.report.labels import error_label, readable_unit
+from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.spectrum import spectrum
+
+# Of the largest errors, in m; shorter bars could not be seen.
+SHORTEST, LONGEST = 1e-3, 60.0
+# Below it nobody measures, in m.
+MEASURABLE = 1e-4
+ANGLE = "second_euler_angle"
+VARIANTS = {
+    "pod_literal": "Galerkin",
+    "pod_literal_reversed_arms": "Galerkin, arm angles reversed",
+}
+# Variable -> label, and values that are nothing but rounding of the largest.
+SPECTRA = {
+    "singular_value": ("singular value\n/ largest", 1e-16),
+    "left_out": ("energy left out\n/ energy (eq. 8)", 1e-32),
+}
+PRESETS = {"recommended": "default settings", "literal": "literal"}
+
+
+def figure_unseen(
+    results: Results, *, methods: Mapping[str, str], inputs: Mapping[str, float], shown: float
+) -> Figure:
+    """A column for each input: paths above, largest lateral errors below.
+
+    Parameters
+    ----------
+    methods
+        Label in any of the studies -> text.
+    inputs
+        Title of a column -> amplitude factor.
+    shown
+        Length in m.
+    """
+    heights = {"height_ratios": [2.0, 1.0]}
+    figure, axes = panels(2, len(inputs), (8.0, 4.4), sharey="row", gridspec_kw=heights)
+    for (upper, lower), (title, amplitude) in zip(axes.T, inputs.items(), strict=True):
+        found: list[Runs] = []
+        for dataset in results.values():
+            held = {m: t for m, t in methods.items() if m in dataset["label"].values}
+            found.append(runs_of(dataset.sel(amplitude_factor=amplitude), held))
+        curves = {curve.label: curve for runs in found for curve in runs.curves}
+        looks = styles(methods)
+        ordered = [curves[label]._replace(style=looks[label]) for label in methods]
+        runs = Runs(found[0].full, ordered)
+        draw_paths(upper, runs)
+        _draw_bars(lower, runs)
+        upper.set_title(title)
+        upper.set_xlim(0.0, shown)
+        upper.set_xlabel("X (m)")
+        lower.set_xlabel("largest error of Y (m)")
+    axes[0, 0].set_ylabel("Y (m), not to scale")
+    legend_below(figure, [axes[0, 0]])
+    return figure
+
+
+def _draw_bars(axis: Axes, runs: Runs) -> None:
+    """Largest lateral error of each reduced model, in numbers too, on a logarithmic axis."""
+    for place, curve in enumerate(runs.curves):
+        error = curve.run["max_error"].sel(output="lateral_position").item()
+        end = max(error, SHORTEST)
+        axis.barh(place, end - SHORTEST, left=SHORTEST, height=0.6, color=curve.style["color"])
+        factor, unit = readable_unit(error, "m")
+        words = f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
+        axis.annotate(words, (end, place), (4, 0), textcoords="offset points", va="center")
+    axis.set_yticks(range(len(runs.curves)), [curve.text for curve in runs.curves])
+    axis.set_ylim(len(runs.curves) - 0.5, -0.5)
+    axis.set_xscale("log")
+    axis.set_xlim(SHORTEST, LONGEST)
+    axis.set_xticks([1e-3, 1e-1, 1e1], ["0.001", "0.1", "10"])
+    axis.minorticks_off()
+    axis.grid(visible=False, axis="y")
+
+
+def figure_spread(results: Results) -> Figure:
+    """Figure 14, frequency +100 %: three states above; four, and six with their spread, below."""
+    dataset, spread = results["figure-14"], results["figure-14-spread"]
+    above = {"pod": "r = 3 (least squares)", "pod_literal": "r = 3 (literal)", "replay": "replay"}
+    three = runs_of(dataset.sel(rank=3), above)
+    below = {"pod_uncut": "r = 6 (least squares)", "pod_literal": "r = 6 (literal)"}
+    four = runs_of(dataset.sel(rank=4), {"pod": "r = 4 (least squares)"}).curves
+    six = runs_of(spread.sel(rank=6, rounding_seed=0), below).curves
+    looks = styles(["pod_state", "pod", "pod_literal"]).values()
+    lines = [c._replace(style=look) for c, look in zip([*four, *six], looks, strict=True)]
+    figure, axes = panels(2, 1, (6.7, 5.4), sharex=True)
+    scale = float(abs(three.full["reference_outputs"].sel(output=ANGLE)).max())
+    factor, _ = readable_unit(scale, "rad")
+    titles = ("three states", "four and six states")
+    for number, (axis, curves) in enumerate(zip(axes.flat, (three.curves, lines), strict=True)):
+        draw_history(axis, Runs(three.full, curves), ANGLE, scale)
+        axis.axvline(5.0, **END)
+        axis.set_title(letter(number, titles[number]))
+    lower = axes[1, 0]
+    low, high = lower.get_ylim()
+    for label, line in zip(below, lines[1:], strict=True):
+        found = spread["outputs"].sel(label=label, rank=6, output=ANGLE).squeeze(drop=True)
+        values = factor * found.transpose("rounding_seed", "time").values
+        band: Style = {"color": line.style["color"], "alpha": 0.3, "linewidth": 0.0}
+        text = f"{line.text}, 21 roundings"
+        lower.fill_between(
+            found["time"], *(f(values, axis=0) for f in (np.nanmin, np.nanmax)), label=text, **band
+        )
+    margin = 0.35 * (high - low)
+    lower.set_ylim(low - margin, high + margin)
+    lower.set_xlabel("time (s)")
+    lower.set_xlim(0.0, float(dataset["time"][-1]))
+    legend_below(figure, axes.flat)
+    return figure
+
+
+def figure_equation_order(results: Results) -> Figure:
+    """Sorted errors of all variants of the same equations; what has diverged above the axes."""
+    dataset, nominal = results["equation-order"], results["figures-6-7"]
+    numbers = rms_numbers(str(dataset.attrs["model"]))
+    figure, axes = panels(1, 2, (6.7, 3.6))
+    for number, (axis, output) in enumerate(zip(axes.flat, ("spindle_y", ANGLE), strict=True)):
+        for shift, (label, text) in enumerate(VARIANTS.items()):
+            values = dataset["rms_error"].sel(label=label, output=output).squeeze(drop=True).values
+            order = np.argsort(values)
+            # Crosses of both stand beside each other.
+            places = np.arange(1.0, len(values) + 1) + np.where(
+                np.isfinite(values[order]), 0, 0.4 * shift
+            )
+            color = ("#D55E00", "#0072B2")[shift]
+            look: Style = {"color": color, "marker": "o^"[shift], "markersize": 5}
+            look |= {"linestyle": "none", "markerfacecolor": (color, "none")[shift]}
+            draw_errors(axis, places, values[order], look, text)
+            natural = {"marker": "o", "markersize": 10, "markerfacecolor": "none"}
+            at = places[order == 0], values[:1]
+            axis.plot(*at, "k", linestyle="none", label="natural order", **natural)
+        least = nominal["rms_error"].sel(label="pod", rank=3, output=output).item()
+        axis.axhline(least, color="#009E73", linestyle="--", label="least squares")
+        axis.axhline(numbers[output].value, label="published", **THIN)
+        scale_errors(axis)
+        axis.set_ylim(1e-7, 0.1)
+        axis.set_xticks([1, 5, 10, 15, 20, 25])
+        axis.set_ylabel(error_label(dataset, "RMS error", output))
+        axis.set_xlabel("variant, sorted by error")
+        axis.set_title(letter(number), pad=9)
+    legend_below(figure, axes.flat)
+    return figure
+
+
+def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
+    """A column for each model (name -> title): medians over control periods, and all of them."""
+    data = spectrum(list(models))
+    figure, axes = panels(len(SPECTRA), len(models), (6.7, 4.6), sharex="col", sharey="row")
+    for number, axis in enumerate(axes.flat):
+        row, column = divmod(number, len(models))
+        variable, (label, rounding) = list(SPECTRA.items())[row]
+        model, title = list(models.items())[column]
+        found = data.sel(model=model)
+        for method, (preset, text) in zip(("pod", "pod_literal"), PRESETS.items(), strict=True):
+            values = found[variable].sel(preset=preset).transpose("mode", "window")
+            values = values.where(values > 0.1 * rounding).dropna("mode", how="all")
+            look: Style = {"marker": "o", "markersize": 3, **styles([method])[method]}
+            words = f"{text}: median, all periods"
+            draw_band(axis, values["mode"].values, values.values, look, words)
+        axis.set_yscale("log")
+        axis.set_ylim(bottom=rounding)
+        axis.axvline(int(found["rank"]), label="states that the paper keeps", **THIN)
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axis.set_title(letter(number, title))
+        axis.set_ylabel("" if column else label)
+        axis.set_xlabel("number of modes" if row else "")
+    legend_below(figure, [axes[0, 0]])
+    return figure

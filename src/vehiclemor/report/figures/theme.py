@@ -1,0 +1,146 @@
+"""One look for all figures: lines, panels, legends, and the files that they are written to."""
+
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import matplotlib.style
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vehiclemor.arguments import quoted
+from vehiclemor.errors import InputError
+from vehiclemor.files import write_whole
+from vehiclemor.report.labels import MARK, TRAINED
+from vehiclemor.report.printing import alphabetic
+
+Results = Mapping[str, "xr.Dataset"]
+Style = dict[str, Any]
+FORMATS = ("pdf", "svg", "png")
+OWN_STYLE = Path(__file__).with_name("style.mplstyle")
+# Without a date and a version, two regenerations give the same bytes.
+METADATA: dict[str, dict[str, None]] = {
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+    "svg": {"Date": None, "Creator": None},
+    "png": {"Software": None},
+}
+# Colour-blind safe (M. Okabe, K. Ito).
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+FULL: Style = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
+# Gaps of an upper line show the lower one where both coincide.
+OTHER: Style = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
+# Lines differ where they are printed in grey too.
+DASHES = ("--", (0, (8, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2, 2, 2)))
+# Without the marks of what has failed, and of an error 0 on a logarithmic axis.
+MARKERS = "os^D<>phP*d"
+CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
+ZERO: Style = {"marker": 7, "markersize": 6, "linestyle": "none"}
+THIN: Style = {"color": "black", "linewidth": 0.8}
+# Label of a method in a study -> its style.
+STYLES: dict[str, Style] = {
+    "full_order": FULL,
+    "replay": {"color": "#666666", "linestyle": ":", "linewidth": 2.0, "zorder": 2.6},
+    "pod": {"color": "#0072B2", "linestyle": (0, (3, 3)), "zorder": 2.5},
+    "pod_literal": {"color": "#D55E00", "linestyle": "-."},
+    "pod_state": OTHER,
+    "pod_r3": OTHER,
+    "fixed_basis": OTHER,
+}
+# Of a legend in inches: what stands beside a text, and a letter of it.
+HANDLE, LETTER = 0.55, 0.068
+
+
+def styles(methods: Iterable[str]) -> dict[str, Style]:
+    """Style of each method by its label: its own, or a colour and dashes that no other line has."""
+    methods = list(methods)
+    own = {STYLES[method]["color"]: method for method in reversed(methods) if method in STYLES}
+    free = cycle([color for color in COLORS if color not in own] or list(COLORS))
+    dashes = cycle(DASHES)
+    return {
+        method: STYLES[method]
+        if method in own.values()
+        else {"color": next(free), "linestyle": next(dashes)}
+        for method in methods
+    }
+
+
+def panels(
+    rows: int, columns: int, size: tuple[float, float], **options: Any
+) -> tuple[Figure, np.ndarray]:
+    """Figure of a size in inches without a window, and its panels (rows, columns)."""
+    figure = Figure(figsize=size)
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def letter(number: int, title: str = "") -> str:
+    """Title of a panel, counted from 0."""
+    return f"({alphabetic(number)}) {title}".rstrip()
+
+
+def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
+    """One legend below all panels, of the lines in some of them, in all columns with room."""
+    shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
+    if not shown:
+        return
+    lengths = [len(text.replace("$", "")) for text in shown]
+
+    def width(columns: int) -> float:
+        parts = np.array_split(lengths, columns)
+        return sum(HANDLE + LETTER * max(part, default=0) for part in parts)
+
+    fitting = (n for n in range(len(shown), 1, -1) if width(n) <= figure.get_figwidth())
+    title = f"{MARK} {TRAINED}" if any(MARK in text for text in shown) else None
+    where, columns = "outside lower center", next(fitting, 1)
+    # As few columns as the rows need, so that none stands almost empty.
+    columns = -(-len(shown) // -(-len(shown) // columns))
+    figure.legend(shown.values(), shown, loc=where, ncols=columns, title=title)
+
+
+def tell_empty(figure: Figure) -> None:
+    """Say in panels of lines that there is nothing that could be drawn."""
+    for axis in figure.axes:
+        lines = [line for line in axis.lines if line.get_transform() == axis.transData]
+        points = [found for line in lines if np.size(found := line.get_xydata())]
+        if points and not any(np.isfinite(found).all(axis=1).any() for found in points):
+            words = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
+            axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)
+
+
+def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[None]:
+    """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch.
+
+    Raises
+    ------
+    InputError
+        If there is no such style, or the resolution makes no sense.
+    """
+    if dpi is not None and not (isinstance(dpi, int | np.integer) and 10 <= dpi <= 2400):
+        raise InputError(f"dpi is {quoted(dpi)}; it is a whole number from 10 to 2400 dots an inch")
+    changes = [OWN_STYLE, *([style] if style else []), {"savefig.dpi": dpi} if dpi else {}]
+    try:
+        with matplotlib.style.context(changes):
+            pass
+    except (OSError, TypeError, ValueError):
+        known = ", ".join(matplotlib.style.available)
+        raise InputError(f"style is {quoted(style)}, neither a file nor one of {known}") from None
+    return matplotlib.style.context(changes)
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure whole; its format is the file's suffix.
+
+    Raises
+    ------
+    InputError, FileError
+        If the format is not one of `FORMATS`, or the file can't be written.
+    """
+    suffix = path.suffix.removeprefix(".").lower()
+    if suffix not in FORMATS:
+        raise InputError(f"{path}: a figure is one of {', '.join(FORMATS)}")
+    metadata = METADATA[suffix]
+    write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))
+    return path
