@@ -74,17 +74,12 @@ def _sees(place: Place) -> bool:
 
 
 def _same_source(experiments: Sequence[Experiment]) -> None:
-    """Raise `InputError` if results would be those of other source or another compiler."""
+    """Raise `InputError` if results would be those of other source."""
     for e in {(e.model, e.method): e for e in experiments}.values():
-        what = ""
-        if code_digest(e.model, e.method) != e.code:
-            what = "another version of vehiclemor, or of the package of"
-        elif model_of(e).kernel_hash != e.kernel:
-            what = "another processor or compiler, which gives other kernels of"
-        if what:
+        if code_digest(e.model, e.method) != e.code or model_of(e).kernel_hash != e.kernel:
             from distributed import get_worker
 
             raise InputError(
-                f"scheduler: worker {get_worker().address} has {what} {e.model} with {e.method}; "
-                f"cells are known by what computes them, so it must be the driver's own"
+                f"scheduler: worker {get_worker().address} has other source of {e.model} with "
+                f"{e.method}; install the same versions of vehiclemor, sympy and plug-ins"
             )
