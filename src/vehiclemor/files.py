@@ -1,20 +1,18 @@
 """Writing files whole: under a temporary name first, then moved into place."""
 
-import hashlib
 import os
-import platform
+import secrets
 import shutil
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 
 from vehiclemor.errors import FileError, MachineError, machine_reason
 
-TEMPORARY, DAY = ".partial-", 86400.0
+# Beginning of temporary names; and age (s) of a file that nobody is writing any more.
+TEMPORARY, OLD = ".partial-", 3600.0
 
 
 def make_folder(folder: Path) -> None:
@@ -102,41 +100,13 @@ def write_text(path: Path, text: str) -> Path:
 
 
 def temporary_path(path: Path) -> Path:
-    """Name beside `path` that no other process or thread writes under."""
-    owner = f"{os.getpid()}-{threading.get_ident()}-{_machine()}"
-    return path.with_name(f"{TEMPORARY}{owner}-{path.name}")
+    """Name beside `path` that nobody else writes under."""
+    return path.with_name(f"{TEMPORARY}{secrets.token_hex(8)}-{path.name}")
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that are no more; finished files are never touched.
-
-    Of another machine's processes, which share the folder, nothing is known: theirs stay for a day.
-    """
+    """Remove temporary files of processes that were killed; finished files are never touched."""
     for path in folder.glob(f"{TEMPORARY}*"):
-        process, _, machine, *_ = [*path.name.removeprefix(TEMPORARY).split("-"), "", ""]
         with suppress(OSError):
-            if machine == _machine() and process.isdigit():
-                ended = not _alive(int(process))
-            else:
-                ended = time.time() - path.stat().st_mtime > DAY
-            if ended:
+            if time.time() - path.stat().st_mtime > OLD:
                 path.unlink()
-
-
-@cache
-def _machine() -> str:
-    return hashlib.sha256(platform.node().encode()).hexdigest()[:8]
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    try:
-        # A process that has ended stays known until its parent has asked for it.
-        return not Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2].startswith("Z")
-    except OSError:
-        return True

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from tests.study.small import small_study
+from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import sine_travel
+from vehiclemor.reduction.methods import pod
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
+from vehiclemor.study import provenance
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import make_experiment
 from vehiclemor.study.method_settings import complete_settings
@@ -58,6 +61,26 @@ def cell():
 def test_key_changes_with_all_that_determines_the_result(cell, field, value):
     again = make_cell(build("double_wishbone"), sine_travel, "pod", {"rank": 3})
     assert dataclasses.replace(cell, **{field: value}).key != again.key == cell.key
+
+
+def test_versions_count_where_a_method_declares_them(cell, monkeypatch):
+    def key() -> str:
+        provenance.code_digest.cache_clear()
+        return make_cell(build("double_wishbone"), sine_travel, "pod", {"rank": 3}).key
+
+    declared = dataclasses.replace(pod.METHOD, packages=("scipy",))
+    keys = []
+    for _ in range(2):
+        monkeypatch.setattr(pod, "METHOD", declared)
+        keys.append(key())
+        monkeypatch.undo()
+        assert key() == cell.key
+        # Another processor, other libraries.
+        monkeypatch.setattr(cache, "compiler_identity", lambda: "another")
+        monkeypatch.setattr(provenance, "version", lambda _: "0.0")
+        assert key() == cell.key
+    provenance.code_digest.cache_clear()
+    assert len({cell.key, *keys}) == 3
 
 
 def test_another_geometry_gives_another_key_and_result(cell):

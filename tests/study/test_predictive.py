@@ -149,7 +149,8 @@ def no_timing(protocol, rows, *_):
         {
             **{name: (("label", "scenario"), np.ones(shape)) for name in SECONDS},
             "offline_seconds": ("label", np.ones(shape[0])),
-        }
+        },
+        attrs={"timing": "none"},
     )
 
 

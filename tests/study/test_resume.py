@@ -57,13 +57,14 @@ def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_pa
     # Workers hold this end of the pipe for as long as they live, which was 330 s.
     process.communicate(timeout=60)
     finished = {path: path.stat().st_mtime_ns for path in cells.glob("??/*")}
-    half = temporary_path(cells / "left").name.replace(str(os.getpid()), str(process.pid))
-    (cells / half).write_bytes(b"half a file")
+    for path in (half := temporary_path(cells / "left"), *cells.glob(f"{TEMPORARY}*")):
+        path.write_bytes(b"half a file")
+        os.utime(path, (0, 0))
     resumed = run_studies(str(study), tmp_path)["small"]
     assert 20 <= len(finished) < 140
     for path, written in finished.items():
         assert path.stat().st_mtime_ns == written, "a finished cell was computed again"
-    assert not list(cells.glob(f"{TEMPORARY}*"))
+    assert not half.exists()
     assert_same(uninterrupted, resumed)
 
 

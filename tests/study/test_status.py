@@ -38,7 +38,7 @@ def test_a_study_is_followed_from_nothing_to_its_end(study, tmp_path, capsys, mo
     run_studies(str(study), out)
     monkeypatch.setattr(workers, "evaluate", None)
     # The arrays of cells are not read.
-    monkeypatch.setattr(cell_file, "check", None)
+    monkeypatch.setattr(cell_file, "decoded", None)
     found = vm.status(study, out)["small"]
     assert (found.cells, found.done, found.to_do, found.seconds_left) == (12, 12, 0, 0.0)
     # Messages differ in the time at which the wheel does not reach its height.

@@ -49,20 +49,21 @@ def test_any_dataset_comes_back_as_it_was(shape):
     dataset = xr.Dataset(found, attrs=attributes).set_coords(["<f4", "|O"])
     dataset = dataset.assign_coords({name: np.arange(size) for name, size in shape.items()})
     content = cell_file.encoded(dataset, KEY, 0.5)
-    again, held = cell_file.dataset_of(content, KEY), cell_file.arrays_of(content, KEY)
+    cell = cell_file.decoded(content, KEY)
+    again, held = cell.dataset(), {name: array for name, (_, array, _) in cell.variables.items()}
     xr.testing.assert_identical(dataset, again)
     assert list(dataset.variables) == list(again.variables)
     for name, variable in dataset.variables.items():
-        assert variable.dtype == again[name].dtype
         assert again[name].values.flags.writeable or name in again.indexes
         if variable.dtype.kind in "OU":
-            assert np.asarray(held[name], dtype=object).tolist() == variable.values.tolist()
+            assert held[name].tolist() == variable.values.tolist()
         else:
+            assert variable.dtype == again[name].dtype
             assert held[name].tobytes() == variable.values.tobytes()
 
 
 def test_what_has_no_place_in_a_cell_is_refused():
-    with pytest.raises(TypeError, match="objects that are no text"):
+    with pytest.raises(TypeError, match="expected str"):
         cell_file.encoded(xr.Dataset({"x": ("d", np.array([{}], dtype=object))}), KEY)
     with pytest.raises(TypeError, match="Path can't be stored"):
         cell_file.encoded(xr.Dataset(attrs={"file": Path()}), KEY)
@@ -83,12 +84,9 @@ def test_every_flipped_bit_and_every_part_of_a_file_is_noticed():
     for place in range(len(whole)):
         flipped = bytearray(whole)
         flipped[place] ^= 1 << place % 8
-        with pytest.raises(SpoiledError):
-            cell_file.dataset_of(bytes(flipped), KEY)
-        with pytest.raises(SpoiledError):
-            cell_file.arrays_of(whole[:place], KEY)
-    with pytest.raises(SpoiledError):
-        cell_file.check(whole + b"\0", KEY)
+        for damaged in (bytes(flipped), whole[:place], whole + bytes(place + 1)):
+            with pytest.raises(SpoiledError):
+                cell_file.decoded(damaged, KEY)
 
 
 def test_how_a_cell_has_ended_is_told_by_its_header(tmp_path):
@@ -151,7 +149,7 @@ def cells(place: Path) -> list[Path]:
         (lambda whole, _: whole[:200], "truncated"),
         (lambda *_: b"", "truncated"),
         (lambda _, other: other, "not the result that belongs here"),
-        (lambda whole, _: whole.replace(b"cell 1", b"cell 7", 1), "'vehiclemor cell 7'"),
+        (lambda whole, _: whole.replace(b"cell 2", b"cell 7", 1), "'vehiclemor cell 7'"),
     ],
     ids=["cut", "header", "empty", "foreign", "version"],
 )
@@ -211,8 +209,6 @@ DATASETS = {
     "coordinates": described("dataset", coordinates=["x"]),
     "attributes": described("dataset", attributes=["title"]),
     "dimensions": described("errors", dimensions=["output", "output"]),
-    "type": described("errors", type="<U1000000000"),
-    "no type": described("errors", type="(2,"),
     "text without place": described("errors", text=["a"], shape=[10**30]),
     "text of numbers": described("errors", text=[1.0] * 4, shape=[4]),
 }

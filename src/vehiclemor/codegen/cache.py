@@ -10,94 +10,28 @@ file one makes it, of several threads too.
 import atexit
 import gc
 import hashlib
-import inspect
 import logging
 import os
 import platform
 import shutil
 import stat
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
 from threading import RLock
-from types import ModuleType
 from typing import Any, BinaryIO, TypeVar
 
 from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 from vehiclemor.progress import making
 
-PACKAGE = Path(__file__).resolve().parents[1]
 Made = TypeVar("Made")
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
-
-
-def source_digest(layers: Sequence[str], files: Sequence[str], components: Sequence[object]) -> str:
-    """Hash of layers and files of this package, and of plug-ins.
-
-    Parameters
-    ----------
-    layers
-        Folders of the package, with all that is in them.
-    files
-        Further files of the package.
-    components
-        Of a plug-in, all of its top-level package counts.
-    """
-    paths = [path for layer in layers for path in sorted((PACKAGE / layer).rglob("*.py"))]
-    paths += [PACKAGE / name for name in files]
-    digest = hashlib.sha256()
-    for path in paths:
-        digest.update(path.relative_to(PACKAGE).as_posix().encode())
-        digest.update(path.read_bytes())
-    for component in components:
-        for text in _plug_in_source(component):
-            digest.update(text)
-    return digest.hexdigest()[:16]
-
-
-def _plug_in_source(thing: object) -> list[bytes]:
-    """Source texts of the package, or of the single file with its neighbours, of a component."""
-    module = _module_of(thing)
-    if module is None or module.__file__ is None:
-        return [repr(thing).encode()]
-    top = module.__name__.split(".")[0]
-    if top == "vehiclemor":
-        return []
-    folders = list(getattr(sys.modules.get(top), "__path__", ()))
-    if folders:
-        paths = [path for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
-        return [path.read_bytes() for path in paths]
-    return [path.read_bytes() for path in sorted(_neighbours(module, set()))]
-
-
-def _module_of(thing: object) -> ModuleType | None:
-    """The module that a component is, or that its functions or its class come from."""
-    if isinstance(thing, ModuleType):
-        return thing
-    for name in ("derive", "fit", "signal"):
-        if callable(function := getattr(thing, name, None)):
-            return inspect.getmodule(function)
-    return inspect.getmodule(thing) or inspect.getmodule(type(thing))
-
-
-def _neighbours(module: ModuleType, found: set[Path]) -> set[Path]:
-    """File of a module, and those in its folder of what it has imported."""
-    if module.__file__ is None or Path(module.__file__) in found:
-        return found
-    found.add(Path(module.__file__))
-    for value in list(vars(module).values()):
-        other = value if isinstance(value, ModuleType) else inspect.getmodule(value)
-        origin = getattr(other, "__file__", None)
-        if other is not None and origin and Path(origin).parent == Path(module.__file__).parent:
-            _neighbours(other, found)
-    return found
 
 
 @cache
@@ -108,11 +42,6 @@ def compiler_identity() -> str:
     parts = [f"{package} {version(package)}" for package in COMPILER_PACKAGES]
     features = llvm.get_host_cpu_features().flatten()
     return "\n".join([*parts, platform.machine(), llvm.get_host_cpu_name(), features])
-
-
-def kernel_hash(source: str) -> str:
-    """Hash of a source and of what compiles it."""
-    return hashlib.sha256(f"{source}\n{compiler_identity()}".encode()).hexdigest()[:16]
 
 
 def cache_folder() -> Path:

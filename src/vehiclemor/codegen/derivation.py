@@ -15,8 +15,9 @@ from functools import cached_property, lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from vehiclemor.codegen.cache import cache_folder, fetched, source_digest
+from vehiclemor.codegen.cache import cache_folder, fetched
 from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
+from vehiclemor.codegen.sources import source_digest
 from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, fetched, once, source_digest
+from vehiclemor.codegen.cache import compiler_identity, fetched, once
 from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.sources import source_digest
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, fetched, once, source_digest
+from vehiclemor.codegen.cache import compiler_identity, fetched, once
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
@@ -237,7 +238,7 @@ def _loops(
 
 
 def loops_digest(modules: Sequence[str]) -> str:
-    """Hash of the source of loops and of what compiles them."""
+    """Hash of the source of loops, and of this layer, which compiles them."""
     files = [f"{name.replace('.', '/')}.py" for name in modules]
     return source_digest(("codegen",), files, ())
 

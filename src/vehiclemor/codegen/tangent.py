@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import fetched, once, source_digest
+from vehiclemor.codegen.cache import fetched, once
 from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
+from vehiclemor.codegen.sources import source_digest
 from vehiclemor.codegen.vector_lanes import DIRECTIONS
 from vehiclemor.short_repr import ShortRepr
 

@@ -118,6 +118,9 @@ class Method(ShortRepr):
     presets
         Kind of model -> name of a preset -> values that differ from the defaults.  The preset
         `recommended` is the defaults where it isn't named.
+    packages
+        Names of the installed packages that `fit` or its model computes with, such as `pymor`.
+        Stored results are computed again when the version of one changes.
     """
 
     repr_fields = ("name", "summary", "reference")
@@ -134,11 +137,16 @@ class Method(ShortRepr):
     follows_time: bool = False
     fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
+    packages: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what is no method, so that its author reads one clear line."""
         for name in ("name", "summary", "reference"):
             line_of_text(f"method {quoted(self.name)}: {name}", getattr(self, name))
+        if isinstance(self.packages, str):
+            raise InputError(f"method {self.name!r}: packages are a tuple of names, not a text")
+        for name in self.packages:
+            line_of_text(f"method {self.name!r}: packages", name)
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")

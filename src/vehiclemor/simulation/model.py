@@ -55,7 +55,7 @@ class Model(ShortRepr):
     parameters
         Validated parameter set.
     kernel_hash
-        Hash of the source of kernels and loops, and of the compiler's versions.
+        Hash of the source of kernels and loops, whatever compiles it.
     constants
         Hoisted constants of the parameter set.
     initial

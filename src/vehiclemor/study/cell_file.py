@@ -9,32 +9,26 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from pydantic import Field, TypeAdapter
 
 from vehiclemor.errors import SpoiledError
 from vehiclemor.short_repr import shortened
-from vehiclemor.toml_files import FileSchema
 
 if TYPE_CHECKING:
     import xarray as xr
 
-ENDING, SCHEMA = ".safetensors", "vehiclemor cell 1"
+ENDING, SCHEMA = ".safetensors", "vehiclemor cell 2"
 # Where the hash stands; while it is computed there are zeros.
 HASH, ZEROS = '"sha256":"{}"', "0" * 64
 # Length of the header is told in so many bytes; and a first read that mostly has all of it.
 PREFIX, FIRST = 8, 1 << 14
-# Bytes that a variable may take which takes less in the file: text.
-MOST = 1 << 28
-# Status, message and number of runs.
-RUNS = TypeAdapter(list[tuple[str, str, int]])
-# Coordinates; and variable -> dimensions, shape, whether it is text, and all its attributes are.
-Layout = tuple[set[str], dict[str, tuple[list[str], tuple[int, ...], bool, bool]]]
-Made = TypeVar("Made")
+# What comes of a text that is none of ours.
+WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
+# Coordinates; and variable -> dimensions, shape and kind of number or text.
+Layout = tuple[set[str], dict[str, tuple[list[str], tuple[int, ...], str]]]
 
 
 class End(NamedTuple):
@@ -51,23 +45,32 @@ class End(NamedTuple):
     runs: dict[tuple[str, str], int]
     seconds: float
 
-
-class Variable(FileSchema):
-    """What the header says of a variable, and its text if it is that."""
-
-    dimensions: list[str]
-    attributes: dict[str, Any]
-    type: str = Field(pattern=r"^[<>|][A-Za-z]\d*$")
-    shape: tuple[int, ...] = ()
-    text: list[str] | None = None
+    @property
+    def broken(self) -> bool:
+        """Whether a bug has ended it: the next run tries it again."""
+        return any(status == "error" for status, _ in self.runs)
 
 
-class Description(FileSchema):
-    """What the header says of a dataset."""
+class Cell(NamedTuple):
+    """What the file of a cell holds: variables as xarray takes them, text as objects."""
 
-    variables: dict[str, Variable]
+    variables: dict[str, tuple[list[str], np.ndarray, dict[str, Any]]]
     coordinates: list[str]
     attributes: dict[str, Any]
+    end: End
+
+    @property
+    def layout(self) -> Layout:
+        """What it holds, whatever the values."""
+        found = self.variables.items()
+        shapes = {name: (list(d), array.shape, array.dtype.kind) for name, (d, array, _) in found}
+        return set(self.coordinates), shapes
+
+    def dataset(self) -> xr.Dataset:
+        """As it was stored."""
+        import xarray as xr
+
+        return xr.Dataset(self.variables, attrs=self.attributes).set_coords(self.coordinates)
 
 
 def encoded(dataset: xr.Dataset, key: str, seconds: float = np.nan) -> bytes:
@@ -86,16 +89,12 @@ def encoded(dataset: xr.Dataset, key: str, seconds: float = np.nan) -> bytes:
     described: dict[str, dict[str, Any]] = {}
     for name, variable in dataset.variables.items():
         values = variable.values
-        entry: dict[str, Any] = {
-            "dimensions": variable.dims,
-            "attributes": variable.attrs,
-            "type": values.dtype.str,
-        }
+        entry = described[str(name)] = {"dimensions": variable.dims, "attributes": variable.attrs}
         if values.dtype.kind in "OU":
-            entry |= {"shape": values.shape, "text": _text(values)}
+            entry |= {"shape": values.shape, "text": values.ravel().tolist()}
+            "".join(entry["text"])
         else:
             arrays[str(name)] = np.ascontiguousarray(values).reshape(values.shape)
-        described[str(name)] = entry
     content = {
         "variables": described,
         "coordinates": [str(name) for name in dataset.coords],
@@ -113,60 +112,35 @@ def encoded(dataset: xr.Dataset, key: str, seconds: float = np.nan) -> bytes:
     return _filled(whole, ZEROS, hashlib.sha256(whole).hexdigest())
 
 
-def arrays_of(content: bytes, key: str) -> dict[str, np.ndarray]:
-    """Arrays of a cell by name, text as objects; what has no dimension is no array.
+def decoded(content: bytes, key: str) -> Cell:
+    """What the content of a file holds.
 
     Raises
     ------
     SpoiledError
-        If the content is not what was written for this key.
+        If it is not what was written for this key.
     """
-    return _decoded(content, key, lambda _, arrays: {n: array[()] for n, array in arrays.items()})
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
 
-
-def dataset_of(content: bytes, key: str) -> xr.Dataset:
-    """The dataset of a cell; `SpoiledError` as of `arrays_of`."""
-    import xarray as xr
-
-    def made(described: Description, arrays: dict[str, np.ndarray]) -> xr.Dataset:
-        variables = {
-            name: (entry.dimensions, arrays[name].astype(entry.type, copy=False), entry.attributes)
-            for name, entry in described.variables.items()
-        }
-        dataset = xr.Dataset(variables, attrs=described.attributes)
-        return dataset.set_coords(described.coordinates)
-
-    return _decoded(content, key, made)
-
-
-def layout(content: bytes, key: str) -> Layout:
-    """What a cell holds, whatever the values; `SpoiledError` as of `arrays_of`."""
-
-    def made(described: Description, arrays: dict[str, np.ndarray]) -> Layout:
-        return set(described.coordinates), {
-            name: (
-                entry.dimensions,
-                arrays[name].shape,
-                entry.text is not None,
-                all(isinstance(value, str) for value in entry.attributes.values()),
-            )
-            for name, entry in described.variables.items()
-        }
-
-    return _decoded(content, key, made)
-
-
-def check(content: bytes, key: str) -> dict[str, str]:
-    """Texts of the header of a file that is what was written for a key; else `SpoiledError`."""
     header = _header(content, key)
-    digest = header.get("sha256", "")
-    if hashlib.sha256(_filled(content, digest, ZEROS)).hexdigest() != digest:
-        raise SpoiledError("what it holds is not what was written")
-    return header
+    try:
+        digest = header["sha256"]
+        if hashlib.sha256(_filled(content, digest, ZEROS)).hexdigest() != digest:
+            raise SpoiledError("what it holds is not what was written")
+        found, arrays, variables = json.loads(header["dataset"]), load(content), {}
+        for name, entry in found["variables"].items():
+            if "text" in entry:
+                "".join(entry["text"])
+                arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
+            variables[name] = entry["dimensions"], arrays[name], dict(entry["attributes"])
+        return Cell(variables, found["coordinates"], dict(found["attributes"]), _end(header))
+    except (*WRONG, SafetensorError):
+        raise SpoiledError("what it holds is no result") from None
 
 
 def end_of(path: Path, key: str) -> End:
-    """How a cell has ended, from the header of its file alone; `SpoiledError` as of `arrays_of`."""
+    """How a cell has ended, from the header of its file alone; `SpoiledError` as of `decoded`."""
     with path.open("rb", buffering=0) as file:
         content = file.read(FIRST)
         if PREFIX + int.from_bytes(content[:PREFIX], "little") > len(content):
@@ -176,9 +150,9 @@ def end_of(path: Path, key: str) -> End:
 
 def _end(header: dict[str, str]) -> End:
     try:
-        runs = {(status, text): n for status, text, n in RUNS.validate_json(header["runs"])}
+        runs = {(str(s), str(m)): int(n) for s, m, n in json.loads(header["runs"])}
         return End(runs, float(header["seconds"]))
-    except (ValueError, KeyError, TypeError):
+    except WRONG:
         raise SpoiledError("damaged") from None
 
 
@@ -189,7 +163,7 @@ def _header(content: bytes, key: str) -> dict[str, str]:
     try:
         header = json.loads(content[PREFIX : PREFIX + size])["__metadata__"]
         schema, found = shortened(header["schema"]), shortened(header["key"])
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except WRONG:
         raise SpoiledError("damaged, or no result of this package") from None
     if schema != SCHEMA:
         raise SpoiledError(f"{schema!r}, where this version writes {SCHEMA!r}")
@@ -198,38 +172,9 @@ def _header(content: bytes, key: str) -> dict[str, str]:
     return header
 
 
-def _decoded(
-    content: bytes, key: str, make: Callable[[Description, dict[str, np.ndarray]], Made]
-) -> Made:
-    """What is made of the arrays of a file, text as objects, and of what it says of them."""
-    from safetensors import SafetensorError
-    from safetensors.numpy import load
-
-    header = check(content, key)
-    _end(header)
-    try:
-        described, arrays = Description.model_validate_json(header["dataset"]), load(content)
-        for name, entry in described.variables.items():
-            if entry.text is not None:
-                arrays[name] = np.array(entry.text, dtype=object).reshape(entry.shape)
-            size, stored = arrays[name].size, arrays[name].nbytes
-            if np.dtype(entry.type).itemsize * size > max(stored, MOST):
-                raise ValueError
-        return make(described, arrays)
-    except (ArithmeticError, LookupError, SafetensorError, TypeError, ValueError):
-        raise SpoiledError("what it holds is no result") from None
-
-
 def _filled(content: bytes, old: str, new: str) -> bytes:
     """A file with another hash in its place, the first where its text stands."""
     return content.replace(HASH.format(old).encode(), HASH.format(new).encode(), 1)
-
-
-def _text(values: np.ndarray) -> list[str]:
-    found = values.ravel().tolist()
-    if not all(isinstance(value, str) for value in found):
-        raise TypeError("objects that are no text can't be stored")
-    return found
 
 
 def _plain(value: Any) -> Any:

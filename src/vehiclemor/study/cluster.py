@@ -7,35 +7,27 @@ compile what their cache lacks.
 from __future__ import annotations
 
 import logging
+import os
+import threading
 import time
-import uuid
 import warnings
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.cache import cache_folder
+from vehiclemor.codegen.cache import cache_folder, once
 from vehiclemor.errors import InputError, MachineError, one_line
-from vehiclemor.files import temporary_path, write_text
-from vehiclemor.study.cluster_worker import Place, Sent, on_worker
+from vehiclemor.files import temporary_path
+from vehiclemor.study.evaluate import model_of
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.store import write_encoded
-from vehiclemor.study.workers import (
-    KILLED,
-    LARGEST,
-    Done,
-    Engine,
-    Groups,
-    Timed,
-    in_batches,
-    timed_batch,
-)
+from vehiclemor.study.provenance import code_digest
+from vehiclemor.study.store import cell_path, prepare_folder
+from vehiclemor.study.workers import LARGEST, Done, Engine, Groups, evaluate_and_store, in_batches
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from distributed import Client
 
 LOCAL = "local"
@@ -43,8 +35,6 @@ LOCAL = "local"
 REACH, LOOK = 10.0, 1.0
 # Ctrl-C reaches all processes of a terminal, and the driver ends the workers.
 NO_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
-# Packages that must be the same everywhere; that of Python is its first two numbers.
-SAME = ("python", "distributed")
 _LOG = logging.getLogger("vehiclemor")
 
 
@@ -138,48 +128,36 @@ def _same_versions(client: Any) -> None:
     """Raise `InputError` if the scheduler or a worker runs other versions than this process."""
     found = client.get_versions()
     own = _versions(found["client"])
-    others = {"the scheduler": found["scheduler"]}
-    others |= {f"worker {name}": entry for name, entry in found["workers"].items()}
-    for who, entry in others.items():
-        for package, version in _versions(entry).items():
-            if version != own[package]:
-                raise InputError(
-                    f"scheduler: {who} runs {package} {version}, this process {own[package]}; "
-                    f"install the same versions"
-                )
+    for who, entry in {"the scheduler": found["scheduler"], **found["workers"]}.items():
+        if (versions := _versions(entry)) != own:
+            raise InputError(
+                f"scheduler: {who} runs {versions}, this process {own}; install the same versions"
+            )
 
 
-def _versions(entry: dict[str, Any] | None) -> dict[str, str]:
+def _versions(entry: dict[str, Any] | None) -> str:
     packages = (entry or {}).get("packages") or {}
-    found = {name: str(packages.get(name)) for name in SAME}
-    return found | {"python": ".".join(found["python"].split(".")[:2])}
+    python = ".".join(str(packages.get("python")).split(".")[:2])
+    return f"distributed {packages.get('distributed')} on Python {python}"
 
 
 def evaluated_by_cluster(
-    groups: Groups,
-    folder: Path,
-    alone: bool = False,
-    *,
-    client: Client,
-    work: Callable[..., tuple[Done, Sent]] | None = None,
+    groups: Groups, folder: Path, alone: bool = False, *, client: Client
 ) -> Generator[Done, None, None]:
-    """What `evaluate_and_store` gives for each batch, by the workers of a cluster.
+    """What `on_worker` gives for each batch.
 
     Parameters
     ----------
     alone
         Whether each group is a batch of its own, so that one that kills workers spoils no other.
     """
-    from distributed.cfexecutor import ClientExecutor
+    from concurrent.futures import CancelledError
 
-    folder = folder.absolute()
-    token = temporary_path(folder / "cells" / "token")
-    place = Place(folder, token, uuid.uuid4().hex)
-    pool = ClientExecutor(client, pure=False)
-    seen, number, most = 0.0, 0, 1 if alone else LARGEST
+    from distributed import KilledWorker
 
-    def submit(batch: list[Experiment]) -> Future[Timed]:
-        return pool.submit(timed_batch, work or on_worker, batch, place)
+    mark = temporary_path(folder.absolute() / "cells" / "driver")
+    pool = client.get_executor(pure=False)
+    seen, number = 0.0, 0
 
     def places() -> int:
         nonlocal seen, number
@@ -188,26 +166,9 @@ def evaluated_by_cluster(
         return number
 
     try:
-        write_text(token, place.text)
-        for done, results in in_batches(groups, submit, places, _taken, most):
-            for key, (content, broken) in results.items():
-                write_encoded(content, folder, key, broken=broken)
-            yield done
-    finally:
-        pool.shutdown(wait=False)
-        token.unlink(missing_ok=True)
-
-
-def _taken(future: Future[Timed]) -> Timed:
-    """What a worker has given; what it has died of is a fault of the machine."""
-    from concurrent.futures import CancelledError
-
-    from distributed import KilledWorker
-
-    try:
-        return future.result()
-    except KilledWorker:
-        return Timed((([], KILLED), {}), 0.0)
+        mark.touch()
+        work, most = partial(on_worker, mark=mark), 1 if alone else LARGEST
+        yield from in_batches(pool, work, groups, places, most, KilledWorker)
     except CancelledError:
         raise MachineError(
             "the scheduler is lost; what is finished is stored: run again to resume"
@@ -217,3 +178,52 @@ def _taken(future: Future[Timed]) -> Timed:
             f"scheduler: a worker lacks what this process has ({one_line(error)}); "
             f"install the same versions"
         ) from error
+    finally:
+        pool.shutdown(wait=False)
+        mark.unlink(missing_ok=True)
+
+
+def on_worker(experiments: Sequence[Experiment], mark: Path) -> Done:
+    """As `evaluate_and_store`, on a worker; what it can't store is sent.
+
+    Parameters
+    ----------
+    mark
+        File of a random name in the driver's folder: who sees it sees that folder, and not another
+        one of the same name.
+    """
+    with _turn():
+        _same_source(experiments)
+        if _seen(mark):
+            return evaluate_and_store(experiments, mark.parents[1])
+        with TemporaryDirectory() as name:
+            prepare_folder(own := Path(name))
+            done = evaluate_and_store(experiments, own)
+            sent = {key: cell_path(own, key).read_bytes() for key in done.finished}
+            return done._replace(sent=sent)
+
+
+@once
+def _turn() -> threading.Lock:
+    """Cells of one process take turns: the limit of linear algebra is one for all its threads."""
+    from threadpoolctl import threadpool_limits
+
+    threadpool_limits(1)
+    return threading.Lock()
+
+
+@cache
+def _seen(mark: Path) -> bool:
+    return mark.exists() and os.access(mark.parent, os.W_OK)
+
+
+def _same_source(experiments: Sequence[Experiment]) -> None:
+    """Raise `InputError` if results would be those of other source."""
+    for e in {(e.model, e.method): e for e in experiments}.values():
+        if code_digest(e.model, e.method) != e.code or model_of(e).kernel_hash != e.kernel:
+            from distributed import get_worker
+
+            raise InputError(
+                f"scheduler: worker {get_worker().address} has other source of {e.model} with "
+                f"{e.method}; install the same versions of vehiclemor, sympy and plug-ins"
+            )

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from vehiclemor.errors import SpoiledError
 from vehiclemor.files import make_folder
 from vehiclemor.study.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.study.store import set_aside
@@ -42,9 +41,8 @@ def combined_path(folder: Path, owner: Owner) -> Path:
     path = folder / "studies" / f"{owner.study}.nc"
     held = global_attributes(path)
     # A file that was edited in its place is the same study.
-    if not held or owner.study_file == held.get("study_file", owner.study_file):
-        return path
-    if owner.content == held.get("content"):
+    edited = owner.study_file == held.get("study_file", owner.study_file)
+    if edited or owner.content == held.get("content"):
         return path
     return path.with_stem(f"{owner.study}-{owner.content}")
 
@@ -67,52 +65,26 @@ def stored(
     attribute
         Global attribute that holds the key.
     sources
-        Gives the files that it was made from; if one of them is missing or as new, it is made
-        again.
+        Gives the files that it was made from; if one of them is missing it is made again, and if a
+        bug has ended one of its cells.
     owner
         Of the result of a study.
     """
-    dataset = _current(path, attribute, key, sources)
-    if dataset is not None:
-        return dataset
-    same = _under_another_name(path, attribute, key, sources)
-    if same is not None and owner is None:
-        return same
+    dataset = None
+    for place in (path, *sorted(path.parent.glob("[!.]*.nc"))):
+        if global_attributes(place).get(attribute) == key and all(p.exists() for p in sources()):
+            dataset = read_dataset(place, "source", "vehiclemor")
+            dataset.encoding["source"] = str(place)
+            if "status" in dataset and "error" in dataset["status"].values:
+                dataset = None
+            elif place == path or owner is None:
+                return dataset
+            break
     make_folder(path.parent)
-    dataset = make() if same is None else same
+    if path.exists() and global_attributes(path).get("source") != "vehiclemor":
+        set_aside(path, path.parent, "not as it was written, or no result of this package")
+    dataset = make() if dataset is None else dataset
     dataset = dataset.assign_attrs({attribute: key} | (owner._asdict() if owner else {}))
     write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
-
-
-def _under_another_name(
-    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
-) -> xr.Dataset | None:
-    """As `_current`, of any file beside: its study was renamed since."""
-    for other in sorted(path.parent.glob("[!.]*.nc")):
-        if other != path and global_attributes(other).get(attribute) == key:
-            return _current(other, attribute, key, sources)
-    return None
-
-
-def _current(
-    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
-) -> xr.Dataset | None:
-    """What a file holds, if that was made for this key from these sources as they are."""
-    if not path.exists():
-        return None
-    try:
-        dataset = read_dataset(path, "source", "vehiclemor")
-    except SpoiledError as error:
-        set_aside(path, path.parent, error.reason)
-        return None
-    if dataset.attrs.get(attribute) != key:
-        return None
-    written = path.stat().st_mtime_ns
-    try:
-        newest = max((source.stat().st_mtime_ns for source in sources()), default=-1)
-    except FileNotFoundError:
-        return None
-    dataset.encoding["source"] = str(path)
-    return dataset if newest < written else None

@@ -20,7 +20,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.study.cell_file import Layout, encoded, layout
+from vehiclemor.study.cell_file import Layout, decoded, encoded
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.input_range import input_range
@@ -148,7 +148,7 @@ def layout_of(experiment: Experiment) -> Layout:
     like = experiment.kernel, experiment.keep, len(test), test[0].maneuver.samples
     if like not in _LAYOUTS:
         failed = _failed(experiment, model_of(experiment), Failure("error", ""))
-        _LAYOUTS[like] = layout(encoded(failed, ""), "")
+        _LAYOUTS[like] = decoded(encoded(failed, ""), "").layout
     return _LAYOUTS[like]
 
 

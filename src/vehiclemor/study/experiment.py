@@ -22,7 +22,8 @@ class Experiment(ShortRepr):
     Attributes
     ----------
     kernel, code
-        Hash of the compiled kernels, and of the source of everything that computes results.
+        Hash of the source of the kernels, and of that of everything that computes results; the
+        processor and the versions of libraries stand beside a result, and are no part of its key.
     parameters
         Name -> value of the model's parameters, SI units.
     settings

@@ -7,7 +7,6 @@ ones it may never come back.  Other files are first read in a process that can b
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -34,9 +33,7 @@ with netCDF4.Dataset(sys.argv[1]) as file:
     for variable in file.variables.values():
         variable[...]
 """
-LIMIT = 10.0
-# Bytes that are read at a time for a hash.
-AT_ONCE = 1 << 24
+LIMIT, DAMAGED = 10.0, "damaged, or no netCDF-4 file"
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -127,36 +124,31 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
     except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
         if machine := machine_reason(error):
             raise MachineError(f"{path}: can't be read ({machine})") from None
-        reason = error.strerror if isinstance(error, OSError) else None
-        detail = reason or str(error).splitlines()[0][:80]
-        detail = "damaged, or no netCDF-4 file" if "NetCDF:" in detail else detail
         if isinstance(error, PermissionError):
-            raise FileError(f"{path}: can't be read ({detail})") from None
+            raise FileError(f"{path}: can't be read ({error.strerror})") from None
+        detail = getattr(error, "strerror", None) or str(error).splitlines()[0][:80]
+        detail = DAMAGED if "NetCDF:" in detail else detail
         raise SpoiledError(f"not a readable {kind} ({detail})", path, mend) from None
 
 
 def _seal(path: Path) -> None:
     """Append the hash of its bytes to a file."""
-    with path.open("r+b") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        file.write(SEAL + digest.encode())
+    with path.open("ab") as file:
+        file.write(SEAL + _digest(path.read_bytes()))
 
 
 def _sealed(path: Path) -> bool:
     """Whether a file ends with the hash of its bytes; `ValueError` if with another one."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        size = max(file.seek(0, os.SEEK_END) - len(SEAL) - 2 * digest.digest_size, 0)
-        file.seek(size)
-        end = file.read()
-        if not end.startswith(SEAL):
-            return False
-        file.seek(0)
-        for begin in range(0, size, AT_ONCE):
-            digest.update(file.read(min(size - begin, AT_ONCE)))
-    if end.removeprefix(SEAL) != digest.hexdigest().encode():
+    whole, seal, digest = path.read_bytes().rpartition(SEAL)
+    if not seal or len(digest) != len(_digest(b"")):
+        return False
+    if digest != _digest(whole):
         raise ValueError("what it holds is not what was written")
     return True
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.sha256(content).hexdigest().encode()
 
 
 def _read_elsewhere(path: Path) -> None:
@@ -167,4 +159,4 @@ def _read_elsewhere(path: Path) -> None:
     except subprocess.TimeoutExpired:
         raise ValueError(f"damaged: reading it does not end in {LIMIT:g} s") from None
     if ended.returncode:
-        raise ValueError("damaged, or no netCDF-4 file")
+        raise ValueError(DAMAGED)

@@ -6,7 +6,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from vehiclemor.codegen.cache import source_digest
+from vehiclemor.codegen.sources import source_digest
+from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
@@ -34,13 +35,14 @@ FILES = (
 @cache
 def versions() -> str:
     """Versions of Python and of the packages that take part, as one line."""
-    found = [f"Python {platform.python_version()}"]
-    for package in PACKAGES:
-        try:
-            found.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
-            found.append(f"{package} (not installed)")
-    return ", ".join(found)
+    return ", ".join([f"Python {platform.python_version()}", *map(_version, PACKAGES)])
+
+
+def _version(package: str) -> str:
+    try:
+        return f"{package} {version(package)}"
+    except PackageNotFoundError:
+        return f"{package} (not installed)"
 
 
 @cache
@@ -75,11 +77,13 @@ def attributes(title: str, kernel_hash: str, **further: object) -> dict[str, obj
 def code_digest(model: str, method: str) -> str:
     """Hash of the source that computes a result.
 
-    These are the layers of this package and, for a plug-in, all of its top-level package and its
-    version.  Results computed by other source are never taken for finished ones.
+    These are the layers of this package and, for a plug-in, all of its top-level package; and the
+    versions of the packages that the method declares.  Results computed by other source are never
+    taken for finished ones.
     """
-    parts = (component("model", model), component("method", method))
-    return source_digest(LAYERS, FILES, parts)
+    used: Method = component("method", method)
+    source = source_digest(LAYERS, FILES, (component("model", model), used))
+    return " ".join([source, *map(_version, used.packages)])
 
 
 @cache

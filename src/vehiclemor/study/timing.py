@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
@@ -113,7 +114,7 @@ def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: s
 
 def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
     """What is stored for this content and machine, or else is made and stored at `path`."""
-    text = json.dumps([content, machine(), REPEATS, REPEATS_OF_LONG, CLOCK])
+    text = json.dumps([content, machine(), compiler_identity(), REPEATS, REPEATS_OF_LONG, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     return stored(path, "timing", key, make)
 

@@ -9,36 +9,34 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 from vehiclemor.codegen.cache import cache_folder
-from vehiclemor.errors import MachineError, machine_reason
+from vehiclemor.errors import FileError, MachineError, machine_reason
 from vehiclemor.study.evaluate import evaluate, layout_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
-    cell_path,
+    cell_end,
     finished_cells,
     prepare_folder,
     read_cell,
-    remove_partial,
     write_cell,
+    write_encoded,
 )
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
+    from concurrent.futures import Executor, Future
 
     import xarray as xr
 
 Groups = Sequence[Sequence[Experiment]]
-# Keys of what is finished of a group, and how the machine has failed in the rest, if it has.
-Done = tuple[list[str], str]
-# What evaluates groups elsewhere and stores their results, if so each by itself.
-Engine = Callable[[Groups, Path, bool], Generator[Done, None, None]]
 # How often what the machine has spoiled is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
 # Batches sent for each worker, so that none is idle; more would not fit into its queue.
@@ -47,6 +45,31 @@ WAITING = 2
 BATCH, LARGEST = 0.5, 100
 KILLED = "a worker process was killed, perhaps for lack of memory"
 _LOG = logging.getLogger("vehiclemor")
+
+
+class Done(NamedTuple):
+    """What has become of some experiments.
+
+    Attributes
+    ----------
+    finished
+        Keys.
+    fault
+        How the machine has failed in the others, if there are any.
+    seconds
+        That all have taken.
+    sent
+        Key -> content of a cell's file that the driver is to write.
+    """
+
+    finished: list[str]
+    fault: str = ""
+    seconds: float = 0.0
+    sent: Mapping[str, bytes] = MappingProxyType({})
+
+
+# What evaluates groups elsewhere, if so each by itself.
+Engine = Callable[[Groups, Path, bool], Generator[Done, None, None]]
 
 
 @dataclass
@@ -68,7 +91,6 @@ class Workers:
         MachineError
             If the machine has failed again and again; what was finished is stored.
         """
-        remove_partial(self.folder)
         wanted = {e.key: e for group in groups for e in group}
         self.asked |= wanted.keys()
         self.finished |= finished_cells(
@@ -110,28 +132,25 @@ class Workers:
 
     def _evaluated(self, work: list[list[Experiment]], again: bool) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
-        # Starting processes costs seconds: a handful of groups is quicker without.  But what has
-        # killed a worker would kill this process too.
-        few = len(work) < 2 * self.jobs and not again
-        if not self.elsewhere and (self.jobs == 1 or few):
-            for group in work:
-                yield self._taken(*evaluate_and_store(group, self.folder))
-            return
         # One group of each method first, so that workers compile different loops at a time.
         first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
         work.sort(key=lambda group: id(group) not in first)
+        # Starting processes costs seconds: a handful of groups is quicker without.  But what has
+        # killed a worker would kill this process too.
+        few = len(work) < 2 * self.jobs and not again
         if self.elsewhere:
             engine = self.elsewhere(work, self.folder, again)
+        elif self.jobs == 1 or few:
+            engine = (evaluate_and_store(group, self.folder) for group in work)
         else:
             engine = evaluated_by_workers(work, self.folder, self.jobs)
         with closing(engine):
             for done in engine:
-                yield self._taken(*done)
-
-    def _taken(self, finished: list[str], fault: str) -> str:
-        self.finished.update(finished)
-        self._report()
-        return fault
+                for key, content in done.sent.items():
+                    write_encoded(content, self.folder, key)
+                self.finished.update(done.finished)
+                self._report()
+                yield done.fault
 
 
 def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
@@ -142,72 +161,53 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     MachineError
         If a result can't be stored: no other could.
     """
-    # Another driver may have stored it, or a worker that was killed before it could say so.
-    there = {e.key for e in experiments if cell_path(folder, e.key).exists()}
-    left = [e for e in experiments if e.key not in there]
-
-    def keep(key: str, dataset: xr.Dataset, seconds: float) -> None:
-        write_cell(dataset, folder, key, seconds)
-
-    finished, fault = evaluated(left, keep)
-    return [*there, *finished], fault
-
-
-def evaluated(
-    experiments: Sequence[Experiment], keep: Callable[[str, xr.Dataset, float], object]
-) -> Done:
-    """Evaluate some experiments, and keep what each gives, under its key, and its seconds."""
-    finished, fault = [], ""
+    finished, fault, first = [], "", time.perf_counter()
     for experiment in experiments:
-        began = time.perf_counter()
-        try:
-            dataset = evaluate(experiment)
-        except Exception as error:
-            fault = str(error) if isinstance(error, MachineError) else machine_reason(error)
-            if not fault:
-                raise
-            continue
-        keep(experiment.key, dataset, time.perf_counter() - began)
+        # Another driver may have stored it, or a worker that was killed before it could say so.
+        if not is_stored(folder, experiment.key):
+            began = time.perf_counter()
+            try:
+                dataset = evaluate(experiment)
+            except Exception as error:
+                fault = str(error) if isinstance(error, MachineError) else machine_reason(error)
+                if not fault:
+                    raise
+                continue
+            write_cell(dataset, folder, experiment.key, time.perf_counter() - began)
         finished.append(experiment.key)
-    return finished, fault
+    return Done(finished, fault, time.perf_counter() - first)
 
 
-class Timed(NamedTuple):
-    """What a batch gives, and the seconds that a worker took for it."""
-
-    result: Any
-    seconds: float
-
-
-def timed_batch(work: Callable[..., Any], *arguments: object) -> Timed:
-    """Run a batch on a worker."""
-    began = time.perf_counter()
-    return Timed(work(*arguments), time.perf_counter() - began)
+def is_stored(folder: Path, key: str) -> bool:
+    """Whether a finished result is stored, by its header."""
+    try:
+        return cell_end(folder, key)[1]
+    except FileError:
+        return False
 
 
 def in_batches(
+    pool: Executor,
+    work: Callable[[list[Experiment]], Done],
     groups: Groups,
-    submit: Callable[[list[Experiment]], Future[Timed]],
     places: Callable[[], int],
-    taken: Callable[[Future[Timed]], Timed],
     most: int = LARGEST,
-) -> Generator[Any, None, None]:
-    """Send groups to workers, several at once where they are quick; gives what comes back.
+    killed: type[Exception] | tuple[()] = (),
+) -> Generator[Done, None, None]:
+    """What some work gives for each batch of groups; where they are quick, a batch has several.
 
     Parameters
     ----------
-    submit
-        Sends a batch.
     places
         Tells how many batches can be worked at a time.
-    taken
-        Gives what a batch that is done has given.
     most
         Experiments of a batch, unless one group has more.
+    killed
+        Raised of a batch whose worker was killed, while the pool lives on.
     """
     from concurrent.futures import FIRST_COMPLETED, wait
 
-    waiting: dict[Future[Timed], int] = {}
+    waiting: dict[Future[Done], int] = {}
     left, size = deque(groups), 1
     while left or waiting:
         at_once = WAITING * max(places(), 1)
@@ -216,19 +216,20 @@ def in_batches(
             # The last batches are small, so that workers end together.
             while left and len(batch) + len(left[0]) <= min(size, len(left) // at_once):
                 batch += left.popleft()
-            waiting[submit(batch)] = len(batch)
+            waiting[pool.submit(work, batch)] = len(batch)
         for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-            number, (result, seconds) = waiting.pop(future), taken(future)
-            if seconds > 0.0:
-                size = int(min(max(BATCH * number / seconds, 1), most))
-            yield result
+            number = waiting.pop(future)
+            try:
+                done = future.result()
+            except killed:
+                done = Done([], KILLED)
+            if done.seconds > 0.0:
+                size = int(min(max(BATCH * number / done.seconds, 1), most))
+            yield done
 
 
-def evaluated_by_workers(
-    groups: Groups, folder: Path, jobs: int, work: Callable[..., Done] = evaluate_and_store
-) -> Generator[Done, None, None]:
+def evaluated_by_workers(groups: Groups, folder: Path, jobs: int) -> Generator[Done, None, None]:
     """What `evaluate_and_store` gives for each batch, in processes that end with this one."""
-    from concurrent.futures import Future
     from concurrent.futures.process import BrokenProcessPool
 
     from joblib.externals.loky import get_reusable_executor
@@ -242,19 +243,14 @@ def evaluated_by_workers(
         initargs=(os.getpid(), str(cache_folder())),
         env={"PYTHONFAULTHANDLER": ""},
     )
-
-    def submit(batch: list[Experiment]) -> Future[Timed]:
-        return pool.submit(timed_batch, work, batch, folder)
-
     try:
-        yield from in_batches(groups, submit, lambda: jobs, Future.result)
+        work = partial(evaluate_and_store, folder=folder)
+        yield from in_batches(pool, work, groups, lambda: jobs)
     except BrokenProcessPool:
-        yield [], KILLED
+        yield Done([], KILLED)
     except BaseException:
         pool.shutdown(kill_workers=True)
         raise
-    finally:
-        remove_partial(folder)
 
 
 def begin(driver: int, cache: str) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.unit import standard_problems
-from vehiclemor.codegen import cache
 from vehiclemor.codegen import derivation as kept
+from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.multibody import definition
 from vehiclemor.symbolic.program import Program
@@ -109,12 +109,12 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("models/a.py", "models/parts/b.py", "symbolic/c.py", "other.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(f"# {name}\n")
-    monkeypatch.setattr(cache, "PACKAGE", root)
+    monkeypatch.setattr(sources, "PACKAGE", root)
     return root
 
 
 def digest() -> str:
-    return cache.source_digest(("models",), ("other.py",), ())
+    return sources.source_digest(("models",), ("other.py",), ())
 
 
 def test_a_digest_follows_the_source_files_of_its_layers_alone(package: Path) -> None:
@@ -124,7 +124,7 @@ def test_a_digest_follows_the_source_files_of_its_layers_alone(package: Path) ->
     assert seen == {digest()}
     for name in ("models/a.py", "models/parts/b.py", "other.py"):
         with (package / name).open("a") as file:
-            file.write("#\n")
+            file.write("changed\n")
         seen.add(digest())
     new = package / "models" / "new.py"
     new.write_text("")
@@ -135,19 +135,18 @@ def test_a_digest_follows_the_source_files_of_its_layers_alone(package: Path) ->
     (package / "models" / "a.py").unlink()
     seen.add(digest())
     assert len(seen) == 7
-    assert cache.source_digest(("models", "symbolic"), ("other.py",), ()) not in seen
+    assert sources.source_digest(("models", "symbolic"), ("other.py",), ()) not in seen
 
 
 def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
     """Changing the vehicle, the tape or the emitter changes the digest."""
-    files = {path.name for layer in kept.LAYERS for path in (cache.PACKAGE / layer).rglob("*.py")}
+    files = {path.name for layer in kept.LAYERS for path in (sources.PACKAGE / layer).rglob("*.py")}
     assert {"equations.py", "tape.py", "kernel_text.py", "llvm_kernels.py"} <= files
 
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
     layers = ("models",)
-    assert cache.source_digest(layers, (), (definition.ModelDefinition,)) == cache.source_digest(
-        layers, (), ()
-    )
-    plugged = cache.source_digest(layers, (), (standard_problems,))
-    assert plugged != cache.source_digest(layers, (), ())
+    own = sources.source_digest(layers, (), (definition.ModelDefinition,))
+    assert own == sources.source_digest(layers, (), ())
+    plugged = sources.source_digest(layers, (), (standard_problems,))
+    assert plugged != sources.source_digest(layers, (), ())

@@ -89,14 +89,6 @@ def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
     assert identity() == before
 
 
-def test_the_hash_of_a_model_follows_text_and_compiler(monkeypatch):
-    digest = cache.kernel_hash("x = 1\n")
-    assert digest == cache.kernel_hash("x = 1\n")
-    assert digest != cache.kernel_hash("x = 2\n")
-    monkeypatch.setattr(cache, "compiler_identity", lambda: "another")
-    assert digest != cache.kernel_hash("x = 1\n")
-
-
 def test_what_is_missing_has_no_address():
     kernels = Kernels(kernel_sources(TEXT))
     assert "triple" not in kernels

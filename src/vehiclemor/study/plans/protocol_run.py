@@ -28,7 +28,7 @@ from vehiclemor.study.plans.sensitive import reasons, second_run
 from vehiclemor.study.plans.study_file import DRAWN, StudyFile
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import result_path
+from vehiclemor.study.store import cell_path
 from vehiclemor.study.workers import Engine, Workers
 
 if TYPE_CHECKING:
@@ -69,13 +69,13 @@ def run_protocol(
         )
     timed = timed_rows(protocol, rows, found, sets, path)
     keys = sorted(workers.asked)
-    parts = [layout_digest(), protocol.definition.model_dump_json(), *keys]
+    parts = [layout_digest(), protocol.definition.model_dump_json(), timed.attrs["timing"], *keys]
     return stored(
         path,
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
         lambda: protocol_dataset(protocol, rows, found, (timed, apart)),
-        lambda: [Path(timed.encoding["source"]), *(result_path(folder, key) for key in keys)],
+        lambda: (cell_path(folder, key) for key in keys),
         of,
     )
 

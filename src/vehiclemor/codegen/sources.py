@@ -1,0 +1,111 @@
+"""Digests of source: what a program says, not how it is written down.
+
+They hold for the syntax tree without comments and docstrings, so an edited comment makes nothing
+stale.  Parsing the package takes half a second, so the digest is kept under a hash of the bytes.
+"""
+
+import ast
+import hashlib
+import inspect
+import sys
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from vehiclemor.codegen.cache import fetched
+
+PACKAGE = Path(__file__).resolve().parents[1]
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def source_digest(layers: Sequence[str], files: Sequence[str], components: Sequence[object]) -> str:
+    """Hash of layers and files of this package, and of plug-ins.
+
+    Parameters
+    ----------
+    layers
+        Folders of the package, with all that is in them.
+    files
+        Further files of the package.
+    components
+        Of a plug-in, all of its top-level package counts.
+    """
+    paths = [path for layer in layers for path in sorted((PACKAGE / layer).rglob("*.py"))]
+    paths += [PACKAGE / name for name in files]
+    texts = [(path.relative_to(PACKAGE).as_posix(), path.read_bytes()) for path in paths]
+    texts += [("", text) for component in components for text in _plug_in_texts(component)]
+    # This file decides what a text means.
+    written = _hash([("", Path(__file__).read_bytes()), *texts])
+    name = f"sources/source-{written}"
+    return fetched(name, lambda: _hash([(n, _meaning(t)) for n, t in texts]).encode()).decode()
+
+
+def _hash(texts: Sequence[tuple[str, bytes]]) -> str:
+    digest = hashlib.sha256()
+    for name, text in texts:
+        digest.update(f"{name} {len(text)}\n".encode())
+        digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+# Layers share files.
+@cache
+def _meaning(text: bytes) -> bytes:
+    """Hash of the syntax tree of a text; of what is no Python, the text itself."""
+    try:
+        tree = ast.parse(text)
+        for node in ast.walk(tree):
+            if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+                del node.body[0]
+        return hashlib.sha256(_written(tree).encode(errors="surrogatepass")).digest()
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return text
+
+
+def _written(node: object) -> str:
+    """As `ast.dump`, which versions of Python do differently: some leave out what is empty."""
+    if isinstance(node, list):
+        return f"[{', '.join(map(_written, node))}]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    fields = [f"{n}={_written(v)}" for n, v in ast.iter_fields(node) if v is not None and v != []]
+    return f"{type(node).__name__}({', '.join(fields)})"
+
+
+def _plug_in_texts(thing: object) -> list[bytes]:
+    """Source texts of the package, or of the single file with its neighbours, of a component."""
+    module = _module_of(thing)
+    if module is None or module.__file__ is None:
+        return [repr(thing).encode()]
+    top = module.__name__.split(".")[0]
+    if top == "vehiclemor":
+        return []
+    folders = list(getattr(sys.modules.get(top), "__path__", ()))
+    if folders:
+        paths = [path for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
+        return [path.read_bytes() for path in paths]
+    return [path.read_bytes() for path in sorted(_neighbours(module, set()))]
+
+
+def _module_of(thing: object) -> ModuleType | None:
+    """The module that a component is, or that its functions or its class come from."""
+    if isinstance(thing, ModuleType):
+        return thing
+    for name in ("derive", "fit", "signal"):
+        if callable(function := getattr(thing, name, None)):
+            return inspect.getmodule(function)
+    return inspect.getmodule(thing) or inspect.getmodule(type(thing))
+
+
+def _neighbours(module: ModuleType, found: set[Path]) -> set[Path]:
+    """File of a module, and those in its folder of what it has imported."""
+    if module.__file__ is None or Path(module.__file__) in found:
+        return found
+    found.add(Path(module.__file__))
+    for value in list(vars(module).values()):
+        other = value if isinstance(value, ModuleType) else inspect.getmodule(value)
+        origin = getattr(other, "__file__", None)
+        if other is not None and origin and Path(origin).parent == Path(module.__file__).parent:
+            _neighbours(other, found)
+    return found
