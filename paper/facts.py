@@ -98,9 +98,10 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     """A study, or a table of the report; what the folder lacks is run first."""
     import pandas as pd
 
+    from vehiclemor.report.costs import cost_table
     from vehiclemor.report.predictive.rows import predictive_comparison
     from vehiclemor.report.published import load_published
-    from vehiclemor.report.tables import cost_table, operation_table
+    from vehiclemor.report.tables import operation_table
     from vehiclemor.study.run import run_studies
 
     kind, _, model = source.partition(" ")

@@ -10,9 +10,9 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
+from vehiclemor.report.comparison.screens import comparison_text
 from vehiclemor.report.predictive.rows import method_rows, predictive_comparison, protocol_of
 from vehiclemor.report.predictive.targets import target_rows
-from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose
@@ -203,8 +203,8 @@ def test_the_comparison_marks_the_winner_and_judges_it(done):
     assert set(targets["verdict"]) <= {"met", "missed", "not_comparable"}
     assert set(targets["threshold_source"]) <= {"published", "ours"}
     assert {"silent misses", "silent misses outside"} <= set(targets["item"])
-    text = predictive_text(rows)
-    assert "* fixed basis" in text
+    text = comparison_text("predictive", rows, folder)
+    assert "fixed basis (chosen)" in text
     assert "newton 1e-6" in text
     json.loads(rows.to_json(orient="records"))
 

@@ -8,8 +8,7 @@ from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.key_values import key_values
-from vehiclemor.cli.table import print_table
-from vehiclemor.report.printing import wrapped
+from vehiclemor.report.printing import table, wrapped
 
 
 def show(
@@ -51,7 +50,7 @@ def _print(key: str, content: object, indent: str = "") -> None:
     elif isinstance(content, list) and content and isinstance(content[0], dict):
         for heading, rows in _by_source(key, content).items():
             print(f"\n{heading}:")
-            print_table(rows)
+            print(table(rows))
     elif content:
         text = ", ".join(map(str, content)) if isinstance(content, list) else content
         print(wrapped(f"{key}: {text}", len(indent), len(indent) + 2))

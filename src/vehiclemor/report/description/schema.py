@@ -17,7 +17,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 WORDS = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
 
 
-def schema_description(name: str) -> dict[str, object]:
+def schema_description(name: str) -> dict[str, Any]:
     """Every key of a file: type, default and meaning."""
     schema = SCHEMAS[name].model_json_schema()
     tables = {key: rows(part) for key, part in schema.get("$defs", {}).items()}

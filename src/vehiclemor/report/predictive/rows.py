@@ -9,8 +9,13 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.report.predictive.equal_error import at_error
-from vehiclemor.report.predictive.rates import upper_bound
-from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
+from vehiclemor.report.predictive.targets import (
+    Row,
+    error_columns,
+    ratio,
+    target_rows,
+    upper_bound,
+)
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
