@@ -6,7 +6,7 @@ Usage: python paper/schemas.py
 from pathlib import Path
 
 from vehiclemor.files import write_text
-from vehiclemor.report.description.schema import SCHEMAS, schema_description
+from vehiclemor.report.description import SCHEMAS, schema_description
 from vehiclemor.report.printing import table
 
 PAGE = Path(__file__).resolve().parent / "handbook" / "study-schema.md"

@@ -23,6 +23,8 @@ Rows = Sequence[Mapping[str, Any]]
 WIDTH, WIDEST = 80, 120
 # A column of texts is never narrower, where its texts are longer.
 NARROWEST = 12
+# Indent of a note.
+NOTE = 4
 
 
 class Column(NamedTuple):
@@ -117,7 +119,7 @@ COLUMNS = {
     "bound": Column("bound", NUMBER),
     "measured": Column("measured", NUMBER),
     "reproduced": Column("reproduced", NUMBER),
-    "signal_rms": Column("signal", ERROR, "RMS of the signal itself, the error of predicting zero"),
+    "signal_rms": Column("signal", ERROR, "RMS of the signal itself"),
     "not_comparable": Column("not comparable", COUNT),
     "reason": Column("why"),
 }
@@ -147,6 +149,7 @@ def table(
     to: Format = "terminal",
     *,
     group: str = "",
+    note: str = "",
     explain: bool = True,
 ) -> str:
     """Rows as a table.
@@ -163,6 +166,8 @@ def table(
         digits.  `html`: headings, three digits, all digits in the attribute `value`.
     group
         Column whose values stand in lines of their own above their rows.
+    note
+        Column whose texts stand below their rows, over the whole width.
     explain
         Whether meanings stand below.
     """
@@ -170,7 +175,7 @@ def table(
         records = rows if isinstance(rows, Sequence) else rows.to_dict("records")
         names = columns or (records[0] if records else ())
         kinds = columns if isinstance(columns, Mapping) else {name: column(name) for name in names}
-        return _terminal(records, kinds, group) + (legend(kinds.values()) if explain else "")
+        return _terminal(records, kinds, group, note) + (legend(kinds.values()) if explain else "")
     import pandas as pd
 
     frame: Any = pd.DataFrame(rows)
@@ -205,7 +210,7 @@ def _html_cell(value: object) -> str:
     )
 
 
-def _terminal(records: Rows, columns: Mapping[str, Column], group: str) -> str:
+def _terminal(records: Rows, columns: Mapping[str, Column], group: str, note: str) -> str:
     from rich.console import Console, Group
     from rich.table import Table
     from rich.text import Text
@@ -235,9 +240,12 @@ def _terminal(records: Rows, columns: Mapping[str, Column], group: str) -> str:
         if group and row[group] != last:
             last = row[group]
             parts.append(Text(str(last)))
+        if not isinstance(parts[-1], Table):
             start(header=False)
         assert isinstance(parts[-1], Table)
         parts[-1].add_row(*map(Text, line))
+        if note and row[note]:
+            parts.append(Text(wrapped(str(row[note]), NOTE, NOTE)))
     console = Console(width=width(), color_system=None, highlight=False)
     with console.capture() as captured:
         console.print(Group(*parts))

@@ -58,33 +58,29 @@ class Row(NamedTuple):
     id: str
     model: str
     item: str
-    variant: str
-    start: str
-    published: float
-    bound: float
-    reproduced: float
-    unit: str
-    floor: float
-    replay: float
-    within: bool | None
-    verdict: str
-    measure: str
-    reason: str
-    threshold_source: str
+    variant: str = ""
+    start: str = PUBLISHED_START
+    published: float = math.nan
+    bound: float = math.nan
+    reproduced: float = math.nan
+    unit: str = "-"
+    floor: float = math.nan
+    replay: float = math.nan
+    within: bool | None = None
+    verdict: str = NOT_COMPARABLE
+    measure: str = ""
+    reason: str = ""
+    threshold_source: str = ""
     signal_rms: float = math.nan
     strongest: float = math.nan
 
 
 COLUMNS = Row._fields
-_UNKNOWN = Row(
-    *("", ALL_MODELS, "", "", PUBLISHED_START, math.nan, math.nan, math.nan, "-"),
-    *(math.nan, math.nan, None, NOT_COMPARABLE, "", "", ""),
-)
 
 
 def number_row(number: Number, variant: str, start: str, reproduced: float, within: bool) -> Row:
     """Row of a printed number, judged by it."""
-    return _UNKNOWN._replace(
+    return Row(
         id=number.id,
         model=number.model,
         item=f"{number.item} (figure {number.figure})" if number.figure else number.item,
@@ -100,22 +96,15 @@ def number_row(number: Number, variant: str, start: str, reproduced: float, with
     )
 
 
-def not_comparable(entry: Number | Claim, reason: str) -> Row:
-    """Row of something that can't be reproduced."""
-    if isinstance(entry, Number):
-        row = number_row(entry, "", PUBLISHED_START, math.nan, False)
-        return row._replace(within=None, verdict=NOT_COMPARABLE, reason=reason)
-    return _of_claim(entry)._replace(reason=reason)
-
-
-def _of_claim(claim: Claim) -> Row:
+def claim_row(
+    claim: Claim, variant: str = "", finding: Finding | None = None, start: str = PUBLISHED_START
+) -> Row:
+    """Row of a claim by its criterion; not comparable without a finding."""
     statement = f"figure {claim.figure}: {claim.statement}" if claim.figure else claim.statement
-    return _UNKNOWN._replace(id=claim.id, model=claim.model or ALL_MODELS, item=statement)
-
-
-def claim_row(claim: Claim, variant: str, finding: Finding, start: str = PUBLISHED_START) -> Row:
-    """Row of a claim by its criterion."""
-    return _of_claim(claim)._replace(
+    row = Row(claim.id, claim.model or ALL_MODELS, statement)
+    if finding is None:
+        return row
+    return row._replace(
         variant=variant,
         start=start,
         bound=finding.bound,
@@ -127,6 +116,12 @@ def claim_row(claim: Claim, variant: str, finding: Finding, start: str = PUBLISH
         reason=finding.seen or finding.measure,
         threshold_source=finding.threshold,
     )
+
+
+def undecided(row: Row, reason: str) -> Row:
+    """A row that can't be compared after all; one that is not judged stays so."""
+    verdict = NOT_COMPARABLE if row.start == PUBLISHED_START else row.verdict
+    return row._replace(within=None, verdict=verdict, reason=reason)
 
 
 def error_rows(number: Number, nominal: xr.Dataset) -> list[Row]:
@@ -168,7 +163,7 @@ def claim_rows(claim: Claim, results: Results) -> list[Row]:
         return []
     if claim.id not in CRITERIA:
         reason = "an explanation or a judgement; the paper prints nothing that could be measured"
-        return [not_comparable(claim, reason)]
+        return [claim_row(claim)._replace(reason=reason)]
     criterion, rows = CRITERIA[claim.id], []
     own = [results[study] for study in criterion.studies if claim.model]
     starts = dict.fromkeys(str(start) for data in own for start in data["start"].values.ravel())

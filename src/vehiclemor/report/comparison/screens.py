@@ -113,12 +113,9 @@ def _errors(rows: list[Row]) -> str:
         "unit": Column("unit"),
     }
     empty = [f"{r['item']} ({r['of']})" for r in lines if r["signal_rms"] <= r["published"]]
-    text = table(lines, columns, group="of")
-    if empty:
-        text += "\n" + wrapped(
-            f"Empty bounds, since predicting zero meets them: {', '.join(empty)}."
-        )
-    return text
+    note = f"signal: {columns['signal_rms'].meaning}"
+    note += f".  Empty bounds, which zero would meet: {', '.join(empty)}" if empty else ""
+    return f"{table(lines, columns, group='of', explain=False)}\n{wrapped(f'({note}.)', 0, 1)}"
 
 
 def _times(rows: list[Row]) -> str:
@@ -193,7 +190,6 @@ def _claims(rows: list[Row], folder: Path) -> list[str]:
         "floor": Column("projection", ".2g"),
         "replay": Column("replay", ".3g"),
         "verdict": Column("verdict"),
-        "reason": column("reason"),
     }
     for model, own in _by(rows, "model").items():
         lines = []
@@ -204,14 +200,16 @@ def _claims(rows: list[Row], folder: Path) -> list[str]:
             start = "" if row["start"] == PUBLISHED_START else f", {row['start']}"
             words = {True: "within", False: "beyond", None: "not comparable"}[row["within"]]
             verdict = words if row["verdict"] == OURS else VERDICTS[row["verdict"]]
-            reason = row["reason"].removeprefix(PARAMETERS).removeprefix("; ")
+            reason = row["reason"].replace(f"{PARAMETERS}; ", "").replace(row["measure"], "")
             lines.append(
                 row
                 | {"heading": wrapped(f"{row['item']}{unit}{measure}", 0, 2), "reason": reason}
                 | {"who": f"{row['variant']}{start}", "verdict": verdict}
                 | {"bound": shown(row["bound"], ".3g") + mark}
             )
-        parts.append(f"{model.replace('_', ' ')}\n{table(lines, columns, group='heading')}")
+        parts.append(
+            f"{model.replace('_', ' ')}\n{table(lines, columns, group='heading', note='reason')}"
+        )
     models = [model for model in _by(rows, "model") if model != ALL_MODELS]
     parts += [costs_text(model, folder, brief=model != models[-1]) for model in models]
     return parts
