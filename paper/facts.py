@@ -98,9 +98,10 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     """A study, or a table of the report; what the folder lacks is run first."""
     import pandas as pd
 
-    from vehiclemor.report.predictive.rows import predictive_comparison
+    from vehiclemor.report.comparison.kinds import study_comparison
+    from vehiclemor.report.costs import cost_table
     from vehiclemor.report.published import load_published
-    from vehiclemor.report.tables import cost_table, operation_table
+    from vehiclemor.report.tables import operation_table
     from vehiclemor.study.run import run_studies
 
     kind, _, model = source.partition(" ")
@@ -121,7 +122,7 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
     if kind == "predictive":
-        rows = predictive_comparison(folder, jobs)
+        rows = study_comparison("predictive", folder, jobs)
         rows = rows[rows["kind"] == "method"].dropna(axis=1, how="all")
         return rows.set_index(["model", "label"]).to_xarray()
     return run_studies(source, folder, jobs)[source]

@@ -5,11 +5,9 @@ Usage: python paper/schemas.py
 
 from pathlib import Path
 
-import pandas as pd
-
 from vehiclemor.files import write_text
-from vehiclemor.report.description.schema import SCHEMAS, schema_description
-from vehiclemor.report.tables import markdown
+from vehiclemor.report.description import SCHEMAS, schema_description
+from vehiclemor.report.printing import table
 
 PAGE = Path(__file__).resolve().parent / "handbook" / "study-schema.md"
 HEAD = """# Schema of the files
@@ -28,8 +26,7 @@ def page() -> str:
         described.pop("schema")
         for title, rows in described.items():
             heading = "" if title == "keys" else f"### {title}\n\n"
-            table = pd.DataFrame(rows).map(lambda value: "" if value is None else value)
-            parts.append(heading + markdown(table))
+            parts.append(heading + table(rows, to="markdown"))
     return "\n".join(parts)
 
 

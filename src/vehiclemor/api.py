@@ -82,7 +82,7 @@ def describe(
     VehiclemorError
         If nothing has that name, or a parameter is wrong.
     """
-    from vehiclemor.report.description.describe import description
+    from vehiclemor.report.description import description
 
     path = None if parameter_file is None else file_path("parameter_file", parameter_file)
     return description(name, parameters, path)

@@ -9,7 +9,7 @@ from vehiclemor.cli.key_values import parsed
 from vehiclemor.codegen import cache, derivation
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
-from vehiclemor.report.description.schema import SCHEMAS
+from vehiclemor.report.description import SCHEMAS
 from vehiclemor.resources import data_names, handbook_folder
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol

@@ -8,9 +8,9 @@ import pytest
 
 from tests.study.small import small_study
 from vehiclemor.cli import main
-from vehiclemor.report import errors, tables
+from vehiclemor.report import frames, tables
 from vehiclemor.report.comparison import kinds
-from vehiclemor.report.comparison.paper import paper_comparison
+from vehiclemor.report.comparison.kinds import paper_comparison
 from vehiclemor.report.comparison.rows import COLUMNS, Row
 from vehiclemor.report.comparison.times import agreement_rows, time_rows
 from vehiclemor.report.costs import cost_table
@@ -174,7 +174,7 @@ def test_counts_of_a_vehicle(results_folder, model, reduced, share, yaw):
 
 
 def test_errors_of_a_vehicle_by_groups_of_quantities(results_folder):
-    table = errors.quantity_table("high_fidelity_vehicle", results_folder)
+    table = frames.quantity_table("high_fidelity_vehicle", results_folder)
     assert set(table["group"]) == {"coordinate", "speed", "output", "constraint"}
     exact = table[table["label"] == "replay"]
     assert (exact[exact["group"] != "constraint"]["rms"] == 0.0).all()
@@ -189,19 +189,62 @@ def test_errors_of_a_vehicle_by_groups_of_quantities(results_folder):
     assert one["quantity"].str.len().min() > 0
 
 
-def test_command_prints_tables_that_fit_and_says_that_bounds_are_missed(
-    results_folder, capsys, monkeypatch, rows
-):
+@pytest.fixture
+def said(results_folder, capsys, monkeypatch, rows):
+    """Run `compare` on the stored rows: exit status and what it prints."""
     monkeypatch.setattr(kinds, "compare", lambda *_: rows)
     monkeypatch.setenv("COLUMNS", "80")
-    status = main(["compare", "--out", str(results_folder)])
-    assert status == int((rows["verdict"] == "missed").any())
-    printed = capsys.readouterr().out
-    assert max(map(len, printed.splitlines())) <= 80
-    for word in ("bound", "floor", "replay", "missed", "dropped", "break-even"):
-        assert word in printed
-    assert main(["compare", "--json", "--out", str(results_folder)]) == status
-    assert len(json.loads(capsys.readouterr().out)) == len(rows)
+
+    def run(*arguments):
+        status = main(["compare", *arguments, "--out", str(results_folder)])
+        return status, capsys.readouterr().out
+
+    return run
+
+
+def test_one_screen_has_the_printed_numbers_beside_the_signals_and_what_is_missed(said, rows):
+    status, text = said()
+    lines = text.splitlines()
+    assert status == 0
+    assert len(lines) <= 60
+    assert max(map(len, lines)) <= 80
+    plain = " ".join(text.split())
+    judged = rows[rows["start"] == "equilibrium"]
+    errors = judged[judged["id"].str.contains("_rms_")]
+    assert len(errors) == 2 * 6
+    for row in errors.to_dict("records"):
+        name = row["item"].split(" the ", 1)[1].split(" (figure")[0]
+        (line,) = [line for line in lines if line.startswith(name)]
+        for key in ("published", "signal_rms", "reproduced"):
+            assert f"{row[key]:.1e}" in line
+    for row in judged[judged["id"].str.contains("_time_reduction")].to_dict("records"):
+        assert f"{1.0 - row['published']:.2f}" in text
+        assert f"{1.0 - row['reproduced']:.2f}" in text
+    claims = judged[judged["published"].isna() & judged["verdict"].eq("missed")]
+    for item in set(claims["item"]):
+        assert " ".join(item.split()) in plain
+    empty = errors[errors["signal_rms"] <= errors["published"]]
+    assert set(empty["id"]) == {"gv_rms_pitch", "hfv_rms_vertical_speed"}
+
+
+def test_the_rms_of_a_signal_is_the_error_of_predicting_zero(rows, results_folder):
+    data = run_studies("paper", results_folder)["figures-6-7"]
+    place = {"label": "full_order", "output": "spindle_y"}
+    signal = data["reference_outputs"].sel(place).isel(rank=0).squeeze().values
+    found = rows[rows["id"] == "dw_rms_spindle_y"]["signal_rms"]
+    np.testing.assert_allclose(found, np.linalg.norm(signal) / np.sqrt(signal.size), rtol=1e-12)
+
+
+def test_all_claims_and_costs_fit_the_terminal_and_json_has_every_row(said, rows):
+    status, text = said("--all")
+    assert status == 0
+    assert max(map(len, text.splitlines())) <= 80
+    plain = " ".join(text.split())
+    for row in rows.to_dict("records"):
+        assert " ".join(row["item"].split()) in plain
+    for word in ("projection", "replay", "dropped", "offline"):
+        assert word in plain
+    assert len(json.loads(said("--json")[1])) == len(rows)
 
 
 def test_figures_and_tables_are_byte_identical(results_folder, tmp_path, monkeypatch, rows):
@@ -239,7 +282,7 @@ def test_map_is_drawn_from_any_grid(tmp_path):
 
 def test_table_of_settings_records_what_does_not_fit(tmp_path):
     path = small_study(tmp_path, SETTINGS, "pod", model=VEHICLES[0])
-    table = errors.settings_table(str(path), ("pitch", "yaw"), tmp_path / "results")
+    table = frames.settings_table(str(path), ("pitch", "yaw"), tmp_path / "results")
     table = table.set_index(["formulation", "rank"])
     assert len(table) == 4
     assert (table.xs(7, level="rank")["status"] == "rejected").all()
@@ -252,12 +295,15 @@ def test_table_of_settings_records_what_does_not_fit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("what", "verdicts", "status"),
+    ("what", "verdicts", "missed"),
     [
         ("paper", ["met", "not_comparable", "ours"], 0),
         ("predictive", ["met", "missed", "not_comparable"], 1),
     ],
 )
-def test_only_what_is_missed_counts_for_the_exit_status(monkeypatch, what, verdicts, status):
+def test_a_missed_bound_is_a_result_and_a_failure_only_where_one_asks(
+    monkeypatch, what, verdicts, missed
+):
     monkeypatch.setattr(kinds, "compare", lambda *_: pd.DataFrame({"verdict": verdicts}))
-    assert main(["compare", what, "--json"]) == status
+    assert main(["compare", what, "--json"]) == 0
+    assert main(["compare", what, "--json", "--check"]) == missed

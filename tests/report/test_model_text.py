@@ -2,12 +2,12 @@
 
 import pandas as pd
 
-from vehiclemor.report.comparison import model
+from vehiclemor.report.comparison import screens
 
 
 def test_perturbed_errors_are_of_their_start_and_failures_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(model, "costs_text", lambda *_: "")
-    monkeypatch.setattr(model, "predictive_text", lambda _: "")
+    monkeypatch.setattr(screens, "costs_text", lambda *_: "")
+    monkeypatch.setattr(screens, "_predictive", lambda _: [])
     table = pd.DataFrame(
         [
             ("nominal", "pod", "equilibrium", "ok", 1e-6),
@@ -19,6 +19,15 @@ def test_perturbed_errors_are_of_their_start_and_failures_are_named(monkeypatch,
         ],
         columns=["kind", "label", "start", "status", "rms_second_euler_angle"],
     ).assign(effective_rank=3, message="", rms_spindle_y=0.0)
-    text = model.model_text("double_wishbone", table, tmp_path)
-    found = [line.split()[-2:] for line in text.splitlines() if line.split()[1:2] == ["3"]]
-    assert found == [["1.0e-06", "5.0e-06"], ["3.0e-06", "failed"], ["2.0e-06", "-"]]
+    text = screens.comparison_text("double_wishbone", table, tmp_path)
+    found = {
+        (start, line.split()[0]): line.split()[-2:]
+        for start, part in zip(("equilibrium", "dropped"), text.split("\nstart ")[1:], strict=True)
+        for line in part.splitlines()
+        if line.split()[1:2] == ["3"]
+    }
+    assert found == {
+        ("equilibrium", "pod"): ["1.0e-06", "5.0e-06"],
+        ("equilibrium", "path_map"): ["3.0e-06", "failed"],
+        ("dropped", "pod"): ["2.0e-06", "-"],
+    }

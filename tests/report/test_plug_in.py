@@ -11,8 +11,8 @@ from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import legend, nominal, unseen
-from vehiclemor.report.errors import study_tables
 from vehiclemor.report.figures import theme
+from vehiclemor.report.frames import study_tables
 from vehiclemor.report.shown import tabled_outputs, timing_cases
 from vehiclemor.report.tables import model_tables
 

@@ -10,9 +10,10 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
-from vehiclemor.report.predictive.rows import method_rows, predictive_comparison, protocol_of
+from vehiclemor.report.comparison.kinds import study_comparison
+from vehiclemor.report.comparison.screens import comparison_text
+from vehiclemor.report.predictive.rows import method_rows, protocol_of
 from vehiclemor.report.predictive.targets import target_rows
-from vehiclemor.report.predictive.text import predictive_text
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose
@@ -190,7 +191,7 @@ def test_the_best_candidate_that_is_stable_everywhere_is_chosen():
 
 def test_the_comparison_marks_the_winner_and_judges_it(done):
     folder, study, _ = done
-    rows = predictive_comparison(folder, study=study)
+    rows = study_comparison(study, folder)
     methods = rows[rows["kind"] == "method"].set_index("label")
     assert methods.index[methods["winner"].astype(bool)].tolist() == ["fixed basis"]
     assert np.isnan(methods.loc["replay", "ratio_equal"])
@@ -204,8 +205,8 @@ def test_the_comparison_marks_the_winner_and_judges_it(done):
     assert set(targets["verdict"]) <= {"met", "missed", "not_comparable"}
     assert set(targets["threshold_source"]) <= {"published", "ours"}
     assert {"silent misses", "silent misses outside"} <= set(targets["item"])
-    text = predictive_text(rows)
-    assert "* fixed basis" in text
+    text = comparison_text("predictive", rows, folder)
+    assert "fixed basis (chosen)" in text
     assert "newton 1e-6" in text
     json.loads(rows.to_json(orient="records"))
 

@@ -8,7 +8,7 @@ from tests.study.small import small_study
 from vehiclemor.cli.app import main
 from vehiclemor.errors import InputError
 from vehiclemor.registry import component
-from vehiclemor.report.comparison.study import study_comparison, study_text
+from vehiclemor.report.comparison.kinds import study_comparison
 from vehiclemor.report.page import error_tables
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
@@ -130,10 +130,10 @@ def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys
     trained = dataset["in_training"].squeeze(drop=True).sel(label="replay")
     assert trained.to_series().to_dict() == {0.9: False, 1.0: True}
     assert dataset["in_training"].sum() == 1
-    text = study_text(study_comparison(str(file), folder))
-    assert "replay [a]" in text
-    assert "[a] trained on 1 of its 2 runs" in text
-    assert "other [" not in text
+    rows = study_comparison(str(file), folder).set_index("label")
+    assert (rows.loc["replay", "trained"] == 1).all()
+    assert (rows.loc["replay", "runs"] == 2).all()
+    assert (rows.loc["other", "trained"] == 0).all()
     (table,) = error_tables(dataset).values()
     assert list(table["status"]).count("ok (trained on this run)") == 1
     assert main(["run", str(file), "--out", str(folder)]) == 0

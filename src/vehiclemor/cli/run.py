@@ -37,7 +37,7 @@ def run(
     seed
         Draws fresh test runs of protocols, for an audit; their results stand apart.
     """
-    from vehiclemor.report.errors import counted_ends
+    from vehiclemor.report.frames import counted_ends
     from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 

@@ -2,14 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from vehiclemor import api
 from vehiclemor.cli.key_values import key_values
-from vehiclemor.cli.table import print_table
-from vehiclemor.report.printing import wrapped
+from vehiclemor.report.printing import table, wrapped
+
+# Rows of a table that are printed without --all, where it has some more.
+FEW, SOME = 4, 6
 
 
 def show(
@@ -17,6 +19,7 @@ def show(
     *,
     parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
     parameters: Path | None = None,
+    every: Annotated[bool, Parameter(name="--all", negative="")] = False,
     json_output: Annotated[bool, Parameter(name="--json", negative="")] = False,
 ) -> int:
     """Show what a name declares: parameters, settings, inputs, outputs, grid.
@@ -30,6 +33,8 @@ def show(
         name=value: a parameter of a model, SI units; may be given several times.
     parameters
         Parameter file of a model; its own public data by default.
+    every
+        Print long tables of a model as a whole, not only their first rows.
     json_output
         Print JSON.
     """
@@ -37,29 +42,35 @@ def show(
     if json_output:
         print(json.dumps(described, indent=2))
         return 0
-    for key, content in described.items():
-        _print(key, content)
+    few = name in api.models() and not every
+    cut = sum([_print(key, content, few) for key, content in described.items()])
+    if cut:
+        print(f"\n{cut} more rows: vehiclemor show {name} --all")
     return 0
 
 
-def _print(key: str, content: object, indent: str = "") -> None:
-    """A table of rows, lines below a heading, or one line; nothing where there is nothing."""
+def _print(key: str, content: Any, few: bool, indent: str = "") -> int:
+    """Print a table of rows, lines below a heading, or a line; how many rows are left out."""
     if isinstance(content, dict):
         print(f"\n{key}:")
-        for name, part in content.items():
-            _print(name, part, "  ")
-    elif isinstance(content, list) and content and isinstance(content[0], dict):
-        for heading, rows in _by_source(key, content).items():
-            print(f"\n{heading}:")
-            print_table(rows)
-    elif content:
-        text = ", ".join(map(str, content)) if isinstance(content, list) else content
-        print(wrapped(f"{key}: {text}", len(indent), len(indent) + 2))
+        return sum([_print(name, part, few, "  ") for name, part in content.items()])
+    if not (isinstance(content, list) and content and isinstance(content[0], dict)):
+        if content:
+            text = ", ".join(map(str, content)) if isinstance(content, list) else content
+            print(wrapped(f"{key}: {text}", len(indent), len(indent) + 2))
+        return 0
+    shown = content[:FEW] if few and len(content) > SOME else content
+    cut = len(content) - len(shown)
+    for heading, rows in _by_source(key, shown).items():
+        columns = [name for name in rows[0] if any(r[name] not in ("", None, [], {}) for r in rows)]
+        more = f" ({len(shown)} of {len(content)})" if cut else ""
+        print(f"\n{wrapped(f'{heading}{more}:', 0, 2)}\n{table(rows, columns, explain=False)}")
+    return cut
 
 
-def _by_source(key: str, rows: list[dict[str, object]]) -> dict[str, list[dict[str, object]]]:
+def _by_source(key: str, rows: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
     """Heading -> rows: those that have a source stand together, since columns would not fit."""
-    found: dict[str, list[dict[str, object]]] = {}
+    found: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         rest = {name: value for name, value in row.items() if name not in ("status", "source")}
         heading = f"{key}, {row['status']} ({row['source']})" if "status" in row else key

@@ -1,23 +1,16 @@
 """Cost table: seconds, counts, speed-up against both baselines, offline cost, break-even."""
 
-from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import xarray as xr
 
 from vehiclemor.registry import component
-from vehiclemor.report.labels import label_of
-from vehiclemor.report.printing import Line, fixed, number, power, table_text, wrapped
+from vehiclemor.report.printing import Column, column, table, wrapped
 from vehiclemor.report.shown import main_outputs, of_kind, timing_cases
 from vehiclemor.simulation.build import build
 from vehiclemor.study.timing import timed_model
-
-LEGEND = (
-    "Costs.  us: CPU time of the thread, median of interleaved rounds; +-%: half their "
-    "interquartile range; offline: training and fit; even: break-even, the runs after which that "
-    "is earned, against either baseline; errors: RMS"
-)
 
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
@@ -80,46 +73,25 @@ def _row(data: xr.Dataset, counts: list[str]) -> dict[str, object]:
 def costs_text(model: str, folder: Path, brief: bool = False) -> str:
     """Cost table of a model as text: times; then settings, counts and errors if not `brief`.
 
-    A brief one is of the published start alone.
+    A brief one is of the published start alone, and leaves the meanings of columns to another.
     """
-    data, table = timing_of(model, folder), cost_table(model, folder)
+    data = timing_of(model, folder)
+    rows: Any = cost_table(model, folder)
     definition = component("model", model)
-    shown, outputs = of_kind(definition.kind), main_outputs(definition)
-    counts, (baseline, strongest) = shown.counts, shown.against
-    first, *_ = counts.items()
-    starts = list(dict.fromkeys(table["start"]))
-    times: list[Line] = []
-    details: list[Line] = []
-    for start in starts[:1] if brief else starts:
-        heading = f"start {start}" if len(starts) > 1 else ""
-        for row in table.to_dict("records"):
-            if row["start"] == start:
-                times.append(Line(_times(row, first[0]), heading=heading))
-                details.append(Line(_details(row, counts, outputs), heading=heading))
-                heading = ""
-    heads = ["", "us", "+-%", first[1], "x1", "x2", "offline us", "even x1", "even x2"]
-    found = [f"{label_of(output).short} error" for output in outputs]
-    tables = [table_text(heads, times)]
-    if not brief:
-        tables.append(table_text(["", "rank", "tol.", *counts.values(), *found], details))
+    kind = of_kind(definition.kind)
+    rows["spread"] = 50.0 * rows["quartile_spread"]
+    rows["from"] = "start " + rows["start"]
+    ended = rows["status"].where(rows["status"] != "ok", "")
+    rows["label"] += ended.map(lambda status: f" ({status})" if status else "")
+    rows = rows[rows["start"] == rows["start"].iloc[0]] if brief else rows
+    counts = {name: Column(heading, ".0f") for name, heading in kind.counts.items()}
+    times = ["label", "us_per_run", "spread", "speed_up", "speed_up_strongest", "offline_us"]
+    times += ["break_even", "break_even_strongest"]
     title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
-    against = f"x1: speed-up against {baseline}; x2: against {strongest}"
-    return "\n".join([wrapped(title), wrapped(against), "\n\n".join(tables)])
-
-
-def _times(row: dict, count: str) -> list[str]:
-    cells = [row["label"], fixed(row["us_per_run"], 1), fixed(50.0 * row["quartile_spread"], 0)]
-    cells += [str(row[count]), fixed(row["speed_up"]), fixed(row["speed_up_strongest"])]
-    if row["offline_us"] == 0.0 or row["status"] != "ok":
-        return cells
-    even = [row["break_even"], row["break_even_strongest"]]
-    runs = ["never" if count != count else fixed(count, 1) for count in even]
-    return [*cells, fixed(row["offline_us"], 0), *runs]
-
-
-def _details(row: dict, counts: Iterable[str], outputs: Iterable[str]) -> list[str]:
-    cells = [row["label"], str(row["rank"]), number(row["tolerance"])]
-    cells += [str(row[name]) for name in counts]
-    if row["status"] != "ok":
-        return [*cells, row["status"]]
-    return [*cells, *(power(row[f"rms_{output}"]) for output in outputs)]
+    against = f"same: against {kind.against[0]}; best: against {kind.against[1]}; -: never, or none"
+    parts = [wrapped(title), table(rows, times, group="from", explain=not brief), wrapped(against)]
+    if not brief:
+        columns = {name: column(name) for name in ("label", "rank", "tolerance")} | counts
+        errors = {f"rms_{o}": column(f"rms_{o}") for o in main_outputs(definition)}
+        parts += ["", table(rows, columns | errors, group="from")]
+    return "\n".join(parts)

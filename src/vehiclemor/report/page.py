@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 import xarray as xr
@@ -16,15 +16,16 @@ from vehiclemor.arguments import count, file_path, quoted
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import names
-from vehiclemor.report.comparison.paper import paper_comparison
+from vehiclemor.report.comparison.kinds import paper_comparison
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.errors import counted_ends, flat, warned_runs
 from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.figures.theme import METADATA, styled
+from vehiclemor.report.frames import counted_ends, frame, warned_runs
 from vehiclemor.report.labels import TRAINED, trained_runs, unit_of
 from vehiclemor.report.predictive.rows import protocol_rows
+from vehiclemor.report.printing import table
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.report.verdicts import VERDICTS, counted
 from vehiclemor.study.failure import attempt_apart
@@ -145,6 +146,7 @@ def _page(sections: Sequence[Section], left_out: Mapping[str, str]) -> str:
     loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["indented"] = lambda text: json.dumps(json.loads(text), indent=2)
+    environment.filters["html"] = partial(table, to="html")
     template = environment.get_template("page.html.jinja")
     return template.render(sections=sections, left_out=left_out)
 
@@ -201,30 +203,25 @@ def _study(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Section:
 
 def error_tables(dataset: xr.Dataset) -> dict[str, pd.DataFrame]:
     """Errors of every run of a study, with its status and cell; of many the extremes alone."""
-    outputs, dims = shown_outputs(dataset), dataset["status"].dims
-    heads = {f"rms_{o}": f"RMS error of {o} ({unit_of(dataset, o)})" for o in outputs}
-    table = flat(dataset, tuple(outputs)).rename(columns=heads)
-    axes = [str(d) for d in dims if d != "label" and dataset.sizes[d] > 1]
-    if len(table) > MOST_ROWS:
+    units = {output: unit_of(dataset, output) for output in shown_outputs(dataset)}
+    heads = {f"rms_error.{o}": f"RMS error of {o} ({unit})" for o, unit in units.items()}
+    told = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
+    runs: Any = frame(told).rename(columns=heads)
+    axes = [d for d in dataset["status"].dims if d != "label" and dataset.sizes[d] > 1]
+    ok = runs["status"] == "ok"
+    if len(runs) > MOST_ROWS:
         by = ["label", *(["start"] if "start" in axes else [])]
-        good = table[table["status"] == "ok"].groupby(by, sort=False)[[*heads.values()]]
+        good = runs[ok].groupby(by, sort=False)[[*heads.values()]]
         extremes = good.agg(["count", "min", "median", "max"]).reset_index()
         extremes.columns = [": ".join(filter(None, names)) for names in extremes]
         return {"Errors of the runs that are ok; the netCDF file has every run": extremes}
-    said = dataset["remark"].where(warned_runs(dataset) & (dataset["status"] == "ok"), "")
-    said, cells, trained = (
-        values.transpose(*dims).values.ravel()
-        for values in (said, dataset["cell_key"], trained_runs(dataset))
-    )
-    marks = pd.Series(trained).map({True: f" ({TRAINED})", False: ""})
-    told = (table["message"] + said).map(lambda text: f": {text}" if text else "")
-    for sampled in [str(n) for n, c in dataset.coords.items() if c.dims == ("sample",)]:
-        table[sampled] = dataset[sampled].sel(sample=table["sample"]).values
-        axes.append(sampled)
-    counts = [name for name in COUNTS if name in table]
-    shown = table[["label", *dict.fromkeys(axes), *heads.values(), *counts]]
-    shown = shown.set_axis([str(key).removeprefix(PARAMETER) for key in shown], axis="columns")
-    return {"Every run": shown.assign(status=table["status"] + marks + told, cell=cells)}
+    said = runs["message"] + runs["remark"].where(runs["warned"] & ok, "")
+    marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
+    status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")
+    axes += [n for n, c in dataset.coords.items() if c.dims == ("sample",) and n not in axes]
+    shown = runs[["label", *axes, *heads.values(), *(name for name in COUNTS if name in runs)]]
+    shown = shown.rename(columns=lambda key: str(key).removeprefix(PARAMETER))
+    return {"Every run": shown.assign(status=status, cell=runs["cell_key"])}
 
 
 def _svg(caption: str, draw: Callable[[], Figure]) -> tuple[str, str]:

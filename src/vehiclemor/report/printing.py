@@ -1,49 +1,291 @@
-"""Tables as text: one printer for all tables that are shown in a terminal."""
+"""Tables and texts: one printer, with the headings, formats and meanings of all columns."""
 
+from __future__ import annotations
+
+import json
+import math
 import shutil
 import string
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from io import StringIO
-from typing import NamedTuple
+from html import escape
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from vehiclemor.report.labels import label_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Format = Literal["terminal", "csv", "markdown", "latex", "html"]
+Rows = Sequence[Mapping[str, Any]]
 # Columns of a line where there is no terminal, and the most that a wide one is given.
 WIDTH, WIDEST = 80, 120
-# The first column, which may be wrapped, is never narrower.
+# A column of texts is never narrower, where its texts are longer.
 NARROWEST = 12
-# The longest word in a heading of a table without room.
-SHORT_WORD = 7
-# Indents of a table and of the notes in it.
-TABLE, NOTE = 2, 6
+# Indent of a note.
+NOTE = 4
 
 
-class Line(NamedTuple):
-    """Cells of one row of a table, a heading above and a remark below, over the whole width."""
+class Column(NamedTuple):
+    """How a column is printed.
 
-    cells: Sequence[str]
-    note: str = ""
-    heading: str = ""
+    Attributes
+    ----------
+    heading
+        Above it.
+    form
+        Format of its numbers.  An exact zero is a dash where orders of magnitude are compared.
+    meaning
+        What stands below the table.
+    scale
+        Factor from the SI unit to the one that is shown.
+    """
+
+    heading: str
+    form: str = ".6g"
+    meaning: str = ""
+    scale: float = 1.0
 
 
-class Footnotes:
-    """Letters for phrases that stand in several rows, explained once below them."""
+COUNT, ERROR, NUMBER, MICRO = ".0f", ".1e", ".3g", 1e6
+COLUMNS = {
+    "label": Column("method"),
+    # Errors.
+    "median": Column("median", ERROR, "median RMS error of the completed runs, SI units"),
+    "largest": Column("largest", ERROR, "largest RMS error of the completed runs"),
+    "largest_at": Column("largest at"),
+    "rms_error": Column("RMS error", ERROR, "against the full-order solution; -: exactly zero"),
+    "max_error": Column("largest error", ERROR),
+    "signal_range": Column("signal range", ERROR, "largest minus smallest full-order value"),
+    "floor": Column(
+        "projection error",
+        ERROR,
+        "RMS error of the best approximation of the coordinates in the method's subspaces, a lower "
+        "bound for the coordinates, not for every output",
+    ),
+    "failed": Column("failed", COUNT),
+    "failures": Column("failed", COUNT, "of the different runs of the grid"),
+    "warned": Column("untrusted", COUNT, "runs that the method reports as unreliable"),
+    "trained": Column("training", COUNT, "tested runs that the method was trained on"),
+    "evaluations": Column("evaluations", COUNT, "of the equations of motion, or iterations"),
+    "seconds_in_loop": Column(
+        "time, us",
+        ".1f",
+        "median CPU time of the compiled loop, measured once beside other work; compare times with "
+        "vehiclemor compare MODEL",
+        MICRO,
+    ),
+    "offline_seconds": Column("offline, s", ".2g", "CPU time of training and fit"),
+    # Unseen inputs.
+    "misses": Column("missed", COUNT, "runs that violate an error bound"),
+    "silent": Column("undetected", COUNT, "missed runs although the method reports ok"),
+    "flagged": Column("warned", COUNT, "runs that the method reports as unreliable"),
+    "validation_score": Column("validation", NUMBER, "worst error in validation runs, which chose"),
+    "score": Column("worst error", NUMBER, "largest error as a multiple of its bound"),
+    "seconds": Column("call, us", COUNT, "CPU time of a whole call with all outputs", MICRO),
+    "loop_seconds": Column("loop, us", COUNT, "CPU time of its compiled loop", MICRO),
+    "ratio_equal": Column("times faster", ".1f", "than the full model at equal worst error"),
+    "ratio_equal_loop": Column("loop faster", ".1f", "the same for compiled loops alone"),
+    "most": Column("99 % of runs", NUMBER),
+    # Costs.
+    "us_per_run": Column("time, us", ".1f", "CPU time of a run, median of interleaved rounds"),
+    "spread": Column("+- %", COUNT, "half the interquartile range of the rounds, over the median"),
+    "speed_up": Column("faster, same", ".2f"),
+    "speed_up_strongest": Column("faster, best", ".2f"),
+    "offline_us": Column("offline, us", COUNT, "training and fit"),
+    "break_even": Column("pays, same", ".1f"),
+    "break_even_strongest": Column(
+        "pays, best", ".1f", "runs after which a reduced model has earned its training"
+    ),
+    "tolerance": Column("tolerance", ".0e"),
+    "effective_rank": Column("rank", COUNT),
+    "nominal": Column("trained run", ERROR, "RMS error in the nominal run, the training"),
+    "perturbed": Column(
+        "perturbed",
+        ERROR,
+        "largest RMS error over frequency and amplitude factors of 0.8 to 1.2, training unchanged",
+    ),
+    # Singular values.
+    "median_singular_value": Column(
+        "median", ERROR, "singular value over the first, of all control periods"
+    ),
+    "largest_singular_value": Column("largest", ERROR),
+    "largest_left_out": Column(
+        "energy left out", ERROR, "largest share of the later modes (equation 8)"
+    ),
+    # The paper.
+    "published": Column("paper", NUMBER),
+    "bound": Column("bound", NUMBER),
+    "measured": Column("measured", NUMBER),
+    "reproduced": Column("reproduced", NUMBER),
+    "signal_rms": Column("signal", ERROR, "RMS of the signal itself"),
+    "not_comparable": Column("not comparable", COUNT),
+    "reason": Column("why"),
+}
 
-    def __init__(self) -> None:
-        self._letters: dict[str, str] = {}
 
-    def marks(self, *phrases: str) -> str:
-        """The letters of phrases, such as `[a][c]`; an empty one has none."""
-        for phrase in phrases:
-            if phrase:
-                self._letters.setdefault(phrase, alphabetic(len(self._letters)))
-        return "".join(f"[{self._letters[phrase]}]" for phrase in phrases if phrase)
+def column(name: str) -> Column:
+    """How a column is printed; one without an entry has its name as heading."""
+    kind, _, output = name.partition("_")
+    if kind == "rms" and name not in COLUMNS:
+        return Column(f"{label_of(output).short} error", ERROR)
+    return COLUMNS.get(name) or Column(name.replace("_", " "))
 
-    def text(self) -> str:
-        """All phrases with their letters."""
-        return "\n".join(
-            wrapped(f"[{letter}] {phrase}", TABLE, NOTE) for phrase, letter in self._letters.items()
-        )
+
+def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
+    """A value as text: a dash for a missing number, nothing for none."""
+    if isinstance(value, list):
+        return ", ".join(shown(part, form) for part in value)
+    if isinstance(value, float):
+        missing = value != value or (value == 0.0 and form == ERROR)
+        return "-" if missing else format(scale * value, form)
+    return "" if value is None else str(value)
+
+
+def table(
+    rows: pd.DataFrame | Rows,
+    columns: Sequence[str] | Mapping[str, Column] = (),
+    to: Format = "terminal",
+    *,
+    group: str = "",
+    note: str = "",
+    explain: bool = True,
+) -> str:
+    """Rows as a table.
+
+    Parameters
+    ----------
+    rows
+        A frame, or dictionaries.
+    columns
+        Names of those that are shown, or how each of them is printed; all by default.
+    to
+        `terminal`: headings and formats of `COLUMNS`, within the width of the terminal, meanings
+        below.  `csv`: names and all digits.  `markdown`, `latex` (needs booktabs): names and four
+        digits.  `html`: headings, three digits, all digits in the attribute `value`.
+    group
+        Column whose values stand in lines of their own above their rows.
+    note
+        Column whose texts stand below their rows, over the whole width.
+    explain
+        Whether meanings stand below.
+    """
+    if to == "terminal":
+        records = rows if isinstance(rows, Sequence) else rows.to_dict("records")
+        names = columns or (records[0] if records else ())
+        kinds = columns if isinstance(columns, Mapping) else {name: column(name) for name in names}
+        return _terminal(records, kinds, group, note) + (legend(kinds.values()) if explain else "")
+    import pandas as pd
+
+    frame: Any = pd.DataFrame(rows)
+    frame = frame[list(columns)] if columns else frame
+    if to == "csv":
+        return frame.to_csv(index=False, lineterminator="\n")
+    if to == "html":
+        cells = frame.rename(columns=lambda name: str(name).replace("_", " ")).map(_html_cell)
+        cells.columns = [escape(name) for name in cells.columns]
+        return cells.to_html(index=False, escape=False, border=0)
+    cells = frame.map(_four_digits)
+    if to == "latex":
+        return cells.to_latex(index=False, escape=True)
+    # pandas needs tabulate, which is no dependency.
+    escaped = cells.map(lambda text: text.replace("|", "\\|")).values.tolist()
+    head, *lines = (f"| {' | '.join(line)} |\n" for line in [map(str, cells.columns), *escaped])
+    return f"{head}|{'---|' * len(cells.columns)}\n{''.join(lines)}"
+
+
+def _four_digits(value: object) -> str:
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.4g}"
+    return "" if value is None else str(value)
+
+
+def _html_cell(value: object) -> str:
+    if isinstance(value, float) and value == value:
+        return f'<data value="{value}">{value:.3g}</data>'
+    text = escape(shown(value))
+    return (
+        f'<div class="{text}">{text}</div>' if text in ("met", "missed") else f"<div>{text}</div>"
+    )
+
+
+def _terminal(records: Rows, columns: Mapping[str, Column], group: str, note: str) -> str:
+    from rich.console import Console, Group
+    from rich.table import Table
+    from rich.text import Text
+
+    if group:
+        place = {value: i for i, value in enumerate(dict.fromkeys(row[group] for row in records))}
+        records = sorted(records, key=lambda row: place[row[group]])
+    cells = [
+        [shown(row.get(name), kind.form, kind.scale) for name, kind in columns.items()]
+        for row in records
+    ]
+    numbers = [all(isinstance(r.get(name), int | float) for r in records) for name in columns]
+    widths = _widths([kind.heading for kind in columns.values()], cells, numbers)
+    parts: list[Table | Text] = []
+
+    def start(header: bool) -> None:
+        # Tables of equal widths with lines between them look like one.
+        part = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0))
+        for kind, wide, number in zip(columns.values(), widths, numbers, strict=True):
+            justify = "right" if number else "left"
+            part.add_column(Text(kind.heading), justify=justify, width=wide, overflow="fold")
+        parts.append(part)
+
+    start(header=True)
+    last = None
+    for row, line in zip(records, cells, strict=True):
+        if group and row[group] != last:
+            last = row[group]
+            parts.append(Text(str(last)))
+        if not isinstance(parts[-1], Table):
+            start(header=False)
+        assert isinstance(parts[-1], Table)
+        parts[-1].add_row(*map(Text, line))
+        if note and row[note]:
+            parts.append(Text(wrapped(str(row[note]), NOTE, NOTE)))
+    console = Console(width=width(), color_system=None, highlight=False)
+    with console.capture() as captured:
+        console.print(Group(*parts))
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+
+
+def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> list[int]:
+    """Widths of columns: headings are wrapped by words, then the widest texts."""
+    widths = []
+    for index, head in enumerate(heads):
+        longest = max((len(word) for word in head.split()), default=1)
+        widths.append(max(longest, *(len(row[index]) for row in cells), 1))
+    texts = [index for index, number in enumerate(numbers) if not number]
+    while sum(widths) + len(widths) > width() and texts:
+        widest = max(texts, key=lambda index: widths[index])
+        if widths[widest] <= NARROWEST:
+            break
+        widths[widest] -= 1
+    # A heading in one line where there is room for all.
+    whole = [max(w, len(head)) for w, head in zip(widths, heads, strict=True)]
+    return whole if sum(whole) + len(whole) <= width() else widths
+
+
+def legend(kinds: Iterable[Column]) -> str:
+    """Meanings of columns, on new lines; nothing if none needs one."""
+    meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds if kind.meaning]
+    return "\n" + wrapped(f"({'; '.join(meanings)}.)", 0, 1) if meanings else ""
+
+
+def json_text(rows: pd.DataFrame) -> str:
+    """Rows as JSON with all digits; what is missing or infinite is null.
+
+    (`DataFrame.to_json` rounds to ten places behind the point: errors would lose their digits.)
+    """
+
+    def finite(value: object) -> object:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    plain = [{key: finite(value) for key, value in row.items()} for row in rows.to_dict("records")]
+    return json.dumps(plain, indent=2)
 
 
 def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
@@ -64,98 +306,6 @@ def width() -> int:
     return min(max(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH), WIDEST)
 
 
-def table_text(headings: Sequence[str], rows: Iterable[Line], left: Sequence[int] = (0,)) -> str:
-    """A table that fits the terminal, its first column wrapped where needed.
-
-    Parameters
-    ----------
-    headings
-        Of the columns.
-    left
-        Columns that are aligned left; all others are aligned right.
-    """
-    from rich.console import Console, Group
-    from rich.padding import Padding
-    from rich.table import Table
-    from rich.text import Text
-
-    rows = list(rows)
-    widths = _widths(headings, rows)
-    words = [word for row in rows for cell in row.cells[:1] for word in cell.split()]
-    if widths[0] < max(map(len, words), default=0):
-        headings = [headings[0], *map(_abbreviated, headings[1:])]
-        widths = _widths(headings, rows)
-
-    def started(header: bool) -> Table:
-        table = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0))
-        for index, (heading, columns) in enumerate(zip(headings, widths, strict=True)):
-            justify = "left" if index in left else "right"
-            table.add_column(Text(heading), justify=justify, width=columns, vertical="top")
-        return table
-
-    # Tables of equal widths with text between them look like one.
-    parts: list[Table | Padding] = [started(header=True)]
-    for row in rows:
-        if row.heading:
-            parts.append(Padding(Text(row.heading), 0))
-        if row.cells:
-            table = parts[-1]
-            if not isinstance(table, Table):
-                table = started(header=False)
-                parts.append(table)
-            filled = [*row.cells, *[""] * (len(headings) - len(row.cells))]
-            table.add_row(*(Text(cell) for cell in filled))
-        if row.note:
-            parts.append(Padding(Text(row.note), (0, 0, 0, NOTE - TABLE)))
-    target = StringIO()
-    console = Console(file=target, width=width(), color_system=None, highlight=False)
-    console.print(Padding(Group(*parts), (0, 0, 0, TABLE)))
-    return "\n".join(line.rstrip() for line in target.getvalue().splitlines())
-
-
-def _abbreviated(heading: str) -> str:
-    """A heading whose long words are cut, such as `displa. max`."""
-    return " ".join(f"{w[:6]}." if len(w) > SHORT_WORD else w for w in heading.split())
-
-
-def _widths(headings: Sequence[str], rows: Sequence[Line]) -> list[int]:
-    """Widths of the columns: headings are wrapped by words, cells are not but in the first."""
-    widths = [max(map(len, heading.split()), default=0) for heading in headings]
-    widths[0] = len(headings[0])
-    for row in rows:
-        for index, cell in enumerate(row.cells):
-            widths[index] = max(widths[index], len(cell))
-    # One space follows each column.
-    room = width() - TABLE - sum(widths[1:]) - len(widths)
-    widths[0] = max(min(widths[0], room), NARROWEST)
-    return widths
-
-
-def fixed(value: float, digits: int = 2) -> str:
-    """A number with so many digits after the point; a dash for one that is missing."""
-    return "-" if value != value else f"{value:.{digits}f}"
-
-
-def power(value: float) -> str:
-    """A number as 1.2e-5, for columns in which orders of magnitude are compared.
-
-    A dash for one that is missing, or exactly zero.
-    """
-    return "-" if value != value or value == 0.0 else f"{value:.1e}"
-
-
-def short(value: float) -> str:
-    """A number with two digits, with an exponent where it is long without."""
-    if value != value:
-        return "-"
-    return f"{value:.2g}" if 0.01 <= abs(value) < 1e4 or value == 0.0 else f"{value:.1e}"
-
-
-def number(value: float) -> str:
-    """A number with three digits; a dash for one that is missing."""
-    return "-" if value != value else f"{value:.3g}"
-
-
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
     """A paragraph in lines of the width of a table, indented."""
     return "\n".join(
@@ -169,8 +319,3 @@ def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
             break_on_hyphens=False,
         )
     )
-
-
-def terms(meanings: Mapping[str, str]) -> str:
-    """A legend: each term with its meaning, later lines indented."""
-    return "\n".join(wrapped(f"{term}: {text}.", 0, 4) for term, text in meanings.items())

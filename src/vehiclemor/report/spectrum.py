@@ -8,8 +8,8 @@ its mean removed, as step 2 has it, and a share does not depend on how the integ
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import smaller_rank
-from vehiclemor.report.printing import Line, power, table_text, wrapped
 from vehiclemor.simulation.build import build
 
 if TYPE_CHECKING:
@@ -29,10 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PRESETS = ("literal", "recommended")
-LEGEND = (
-    "Singular values of POD over the first of their control period, in the nominal run (median and "
-    "largest), and the largest share of the energy that modes up to this one leave out (equation 8)"
-)
 # Name -> unit, meaning.
 VARIABLES = {
     "singular_value": ("1", "singular value over the first one"),
@@ -75,23 +70,6 @@ def spectrum_table(model: str) -> pd.DataFrame:
     }
     table = data[[]].assign(found).to_dataframe(["preset", "mode"]).reset_index()
     return table.reindex(columns=["preset", "mode", *found]).dropna(ignore_index=True)
-
-
-def spectrum_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows of `spectrum_table` as text, presets side by side."""
-    shown = {
-        "median_singular_value": "median",
-        "largest_singular_value": "largest",
-        "largest_left_out": "left out",
-    }
-    presets = list(dict.fromkeys(row["preset"] for row in rows))
-    lines = []
-    for mode in dict.fromkeys(row["mode"] for row in rows):
-        found = {row["preset"]: row for row in rows if row["mode"] == mode}
-        cells = [power(found[p][c]) if p in found else "-" for p in presets for c in shown]
-        lines.append(Line([f"{mode:.0f}", *cells]))
-    heads = ["mode", *(f"{preset} {head}" for preset in presets for head in shown.values())]
-    return f"{wrapped(LEGEND)}\n{table_text(heads, lines)}"
 
 
 def _of_model(name: str) -> xr.Dataset:

@@ -1,21 +1,44 @@
-"""Which comparisons there are: with the paper, on unseen inputs, of every model, of any study."""
-
-from __future__ import annotations
+"""Comparisons: with the paper, on unseen inputs, of every model, of any study."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
+
+import pandas as pd
 
 from vehiclemor.arguments import count, file_path
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import names, unknown
+from vehiclemor.report.comparison.rows import (
+    COLUMNS,
+    OF_DESIGN,
+    Row,
+    claim_rows,
+    design_rows,
+    error_rows,
+)
+from vehiclemor.report.comparison.times import (
+    AGREE_AND_SAVE,
+    SIX_SLOWER,
+    agreement_rows,
+    slower_row,
+    time_rows,
+)
+from vehiclemor.report.costs import cost_table
+from vehiclemor.report.default_studies import nominal, of_paper, perturbed, unseen
+from vehiclemor.report.frames import grid_rows, study_tables
+from vehiclemor.report.predictive.rows import protocol_rows
+from vehiclemor.report.published import load_published
+from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.resources import data_names
+from vehiclemor.simulation.build import build
+from vehiclemor.study.run import run_studies
 
-if TYPE_CHECKING:
-    import pandas as pd
+PAPER = "paper"
 
 
 def compare(
-    what: str = "paper", out: str | Path = "results", jobs: int = 1, seed: int | None = None
+    what: str = PAPER, out: str | Path = "results", jobs: int = 1, seed: int | None = None
 ) -> pd.DataFrame:
     """A comparison as a table; studies and timings that are missing are run first.
 
@@ -38,9 +61,9 @@ def compare(
     pandas.DataFrame
         Of `paper` the columns id, model, item, variant, start, published, bound, reproduced, unit,
         floor, replay, within, verdict (`met`, `missed`, `not_comparable`, or `ours`: from a start
-        that the paper doesn't have), measure, reason, threshold_source; described at
-        `comparison.rows.Row`, those of the others at `predictive_comparison`,
-        `model_comparison` and `study_comparison` in `vehiclemor.report`.
+        that the paper doesn't have), measure, reason, threshold_source, signal_rms, strongest;
+        described at `rows.Row` in `vehiclemor.report.comparison`, those of the others at
+        `kinds.model_comparison` and `kinds.study_comparison`.
 
     Raises
     ------
@@ -48,42 +71,86 @@ def compare(
         If there is no such comparison.
     """
     folder, jobs = file_path("out", out), count("jobs", jobs)
-    if seed is not None and (what == "paper" or what in names("model")):
+    if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} draws no test runs of its own")
-    if what == "paper":
-        from vehiclemor.report.comparison.paper import paper_comparison
-
+    if what == PAPER:
         return paper_comparison(folder, jobs)
-    if what == "predictive":
-        from vehiclemor.report.predictive.rows import predictive_comparison
-
-        return predictive_comparison(folder, jobs, seed=seed)
     if what in names("model"):
-        from vehiclemor.report.comparison.model import model_comparison
-
         return model_comparison(what, folder, jobs)
     if isinstance(what, str) and (what in data_names("studies") or what.endswith(".toml")):
-        from vehiclemor.report.comparison.study import study_comparison
-
         return study_comparison(what, folder, jobs, seed)
-    known = ["paper", "predictive", *names("model"), *data_names("studies"), "FILE.toml"]
+    known = [PAPER, *names("model"), *data_names("studies"), "FILE.toml"]
     raise unknown("comparison", what, known)
 
 
-def comparison_text(what: str, rows: pd.DataFrame, folder: Path) -> str:
-    """A comparison as text, with the costs of its models."""
-    if what == "paper":
-        from vehiclemor.report.comparison.text import paper_text
+def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
+    """Every number and claim of the paper, with verdict and reason.
 
-        return paper_text(rows, folder)
-    if what == "predictive":
-        from vehiclemor.report.predictive.text import predictive_text
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each published number or claim, start and variant of the method, with the
+        columns of `rows.Row`.
+    """
+    results, published = run_studies("paper", folder, jobs), load_published()
+    numbers = [n for n in published.numbers.values() if n.kind in ("rms_error", "time_reduction")]
+    costs = {m: cost_table(m, folder) for m in dict.fromkeys(n.model for n in numbers)}
+    errors: list[Row] = []
+    times: list[Row] = []
+    rest: list[Row] = []
+    for number in numbers:
+        if number.kind == "rms_error":
+            errors += error_rows(number, results[of_paper(number.model)])
+        else:
+            times += time_rows(number, costs[number.model])
+    for name, claim in published.claims.items():
+        if name == SIX_SLOWER:
+            rest.append(slower_row(claim, costs["double_wishbone"], few=3, many=6))
+        elif name == AGREE_AND_SAVE:
+            rest += agreement_rows(claim, errors, times)
+        elif name in OF_DESIGN:
+            rest += design_rows(claim)
+        else:
+            rest += claim_rows(claim, results)
+    rows = pd.DataFrame([*errors, *times, *rest], columns=list(COLUMNS))
+    place = {model: number for number, model in enumerate(costs)}
+    return rows.sort_values("model", key=lambda c: c.map(place), kind="stable", ignore_index=True)
 
-        return predictive_text(rows)
-    if what in names("model"):
-        from vehiclemor.report.comparison.model import model_text
 
-        return model_text(what, rows, folder)
-    from vehiclemor.report.comparison.study import study_text
+def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
+    """Every registered method that fits, on one model; what is missing is run first.
 
-    return study_text(rows)
+    Returns
+    -------
+    pandas.DataFrame
+        `kind` tells what a row is.  `nominal`, `perturbed`: one run of a method, as in
+        `frames.study_tables`.  `cost`, `spectrum`: as in `cost_table`, `spectrum_table`.  The
+        others are those of `study_comparison`, of the model's protocol.
+    """
+    studies = {"nominal": nominal(name, folder), "perturbed": perturbed(name, folder)}
+    parts = [study_tables(name, [s], folder, jobs).assign(kind=k) for k, s in studies.items()]
+    parts.append(cost_table(name, folder).assign(kind="cost"))
+    if pod.METHOD.accepts(build(name))[0]:
+        parts.append(spectrum_table(name).assign(kind="spectrum"))
+    parts.append(study_comparison(unseen(name, folder), folder, jobs))
+    return pd.concat(parts, ignore_index=True).assign(model=name)
+
+
+def study_comparison(
+    study: str, folder: Path, jobs: int = 1, seed: int | None = None
+) -> pd.DataFrame:
+    """A study, all members of a collection, or a protocol; what is missing is run first.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `study` and `kind` tell what a row is.  `errors`: an output of one method from one start
+        over a study's grid, see `frames.grid_rows`.  `method`: one contestant of a protocol on what
+        is judged, see `predictive.rows.method_rows`.  `target`: what the contender that validation
+        has chosen must reach, with `id`, `bound`, `measured`, `unit`, `verdict`, `reason` and
+        `threshold_source`.  Errors `worst_<measure>_<output>` are in SI units.
+    """
+    rows: list[dict[str, Any]] = []
+    for dataset in run_studies(study, folder, jobs, seed=seed).values():
+        rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
+    return pd.DataFrame(rows)

@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 
 from vehiclemor.registry import component
-from vehiclemor.report.comparison.rows import Row, claim_row, number_row
+from vehiclemor.report.comparison.rows import Row, claim_row, number_row, undecided
 from vehiclemor.report.criteria.finding import IN_WORDS, PRINTED, Finding
 from vehiclemor.report.published import Claim, Number, rms_numbers
 from vehiclemor.report.shown import timing_cases
@@ -14,14 +14,11 @@ from vehiclemor.study.timing import TimingCase
 
 # Preset -> what its rows are called.
 PRESETS = {"recommended": "default", "literal": "literal"}
-OF_INTEGRATION = (
-    "share of the time of the same integrator's full run at equal tolerance that is saved; the "
-    "paper names neither its integrator nor its machine"
-)
-OF_ITERATION = (
-    "share of the time of Newton with fresh Jacobians and generated elimination that is saved; the "
-    "paper names neither its solver nor its machine"
-)
+# Claims about times.
+SIX_SLOWER, AGREE_AND_SAVE = "dw_fig14_six_slower_than_three", "all_close_agreement_less_time"
+SAVED = "share of the time of {} that is saved; the paper names neither its {} nor its machine"
+OF_INTEGRATION = SAVED.format("the same integrator's full run at equal tolerance", "integrator")
+OF_ITERATION = SAVED.format("Newton with fresh Jacobians and generated elimination", "solver")
 
 
 def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
@@ -40,14 +37,14 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
             row = number_row(number, PRESETS[case.preset], str(start), saved, within)
             scattered = "" if wrong else _scatter(table, case.id, "baseline")
             if scattered:
-                row = row._replace(within=None)
-            if scattered and start == PUBLISHED_START:
-                row = row._replace(verdict=NOT_COMPARABLE)
+                row = undecided(row, "")
             algebraic = component("model", number.model).kind == "ae"
-            words = (_beside_solvers if algebraic else _beside_integrators)(table, case.id)
+            words = _beside_full(table, case.id, algebraic)
             reason = "; ".join(text for text in (wrong, scattered, words) if text)
             measure = OF_ITERATION if algebraic else OF_INTEGRATION
-            rows.append(row._replace(replay=1.0, measure=measure, reason=reason))
+            strongest = 1.0 / float(table.loc[case.id, "speed_up_strongest"])
+            row = row._replace(replay=1.0, measure=measure, reason=reason, strongest=strongest)
+            rows.append(row)
     return rows
 
 
@@ -74,30 +71,16 @@ def _missed_errors(model: str, row: dict[str, Any]) -> str:
     return f"counts only with errors that are met: {', '.join(missed)}" if missed else ""
 
 
-def _beside_integrators(table: pd.DataFrame, case: str) -> str:
-    row, baseline, strongest = table.loc[case], table.loc["baseline"], table.loc["strongest"]
+def _beside_full(table: pd.DataFrame, case: str, algebraic: bool) -> str:
+    """A timed run beside the same solver and beside the best one."""
+    row, baseline = table.loc[case], table.loc["baseline"]
     if row["status"] != "ok":
         return ""
+    name, count = ("Newton", "iterations") if algebraic else ("the same integrator", "rhs_calls")
     return (
-        f"{1.0 / float(row['speed_up']):.2f} times the time of the same integrator, "
-        f"{row['rhs_calls']} evaluations against {baseline['rhs_calls']}; "
-        f"{1.0 / float(row['speed_up_strongest']):.1f} times that of the best full-order "
-        f"integrator ({strongest['rhs_calls']} evaluations, RMS yaw {strongest['rms_yaw']:.1e} "
-        f"rad); offline {row['offline_us'] / 1e3:.0f} ms, paid back {_runs(row['break_even'])}, "
-        f"against the best integrator {_runs(row['break_even_strongest'])}"
-    )
-
-
-def _runs(count: float) -> str:
-    return "never" if count != count else f"after {count:.1f} runs"
-
-
-def _beside_solvers(table: pd.DataFrame, case: str) -> str:
-    row, baseline = table.loc[case], table.loc["baseline"]
-    return (
-        f"{1.0 / float(row['speed_up']):.2f} times the time of Newton, {row['iterations']:.0f} "
-        f"iterations against {baseline['iterations']:.0f}; "
-        f"{1.0 / float(row['speed_up_strongest']):.2f} times that of the strongest solver"
+        f"{1.0 / float(row['speed_up']):.2f} times the time of {name}, {row[count]:.0f} "
+        f"{'iterations' if algebraic else 'evaluations'} against {baseline[count]:.0f}; "
+        f"{1.0 / float(row['speed_up_strongest']):.2f} times that of the best full-order solver"
     )
 
 
@@ -118,10 +101,7 @@ def slower_row(claim: Claim, costs: pd.DataFrame, few: int, many: int) -> Row:
     text = "time with six states as a multiple of that with three; and less than the full model's"
     found = claim_row(claim, "literal", Finding(slower, 1.0, met, text, seen, IN_WORDS))
     scattered = _scatter(table, few_case, many_case, "baseline")
-    if scattered:
-        reason = f"{scattered}; {seen}"
-        return found._replace(within=None, verdict=NOT_COMPARABLE, reason=reason)
-    return found
+    return undecided(found, f"{scattered}; {seen}") if scattered else found
 
 
 def agreement_rows(claim: Claim, errors: list[Row], times: list[Row]) -> list[Row]:
@@ -143,7 +123,5 @@ def agreement_rows(claim: Claim, errors: list[Row], times: list[Row]) -> list[Ro
         met = agree and least.reproduced >= bound
         row = claim_row(claim, variant, Finding(least.reproduced, bound, met, text, seen, PRINTED))
         scattered = [r.reason for r in saved if r.verdict == NOT_COMPARABLE]
-        if agree and scattered:
-            row = row._replace(within=None, verdict=NOT_COMPARABLE, reason=scattered[0])
-        rows.append(row)
+        rows.append(undecided(row, scattered[0]) if agree and scattered else row)
     return rows

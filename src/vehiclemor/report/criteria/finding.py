@@ -5,8 +5,8 @@ signal's range.  Each criterion is evaluated for the default settings and for th
 ones, and of a vehicle for each start.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
@@ -53,9 +53,38 @@ class Finding:
     threshold: str = OWN
 
 
+# Label of a method in the paper's studies -> what its rows are called.
+VARIANTS = {"pod": "default", "pod_literal": "literal"}
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A claim of the paper as a number that can miss its bound.
+
+    Attributes
+    ----------
+    judge
+        (results, label of a method) -> finding.
+    studies
+        Names of the studies whose results it needs; it gets no others.
+    variants
+        Label of a method in them -> what its row is called.
+    of_replay
+        Whether replay can be judged too: it has no subspaces, and integrates nothing.
+    """
+
+    judge: Callable[[Results, str], Finding]
+    studies: tuple[str, ...] = ()
+    variants: Mapping[str, str] = field(default_factory=lambda: VARIANTS)
+    of_replay: bool = True
+
+    def __call__(self, results: Results, label: str) -> Finding:
+        """The finding for one method."""
+        return self.judge({name: results[name] for name in self.studies}, label)
+
+
 def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
     """One method at one place of the grid."""
-    # A dictionary: `method` is also the name of an argument of `sel`.
     return without_single(dataset.sel({"label": label, **place}))
 
 

@@ -1,13 +1,18 @@
-"""The paper's claims on the vehicles, figures 2 to 4, 9 and 10, as criteria that can fail."""
+"""The paper's claims on the vehicles (figures 2 to 4, 9 and 10), and on all three models."""
 
-from collections.abc import Callable
+from functools import partial
 
+from vehiclemor.registry import component
+from vehiclemor.report.criteria.double_wishbone import ANGLE, BOTH
 from vehiclemor.report.criteria.finding import (
+    IN_WORDS,
     SMALLEST_CHANGE,
     VISIBLE,
+    Criterion,
     Finding,
     Results,
     at_point,
+    largest_deviation,
     not_visible,
     worst_of,
 )
@@ -20,6 +25,12 @@ HIGH_FIDELITY_OUTPUTS = (
 # Control periods (s): the paper's, and one that is clearly longer.
 PERIOD, LONGER_PERIOD = 0.5, 2.5
 SUBSTANTIAL = 0.1
+# Study of a nominal run -> the paper's rank, outputs that its figures show.
+NOMINAL = {
+    "figures-2-4": (3, OUTPUTS),
+    "figures-6-7": (3, BOTH),
+    "figures-9-10": (1, HIGH_FIDELITY_OUTPUTS),
+}
 
 
 def follows_closely(results: Results, label: str) -> Finding:
@@ -69,13 +80,50 @@ def one_state_suffices(results: Results, label: str) -> Finding:
     return not_visible(at_point(results["figures-9-10"], label, rank=1), HIGH_FIDELITY_OUTPUTS)
 
 
-CRITERIA: dict[str, Callable[[Results, str], Finding]] = {
-    "gv_fig3_closely_matches": follows_closely,
-    "gv_three_states_suffice": three_states_suffice,
-    "gv_control_periods_sharpen_basis": shorter_periods_sharpen_basis,
-    "gv_longer_period_saves_time": longer_periods_save_time,
-    "hfv_fig10_one_state_excellent": one_state_suffices,
+def may_deviate(results: Results, label: str) -> Finding:
+    """Section 4: in some situations the reduced model leaves the full one."""
+    largest = largest_deviation(at_point(results["figure-14"], label, rank=3), ANGLE)
+    text = "largest deviation of the suspension's angle at twice the frequency, as of figure 14"
+    return Finding(largest, VISIBLE, largest > VISIBLE, text)
+
+
+def all_kinds_reduced(results: Results, label: str) -> Finding:
+    """Conclusion: ordinary differential, algebraic and differential-algebraic equations."""
+    reduced: set[str] = set()
+    for study, (rank, _) in NOMINAL.items():
+        point = at_point(results[study], label, rank=rank)
+        if str(point["status"].item()) == "ok":
+            reduced.add(component("model", results[study].attrs["model"]).kind)
+    text = "kinds of equations whose nominal run ends with the paper's number of states"
+    names = ", ".join(sorted(reduced)) or "none"
+    return Finding(float(len(reduced)), 3.0, len(reduced) == 3, text, names, IN_WORDS)
+
+
+def precisely_followed(results: Results, label: str) -> Finding:
+    """Conclusion: the error plots show that trajectories are followed precisely."""
+    found = {
+        study: not_visible(at_point(results[study], label, rank=rank), outputs)
+        for study, (rank, outputs) in NOMINAL.items()
+    }
+    worst, where = worst_of({study: finding.measured for study, finding in found.items()})
+    text = "largest deviation of an output in any nominal run, as a share of its range"
+    seen = f"{where}: {found[where].seen}"
+    return Finding(worst, VISIBLE, all(f.met for f in found.values()), text, seen)
+
+
+PERIODS, FIRST = ("vehicle-control-period",), ("figures-2-4",)
+CRITERIA = {
+    "gv_fig3_closely_matches": Criterion(follows_closely, FIRST),
+    "gv_three_states_suffice": Criterion(three_states_suffice, FIRST, of_replay=False),
+    "gv_control_periods_sharpen_basis": Criterion(
+        shorter_periods_sharpen_basis, PERIODS, of_replay=False
+    ),
+    "gv_longer_period_saves_time": Criterion(longer_periods_save_time, PERIODS, of_replay=False),
+    "hfv_fig10_one_state_excellent": Criterion(one_state_suffices, ("figures-9-10",)),
+    "all_may_deviate": Criterion(may_deviate, ("figure-14",)),
+    "all_three_equation_kinds": Criterion(all_kinds_reduced, tuple(NOMINAL), of_replay=False),
+    "all_follow_precisely": Criterion(precisely_followed, tuple(NOMINAL)),
+    "all_accuracy_buys_time": Criterion(
+        partial(longer_periods_save_time, bound=1.0 - SMALLEST_CHANGE), PERIODS, of_replay=False
+    ),
 }
-WITHOUT_REPLAY = frozenset(
-    {"gv_three_states_suffice", "gv_control_periods_sharpen_basis", "gv_longer_period_saves_time"}
-)

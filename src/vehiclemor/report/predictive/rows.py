@@ -2,54 +2,31 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from vehiclemor.report.predictive.equal_error import at_error
-from vehiclemor.report.predictive.rates import upper_bound
-from vehiclemor.report.predictive.targets import Row, error_columns, ratio, target_rows
+from vehiclemor.report.predictive.targets import (
+    Row,
+    error_columns,
+    ratio,
+    target_rows,
+    upper_bound,
+)
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.protocol_results import judged_part, judged_set
 from vehiclemor.study.plans.study_file import StudyFile
-from vehiclemor.study.run import run_studies
 
-STUDY = "predictive"
 OUTSIDE = ("outside", "drawn_outside")
 # Column of seconds -> what is timed.
 CLOCKS = {"seconds": "whole call", "loop_seconds": "compiled loop"}
 
 
-def predictive_comparison(
-    folder: Path, jobs: int = 1, study: str = STUDY, seed: int | None = None
-) -> pd.DataFrame:
-    """The comparison as a table; what is missing is run first.
-
-    Parameters
-    ----------
-    seed
-        Of the drawn test runs, for an audit; by default that of the protocols.
-
-    Returns
-    -------
-    pandas.DataFrame
-        `kind` tells what a row is, `study` of which protocol.  `method`: one contestant on what is
-        judged, with the columns of `method_rows`.  `target`: what the contender that validation
-        has chosen must reach, with `id`, `bound`, `measured`, `unit`, `verdict` (`met`, `missed` or
-        `not_comparable`), `reason` and `threshold_source`.  Errors `worst_<measure>_<output>`
-        are in SI units.
-    """
-    results = run_studies(study, folder, jobs, seed=seed).values()
-    rows = [row for dataset in results for row in protocol_rows(dataset)]
-    return pd.DataFrame(rows)
-
-
 def protocol_rows(dataset: xr.Dataset) -> list[Row]:
-    """Rows of one protocol: contestants and targets, as of `predictive_comparison`."""
+    """Rows of one protocol: contestants and targets, as of `compare`."""
     protocol = protocol_of(dataset)
     methods = method_rows(dataset, protocol)
     rows = methods + target_rows(dataset, protocol, methods)

@@ -11,6 +11,8 @@ from vehiclemor.report.verdicts import NOT_COMPARABLE, judged, scatter
 from vehiclemor.study.plans.study_file import SpeedTarget, Straight, StudyFile
 
 Row = dict[str, Any]
+# Of the bounds of rates.
+CONFIDENCE = 0.95
 
 
 def error_columns(protocol: StudyFile) -> dict[str, tuple[str, str]]:
@@ -20,6 +22,19 @@ def error_columns(protocol: StudyFile) -> dict[str, tuple[str, str]]:
         for output, bound in protocol.bounds.items()
     }
     return bounded | {f"rms_{output}": (output, "rms") for output in protocol.reported}
+
+
+def upper_bound(misses: int, runs: int) -> float:
+    """Rate of misses that so many in so many runs exclude at 95 % (C. Clopper, E. Pearson, 1934).
+
+    The one-sided exact bound: without a miss in 299 runs it is below 1 %.
+    """
+    from scipy.stats import binomtest
+
+    if runs == 0:
+        return 1.0
+    test = binomtest(misses, runs, alternative="less")
+    return float(test.proportion_ci(CONFIDENCE, method="exact").high)
 
 
 def ratio(other: Row | None, row: Row) -> float:

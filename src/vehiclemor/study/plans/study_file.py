@@ -294,7 +294,11 @@ class StudyFile(FileSchema):
 
     @property
     def points(self) -> int:
-        """Number of points of the grid; one cell may stand at several of them."""
+        """Number of points of the grid, or of tests; one cell may stand at several of them."""
+        if self.bounds:
+            listed = sum(group.scenarios for group in (*self.test, *self.outside))
+            draws = sum(draw.runs for draw in (self.drawn, self.drawn_outside) if draw)
+            return (listed + draws) * len(self.methods)
         sizes = [len(values(entry)) for entry in self.grid.values()]
         sizes += [len(self.start) or 1, self.sampling.count if self.sampling else 1]
         return math.prod(sizes) * len(self.methods)

@@ -1,0 +1,295 @@
+"""What a name stands for: model, method, maneuver, study, or the schema of a file."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from vehiclemor.arguments import quoted
+from vehiclemor.errors import InputError
+from vehiclemor.maneuver import FACTORS
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
+from vehiclemor.reduction.interface import never_refused
+from vehiclemor.registry import component, names, unknown
+from vehiclemor.resources import data_names
+from vehiclemor.simulation.build import build_derived
+from vehiclemor.study.plans.loading import load_studies, study_path
+from vehiclemor.study.plans.study_file import SETS, StudyFile, values
+from vehiclemor.toml_files import read_toml
+
+Description = dict[str, Any]
+SCHEMAS: dict[str, type[BaseModel]] = {
+    "study-schema": StudyFile,
+    "parameter-schema": ParameterFile,
+}
+WORDS = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
+KINDS = {
+    "ae": "algebraic equations Phi(q; u) = 0",
+    "ode": "ordinary differential equations x' = f(x, u)",
+    "dae": "differential equations with constraints, stabilised",
+}
+UNKNOWN = "known once the model has been simulated"
+# Values of an axis that are printed.
+SHOWN = 40
+
+
+def description(
+    name: str,
+    parameters: Mapping[str, object] | None = None,
+    parameter_file: Path | None = None,
+) -> Description:
+    """What a name stands for; lists of dictionaries are the rows of tables.
+
+    Raises
+    ------
+    InputError
+        If nothing has that name, or a parameter is wrong.
+    """
+    if not isinstance(name, str):
+        raise InputError(f"name is {quoted(name)}, not a text")
+    if name in names("model"):
+        return _model(name, parameters, parameter_file)
+    known = {
+        **dict.fromkeys(names("method"), _method),
+        **dict.fromkeys(names("maneuver"), _maneuver),
+        **dict.fromkeys(data_names("studies"), _study),
+        **dict.fromkeys(SCHEMAS, schema_description),
+    }
+    if name.endswith(".toml"):
+        return _study(name)
+    if name not in known:
+        raise unknown("name", name, {*known, *names("model")})
+    return known[name](name)
+
+
+def _model(
+    name: str, overrides: Mapping[str, object] | None, parameter_file: Path | None
+) -> Description:
+    """Kind, parameters, starts, inputs, outputs and states of a model, and what reduces it."""
+    definition: ModelDefinition = component("model", name)
+    path = parameter_file or definition.parameter_file or parameter_path(name)
+    parameters = load_parameters(name, definition.parameters, path, overrides)
+    accepted = {method: _accepts(method, definition)[0] for method in names("method")}
+    # Initial conditions, as far as they are known without deriving the model.
+    if model := build_derived(name):
+        starts = list(model.starts)
+    elif definition.kind == "ae":
+        starts = [DESIGN_START]
+    else:
+        starts = [UNKNOWN] if definition.solved else list(definition.starts(parameters.values()))
+    quantities = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints")
+    return {
+        "model": name,
+        "summary": definition.summary,
+        "kind": f"{definition.kind}: {KINDS[definition.kind]}",
+        "maneuver": definition.maneuver,
+        "starts": starts,
+        "methods": [method for method, answer in accepted.items() if answer == "yes"],
+        f"methods that may fit ({UNKNOWN})": [m for m, a in accepted.items() if a == "?"],
+        **{kind: _quantities(getattr(definition, kind)) for kind in quantities},
+        "parameter file": str(path),
+        "parameters": [
+            {
+                "name": parameter,
+                "value": entry.value,
+                "unit": entry.unit,
+                "bounds": _bounds(declared.above, declared.at_least, declared.at_most),
+                "meaning": entry.description,
+                "status": entry.status,
+                "source": entry.source,
+            }
+            for (parameter, declared), entry in zip(
+                definition.parameters.items(), parameters.entries.values(), strict=True
+            )
+        ],
+        "sources": [
+            {"source": key, "licence": source.licence, "text": source.text}
+            for key, source in read_toml(path, ParameterFile).sources.items()
+        ],
+    }
+
+
+def _quantities(quantities: Iterable[Quantity]) -> list[dict[str, str]]:
+    return [{"name": q.name, "unit": q.unit, "meaning": q.long_name} for q in quantities]
+
+
+def _accepts(method_name: str, definition: ModelDefinition) -> tuple[str, str]:
+    """Whether a method reduces a model (`yes`, `no`, `?`) without deriving it, and the reason."""
+    method = component("method", method_name)
+    by_kind = definition.kind not in method.settings or method.refusal is never_refused
+    model = definition if by_kind else build_derived(definition.name)
+    if model is None:
+        return "?", UNKNOWN
+    accepted, reason = method.accepts(model)
+    return "yes" if accepted else "no", reason
+
+
+def _method(name: str) -> Description:
+    """Summary, reference, settings and presets by kind of model, and the models it accepts."""
+    method = component("method", name)
+    settings: Description = {}
+    for declared in dict.fromkeys(method.settings.values()):
+        kinds = [kind for kind, of_kind in method.settings.items() if of_kind is declared]
+        settings[f"settings, kind {' and '.join(kinds)}"] = _keys(declared.model_json_schema())
+    answers = {model: _accepts(name, component("model", model)) for model in names("model")}
+    return {
+        "method": name,
+        "summary": method.summary,
+        "reference": f"doi:{method.reference}" if method.reference else "",
+        **settings,
+        "presets": [
+            {"preset": preset, "kind": kind, "changes": _listed(changes) or "the defaults"}
+            for kind in method.settings
+            for preset, changes in method.presets_of(kind).items()
+        ],
+        "models": [{"model": m, "accepted": a, "reason": r} for m, (a, r) in answers.items()],
+    }
+
+
+def _listed(settings: Mapping[str, object]) -> str:
+    return ", ".join(f"{key}={value}" for key, value in settings.items())
+
+
+def _maneuver(name: str) -> Description:
+    """Summary, duration, ranges of the inputs, factors, and the models that it drives."""
+    maneuver = component("maneuver", name)
+    models = {model: component("model", model).inputs for model in names("model")}
+    driven = {m: i for m, i in models.items() if tuple(q.name for q in i) == maneuver.inputs}
+    units = [q.unit for q in next(iter(driven.values()), ())] or [""] * len(maneuver.inputs)
+    signals = maneuver.at(maneuver.times).T
+    return {
+        "maneuver": name,
+        "summary": maneuver.summary,
+        "duration": f"{maneuver.duration:g} s, {maneuver.samples} output times",
+        "break points": [f"{time:g} s" for time in maneuver.break_points],
+        "models": list(driven),
+        "inputs": [
+            {"name": i, "unit": unit, "smallest": float(s.min()), "largest": float(s.max())}
+            for i, unit, s in zip(maneuver.inputs, units, signals, strict=True)
+        ],
+        "parameters": [
+            {"name": f"{factor} factor", "default": 1.0, "bounds": _bounds(None, *limits)}
+            for factor, limits in FACTORS.items()
+        ],
+    }
+
+
+def _study(name: str) -> Description:
+    """Grid and methods of a study, its members if it is a collection, or its protocols."""
+    path = study_path(name)
+    study = read_toml(path, StudyFile)
+    head: Description = {"study": path.stem, "summary": study.title, "file": str(path)}
+    if study.studies:
+        rows = [
+            {"study": member, "runs": content.points, "summary": content.title}
+            for member, content in load_studies(name).items()
+        ]
+        return {**head, "runs": sum(row["runs"] for row in rows), "studies": rows}
+    if study.bounds:
+        return head | _protocol(study)
+    plan = study.sampling
+    how = f"{plan.plan}, {plan.count} points, seed {plan.seed}" if plan else ""
+    ranges = plan.ranges.items() if plan else ()
+    grid = {key: values(entry) for key, entry in study.grid.items()}
+    return {
+        **head,
+        "model": study.model,
+        "maneuver": study.maneuver or component("model", study.model).maneuver,
+        "starts": study.start or ["the model's first"],
+        "training": study.training_words,
+        "parameters": _listed(study.parameters),
+        "grid points": study.points,
+        "keeps": study.keep,
+        "grid": [{"dimension": key, "values": _axis(entry)} for key, entry in grid.items()],
+        "sampling": [
+            {"name": key, "from": low, "to": high, "plan": how} for key, (low, high) in ranges
+        ],
+        "methods": [
+            {"label": label, "method": entry.method, "preset": entry.preset}
+            | {"settings": _listed(entry.settings)}
+            for label, entry in study.labelled.items()
+        ],
+    }
+
+
+def _axis(axis: list[int | float | str]) -> str:
+    """Values of an axis; of a long one both ends."""
+    if len(axis) <= SHOWN:
+        return ", ".join(map(str, axis))
+    return f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)"
+
+
+def _protocol(study: StudyFile) -> Description:
+    """What a study with bounds trains, chooses by and tests; scenarios are counted."""
+    counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
+    draws = {"drawn": study.drawn, "drawn outside": study.drawn_outside}
+    counted |= {name: draw.runs for name, draw in draws.items() if draw}
+    return {
+        "model": study.model,
+        "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
+        "seed": study.seed,
+        "version": study.version,
+        "bounds": [
+            {"output": output, "measure": b.measure, "bound": b.bound, "reason": b.reason}
+            for output, b in study.bounds.items()
+        ],
+        "methods": [
+            {"label": label, "method": entry.method, "role": entry.role}
+            | {"candidates": len(entry.candidates)}
+            for label, entry in study.labelled.items()
+        ],
+    }
+
+
+def schema_description(name: str) -> Description:
+    """Every key of a file, from the class that parses it: type, default and meaning."""
+    schema = SCHEMAS[name].model_json_schema()
+    tables = {key: _keys(part) for key, part in schema.get("$defs", {}).items()}
+    # Without the markup of docstrings.
+    summary = " ".join(schema["description"].replace("`", "").split())
+    return {"schema": name, "summary": summary, "keys": _keys(schema), **tables}
+
+
+def _keys(schema: Mapping[str, Any]) -> list[dict[str, object]]:
+    """A row for each key of an object's JSON schema."""
+    required = schema.get("required", ())
+    return [
+        {
+            "name": key,
+            "type": _type(part),
+            "default": "required" if key in required else part.get("default"),
+            "meaning": part.get("description", ""),
+        }
+        for key, part in schema["properties"].items()
+    ]
+
+
+def _type(part: Mapping[str, Any]) -> str:
+    """Type and bounds of a value in words."""
+    if "$ref" in part:
+        return part["$ref"].rpartition("/")[2]
+    if "enum" in part:
+        return ", ".join(map(str, part["enum"]))
+    if one := part.get("anyOf") or part.get("oneOf"):
+        choices = [_type(choice) for choice in one if choice != {"type": "null"}]
+        # Every integer is a number.
+        return " or ".join(c for c in choices if c != "integer" or "number" not in choices)
+    kind = part.get("type", "value")
+    for container, key in (("array", "items"), ("object", "additionalProperties")):
+        if kind == container:
+            inside = part.get(key)
+            return f"{WORDS[kind]} of {_type(inside)}" if isinstance(inside, dict) else WORDS[kind]
+    largest = part.get("maximum", part.get("exclusiveMaximum"))
+    limits = _bounds(part.get("exclusiveMinimum"), part.get("minimum"), largest)
+    return f"{WORDS.get(kind, kind)} {limits}".rstrip()
+
+
+def _bounds(above: float | None, at_least: float | None, at_most: float | None) -> str:
+    """Bounds of a number in words; empty if there are none."""
+    if at_least is not None and at_most is not None:
+        return f"{at_least:g} to {at_most:g}"
+    limits = ((">", above), (">=", at_least), ("<=", at_most))
+    return ", ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)

@@ -1,1 +1,0 @@
-"""What a registered name is, from its declaration: data that the command line prints."""
