@@ -66,9 +66,9 @@ def test_a_study_shows_its_grid():
         if name in definitions and definitions[name].grid:
             assert shown["grid points"] == definitions[name].points
             assert [row["dimension"] for row in shown["grid"]] == list(definitions[name].grid)
-    members = {row["study"]: row["grid points"] for row in vm.describe("paper")["studies"]}
+    members = {row["study"]: row["runs"] for row in vm.describe("paper")["studies"]}
     assert members["figure-13-frequency"] == 31 * 5
-    assert vm.describe("paper")["grid points"] == sum(members.values())
+    assert vm.describe("paper")["runs"] == sum(members.values())
     protocol = load_protocol("predictive-independent_suspension_vehicle").definition
     runs = vm.describe("predictive-independent_suspension_vehicle")["runs"]
     assert f"{protocol.drawn.runs} drawn" in runs

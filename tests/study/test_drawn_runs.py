@@ -54,7 +54,7 @@ def test_drawn_runs_follow_from_seed_version_and_purpose(protocol):
 def test_the_test_set_of_every_commit_and_machine(name, first, digest):
     """A change here is another test set: it needs another version in the protocol."""
     protocol = load_protocol(f"predictive-{name}")
-    assert protocol.test_set == "predictive-1, seed 20261122"
+    assert protocol.test_set == f"predictive-{name}-1, seed 20261122"
     sets = drawn_sets(protocol)
     assert len(sets["drawn"]) == 299
     assert sets["drawn"][0].label == first

@@ -71,5 +71,4 @@ METHOD = Method(
     # Kinds of models that it reduces.
     settings={"ode": ModalSettings},
     fit=fit,
-    # Only what ReducedSystem integrates can be.
 )

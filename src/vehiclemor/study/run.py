@@ -19,7 +19,7 @@ from vehiclemor.study.plans.grid_results import cells_digest, combined
 from vehiclemor.study.plans.loading import owner, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import cell_path
 from vehiclemor.study.workers import Workers
@@ -58,11 +58,15 @@ def run_studies(
     """
     count("jobs", jobs, most=MOST_JOBS)
     if seed is not None:
-        count("seed", seed, least=0)
+        count("seed", seed, least=0, most=MOST_SEED)
     if jobs > 1 and scheduler not in ("", LOCAL):
         raise InputError("jobs: a scheduler at an address has its own workers")
     files = studies_and_files(study)
-    protocols = [load_protocol(str(path), seed) for path, d in files.values() if d.bounds]
+    protocols = [
+        load_protocol(str(path), seed if d.drawn else None)
+        for path, d in files.values()
+        if d.bounds
+    ]
     if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
         raise InputError(f"seed: {study} draws no test runs")
     grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.bounds]

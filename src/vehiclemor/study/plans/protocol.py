@@ -89,7 +89,7 @@ class Protocol:
     @property
     def test_set(self) -> str:
         """Name of its drawn test set, with the seed."""
-        return f"predictive-{self.definition.version}, seed {self.seed}"
+        return f"{self.path.stem}-{self.definition.version}, seed {self.seed}"
 
 
 def protocol_names() -> dict[str, str]:
@@ -137,7 +137,9 @@ def _resolved(path: Path, definition: StudyFile, seed: int) -> Protocol:
     labels = [label for entry in entries for label in entry.row_labels]
     for label in labels:
         if labels.count(label) > 1:
-            raise InputError(f"label {label!r} is used twice")
+            raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
+    if definition.straight:
+        _check_driven(definition, definition.straight.maneuver)
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
         choice("row that a target is against", target.against, known)
@@ -149,9 +151,6 @@ def _scenarios(model: Model, key: str, definition: StudyFile) -> tuple[Scenario,
     found: list[Scenario] = []
     for number, group in enumerate(getattr(definition, key), start=1):
         try:
-            # What is stored lists them where there are none.
-            if "points" in group.model_fields_set and not group.points:
-                raise InputError("points is empty")
             found += _of_group(model, group)
         except InputError as error:
             raise type(error)(f"{key}, group {number}: {error}") from None
@@ -197,6 +196,13 @@ def _check_boxes(model: Model, definition: StudyFile) -> None:
                 raise type(error)(f"{purpose}, box {number}: {error}") from None
 
 
+def _check_driven(definition: StudyFile, maneuver: str) -> None:
+    """Raise `InputError` if no test run is of a maneuver."""
+    boxes = [box for name in DRAWN if (d := getattr(definition, name)) for box in d.boxes]
+    known = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
+    choice("maneuver of a test, in straight", maneuver, sorted(known))
+
+
 def _check_corners(model: Model, box: Box) -> None:
     maneuver: Maneuver = component("maneuver", box.maneuver)
     for start in box.start:
@@ -218,8 +224,9 @@ def _entry(
     where = f"method {label!r}"
     candidates: list[Settings] = []
     for given in entry.candidates:
-        settings: dict[str, object] = {"preset": entry.preset, **entry.settings, **given}
-        preset = str(settings.pop("preset"))
+        own: dict[str, object] = dict(given)
+        preset = str(own.pop("preset", entry.preset))
+        settings = {**entry.settings, **own}
         complete = complete_settings(model, entry.method, settings, preset)
         # Of a method that refuses the model all candidates are empty.
         if complete in candidates and method.accepts(model)[0]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +69,7 @@ def protocol_dataset(
         "validation_score": [row.validation[row.candidate].score for row in rows],
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
-    dataset = dataset.assign(variables(per_row, "label"))
+    dataset = dataset.assign(variables(per_row, "label")).set_coords("method")
     judged = dataset["scenario_set"].values == judged_set(found)
     places = np.flatnonzero(judged)[: timed.sizes["scenario"]]
     for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
@@ -83,9 +84,17 @@ def protocol_dataset(
             model=protocol.model.name,
             evaluations=protocol.model.evaluations,
             configuration=protocol.definition.model_dump_json(exclude_defaults=True),
-            test_set=protocol.test_set if protocol.definition.drawn else "listed",
+            test_set=_test_set(protocol, found),
         )
     )
+
+
+def _test_set(protocol: Protocol, found: Mapping[str, Sequence[xr.Dataset]]) -> str:
+    """Name of what is judged, with a hash of the very runs where they are drawn."""
+    if "drawn" not in found:
+        return "listed"
+    labels = "\n".join(str(label) for label in found["drawn"][0]["scenario"].values)
+    return f"{protocol.test_set}, runs {hashlib.sha256(labels.encode()).hexdigest()[:8]}"
 
 
 def judged_set(sets: Container[str]) -> str:

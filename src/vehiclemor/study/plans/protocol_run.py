@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.errors import FileError
+from vehiclemor.errors import FileError, InputError
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
@@ -49,6 +49,11 @@ def run_protocol(
         On the dimensions `label`, `scenario` and `output`, stored as `studies/NAME.nc` too.
     """
     workers = Workers(protocol.study, folder, jobs, elsewhere)
+    sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
+    try:
+        sets |= drawn_sets(protocol)
+    except InputError as error:
+        raise FileError(f"{protocol.path}: {error}") from None
     of = owner(protocol.study, protocol.path, protocol.definition, folder)
     path = combined_path(folder, of)
     rows = validate(
@@ -59,8 +64,6 @@ def run_protocol(
         workers,
     )
     rows = with_winner(protocol, rows, path)
-    sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
-    sets |= drawn_sets(protocol)
     found = test(protocol.model, rows, sets, workers)
     apart = _sensitive(protocol, sets, workers)
     if "drawn" in sets and all(apart["drawn"]):
@@ -153,6 +156,9 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
     within = [i for i in racing if results[i].score <= MARGIN_OF_CHOSEN]
     fitting = [i for i in within if results[i].stable == 1.0]
     best = min(racing, key=lambda i: (-results[i].stable, results[i].score))
+    # What gives no run at all is not chosen.
+    if not results[best].stable:
+        return list(rows)
     if len(fitting) > 1:
         sample = protocol.sets["validation"][:TIMED]
         experiments = {rows[i].label: _experiment(protocol, rows[i], sample) for i in fitting}

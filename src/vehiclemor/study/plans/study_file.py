@@ -19,12 +19,15 @@ PARAMETER = "parameters."
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
 # Of the test sets of every study that gives none.
-SEED = 20261122
+SEED, MOST_SEED = 20261122, 2**63 - 1
 # Sets of scenarios that a study with bounds lists, and those that it draws.
 SETS = ("training", "validation", "test", "outside")
 DRAWN = ("drawn", "drawn_outside")
 # Keys that go with bounds alone; and of a method.
-OF_TESTS = (*SETS[1:], *DRAWN, "reported", "sensitive", "targets", "failure_rate", "straight")
+OF_TESTS = (
+    *(*SETS[1:], *DRAWN, "version", "seed", "reported", "sensitive"),
+    *("targets", "failure_rate", "flagged_misses", "straight"),
+)
 OF_ENTRIES = {"candidates", "role"}
 # Keys that go without bounds alone.
 OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "parameters", "keep")
@@ -110,6 +113,9 @@ class Group(FileSchema):
 
     @model_validator(mode="after")
     def _either(self) -> "Group":
+        for name in self.model_fields_set - {"maneuver"}:
+            if not getattr(self, name):
+                raise ValueError(f"{name} is empty")
         if self.points and (self.frequency or self.amplitude or self.speed):
             raise ValueError("give points or lists of factors, not both")
         if any(len(point) not in (2, 3) for point in self.points):
@@ -164,8 +170,10 @@ class SpeedTarget(FileSchema):
     against: str = Field(
         description="equal accuracy, within bounds, or the label of a full-order row"
     )
-    ratio: float = Field(gt=0.0, description="least ratio of the times")
-    aim: float = Field(0.0, description="ratio that is aimed at")
+    ratio: Limit = Field(description="least ratio of the times")
+    aim: float = Field(
+        0.0, ge=0.0, allow_inf_nan=False, description="larger ratio that is aimed at"
+    )
 
 
 class Straight(FileSchema):
@@ -262,7 +270,7 @@ class StudyFile(FileSchema):
         default_factory=list, description="beyond what was trained: reported, not judged"
     )
     version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
-    seed: int = Field(SEED, ge=0, description="of the drawn runs")
+    seed: int = Field(SEED, ge=0, le=MOST_SEED, description="of the drawn runs")
     drawn: Draw | None = Field(None, description="test set: drawn from boxes")
     drawn_outside: Draw | None = Field(
         None, description="the same beyond the boxes: whether models warn"
@@ -323,6 +331,9 @@ class StudyFile(FileSchema):
 
     @model_validator(mode="after")
     def _complete(self) -> "StudyFile":
+        for name in ("studies", "bounds"):
+            if name in self.model_fields_set and not getattr(self, name):
+                raise ValueError(f"{name} is empty")
         if self.studies:
             if self.model or self.grid or self.methods:
                 raise ValueError("a collection names studies and nothing else")
