@@ -18,7 +18,7 @@ from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, combined
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.study_file import StudyFile, owner, studies_and_files
+from vehiclemor.study.plans.study_file import StudyFile, content_hash, load_studies
 from vehiclemor.study.progress import tell
 from vehiclemor.study.store import cell_path
 from vehiclemor.study.workers import Workers
@@ -61,23 +61,22 @@ def run_studies(
         count("seed", seed, least=0)
     if jobs > 1 and scheduler not in ("", LOCAL):
         raise InputError("jobs: a scheduler at an address has its own workers")
-    files = studies_and_files(study)
-    protocols = [load_protocol(name, seed) for _, d in files.values() for name in d.protocols]
+    files = load_studies(study)
+    protocols = [load_protocol(name, seed) for d in files.values() for name in d.protocols]
     if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
         raise InputError(f"seed: {study} draws no test runs")
-    grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.protocols]
+    grids = [_expanded(n, d) for n, d in files.items() if not d.protocols]
     with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
-        for path, grid in grids:
-            of = owner(grid.name, path, grid.definition, folder)
+        for grid in grids:
             workers = Workers(grid.name, folder, jobs, elsewhere, set(grid.unique))
             results[grid.name] = stored(
-                combined_path(folder, of),
+                combined_path(folder, grid.name),
                 "cells",
                 cells_digest(grid),
                 partial(_combined, grid, workers),
                 lambda grid=grid: (cell_path(folder, key) for key in grid.unique),
-                of,
+                content_hash(grid.definition),
             )
             tell(grid.name, len(grid.unique), len(grid.unique))
     return results

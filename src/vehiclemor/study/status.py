@@ -12,13 +12,14 @@ import numpy as np
 
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.combined import Owner, combined_path
+from vehiclemor.study.combined import result_path
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import validation_experiments
-from vehiclemor.study.plans.study_file import owner, studies_and_files
+from vehiclemor.study.plans.study_file import content_hash, load_studies
 from vehiclemor.study.store import cell_end
 
+LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")
 
@@ -84,14 +85,15 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: not a folder")
     found: dict[str, StudyStatus] = {}
-    for name, (path, definition) in studies_and_files(study).items():
+    for name, definition in load_studies(study).items():
         for protocol in map(load_protocol, definition.protocols):
-            of = owner(protocol.study, protocol.path, protocol.definition, folder)
+            result = result_path(folder, protocol.study, content_hash(protocol.definition))
             cells = {e.key: e.method for e in validation_experiments(protocol)}
-            found[protocol.study] = _status(cells, of, folder, "then the chosen ones are tested")
+            found[protocol.study] = _status(cells, result, folder, LATER)
         if not definition.protocols:
             cells = _methods(expand(name, definition))
-            found[name] = _status(cells, owner(name, path, definition, folder), folder)
+            result = result_path(folder, name, content_hash(definition))
+            found[name] = _status(cells, result, folder)
     return found
 
 
@@ -102,10 +104,11 @@ def _methods(grid: Grid) -> dict[str, str]:
     return {key: label for label, own in zip(labels, keys, strict=True) for key in own}
 
 
-def _status(cells: Mapping[str, str], of: Owner, folder: Path, later: str = "") -> StudyStatus:
+def _status(
+    cells: Mapping[str, str], result: Path | None, folder: Path, later: str = ""
+) -> StudyStatus:
     """Of cells with their methods."""
-    result = combined_path(folder, of)
-    status = StudyStatus(len(cells), result=result if result.exists() else None, later=later)
+    status = StudyStatus(len(cells), result=result, later=later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     seconds: dict[str, list[float]] = defaultdict(list)
     missing: Counter[str] = Counter()

@@ -25,7 +25,7 @@ from vehiclemor.study.plans.protocol import CONTENDER, DRAWN, FULL_ORDER, Contes
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.sensitive import reasons, second_run
-from vehiclemor.study.plans.study_file import owner
+from vehiclemor.study.plans.study_file import content_hash
 from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.store import cell_path
@@ -50,8 +50,7 @@ def run_protocol(
         `studies/predictive-<protocol>.nc` too.
     """
     workers = Workers(protocol.study, folder, jobs, elsewhere)
-    of = owner(protocol.study, protocol.path, protocol.definition, folder)
-    path = combined_path(folder, of)
+    path = combined_path(folder, protocol.study)
     rows = validate(
         protocol.model,
         protocol.definition,
@@ -77,7 +76,7 @@ def run_protocol(
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
         lambda: protocol_dataset(protocol, rows, found, (timed, apart)),
         lambda: (cell_path(folder, key) for key in keys),
-        of,
+        content_hash(protocol.definition),
     )
 
 

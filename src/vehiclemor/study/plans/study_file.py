@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +11,6 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from vehiclemor.errors import FileError
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.protocol_file import ProtocolFile
 from vehiclemor.toml_files import FileSchema, Line, has_table, read_toml
 
@@ -259,29 +257,7 @@ def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
     return members
 
 
-def owner(study: str, path: Path, definition: FileSchema, folder: Path) -> Owner:
-    """Whose a combined dataset in a results folder is.
-
-    Parameters
-    ----------
-    study
-        Name of its results.
-    """
-    return Owner(study, _as_stored(path, folder), content_hash(definition))
-
-
 def content_hash(definition: FileSchema) -> str:
     """Short hash of what a file says."""
     text = definition.model_dump_json(exclude_defaults=True)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
-
-
-def _as_stored(path: Path, folder: Path) -> str:
-    """How results in a folder name the file that they come from: the package's own by its name."""
-    if data_folder() in path.parents:
-        return path.stem
-    try:
-        return os.path.relpath(path.resolve(), folder.resolve())
-    except ValueError:
-        # Another drive, where there are drives.
-        return str(path.resolve())
