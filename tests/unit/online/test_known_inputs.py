@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from vehiclemor.study.plans.boxes import drawn
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
 from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.study.plans.boxes import drawn
 from vehiclemor.study.plans.protocol import load_protocol
 
 CAR = "independent_suspension_vehicle"

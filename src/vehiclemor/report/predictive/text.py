@@ -109,7 +109,9 @@ def _method_table(rows: list[Row], winner: Row | None, notes: Footnotes) -> str:
     table = table_text(heads, [Line(_costs(row, notes)) for row in (*full, *shown)])
     if not lost:
         return table
-    words = ", ".join(f"{row['label']} {row['misses']:.0f} ({short(row['score'])})" for row in lost)
+    words = ", ".join(
+        f"{row['label']} {row['misses']:.0f} ({short(row['score'])})" for row in lost
+    )
     return f"{table}\n{wrapped(f'Miss more (worst score): {words}.', 2, 4)}"
 
 
