@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import logging
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,8 @@ import pytest
 import xarray as xr
 
 from tests.study.small import TIMED, small_study
-from vehiclemor.errors import SpoiledError
+from vehiclemor.errors import InputError, SpoiledError
+from vehiclemor.report.result_selection import stored_result
 from vehiclemor.study import cell_file, netcdf_file, workers
 from vehiclemor.study.netcdf_file import read_dataset, write_dataset
 from vehiclemor.study.run import run_studies
@@ -267,7 +269,8 @@ DAMAGED = """
 import sys
 from pathlib import Path
 import numpy as np
-from vehiclemor.errors import SpoiledError
+from vehiclemor.errors import InputError, SpoiledError
+from vehiclemor.report.result_selection import stored_result
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
@@ -334,20 +337,22 @@ def test_other_tools_read_files_that_end_with_their_hash(tmp_path):
 # Whose results these are
 
 
-def test_two_studies_of_one_name_are_both_stored(place, computed):
+def test_of_two_studies_of_one_name_the_last_is_stored_and_told(place, computed, caplog):
     other = small_study(place / "other", GRID.replace("[2, 3]", "[3, 4]"), "pod")
-    out = place / "out"
-    both = [run(path, out) for path in (other, place / "small.toml", other)]
+    out, path = place / "out", place / "out" / "studies" / "small.nc"
+    caplog.set_level(logging.INFO, "vehiclemor")
+    for study, ranks in ((other, [3, 4]), (place / "small.toml", [2, 3]), (other, [3, 4])):
+        told = len(caplog.messages)
+        # What stands there is of the other.
+        with pytest.raises(InputError, match="no such result"):
+            stored_result(str(study), out)
+        for _ in range(2):
+            assert list(run(study, out)["rank"].values) == ranks
+        assert list(stored_result(str(study), out)["rank"].values) == ranks
+        assert [str(path) in message for message in caplog.messages[told:]] == [True]
     # The cell that both have is computed once.
     assert len(computed) == 1
-    assert [list(dataset["rank"].values) for dataset in both] == [[3, 4], [2, 3], [3, 4]]
-    names = sorted(path.name for path in (out / "studies").iterdir())
-    assert names == [f"small-{both[0].attrs['content']}.nc", "small.nc"]
-    # A study that was edited in its place is the same study.
-    small_study(place, GRID.replace("[2, 3]", "[2, 3, 4]"), "pod")
-    assert run(place / "small.toml", out).sizes["rank"] == 3
-    assert len(computed) == 1
-    assert sorted(path.name for path in (out / "studies").iterdir()) == names
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
 
 
 def test_a_collection_may_have_two_studies_of_one_name(place, computed):

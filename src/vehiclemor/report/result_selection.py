@@ -12,9 +12,9 @@ from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names
-from vehiclemor.study.combined import combined_path
+from vehiclemor.study.combined import combined_path, result_path
 from vehiclemor.study.netcdf_file import read_dataset
-from vehiclemor.study.plans.loading import owner, studies_and_files
+from vehiclemor.study.plans.loading import content_hash, load_studies
 from vehiclemor.study.plans.study_file import FACTORS
 
 if TYPE_CHECKING:
@@ -37,13 +37,15 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
     if path.suffix != ".nc":
         path = results / "studies" / f"{name}.nc"
         if name.endswith(".toml") or name in data_names("studies") or not path.exists():
-            members = studies_and_files(name)
+            members = load_studies(name)
             if len(members) > 1:
                 raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
-            ((study, found),) = members.items()
-            path = combined_path(results, owner(study, *found, results))
-        if not path.exists():
-            raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
+            ((study, definition),) = members.items()
+            found = result_path(results, study, content_hash(definition))
+            if found is None:
+                path = combined_path(results, study)
+                raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
+            path = found
     return read_dataset(path, "source", "vehiclemor")
 
 

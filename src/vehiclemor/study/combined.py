@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from vehiclemor.files import make_folder
 from vehiclemor.study.netcdf_file import global_attributes, read_dataset, write_dataset
@@ -13,38 +14,18 @@ from vehiclemor.study.store import set_aside
 if TYPE_CHECKING:
     import xarray as xr
 
-
-class Owner(NamedTuple):
-    """The study that a combined dataset is of.
-
-    Attributes
-    ----------
-    study
-        Name of its results.
-    study_file
-        Where it comes from.
-    content
-        Hash of what that file says: two files of one name are two studies, and a file that was
-        renamed is still the same.
-    """
-
-    study: str
-    study_file: str
-    content: str
+_LOG = logging.getLogger("vehiclemor")
 
 
-def combined_path(folder: Path, owner: Owner) -> Path:
-    """File of a study's combined dataset: `studies/<name>.nc`.
+def combined_path(folder: Path, study: str) -> Path:
+    """File of the combined dataset of the study that has last run under this name."""
+    return folder / "studies" / f"{study}.nc"
 
-    If that holds another study's, a part of the content's hash is put to the name.
-    """
-    path = folder / "studies" / f"{owner.study}.nc"
-    held = global_attributes(path)
-    # A file that was edited in its place is the same study.
-    edited = owner.study_file == held.get("study_file", owner.study_file)
-    if edited or owner.content == held.get("content"):
-        return path
-    return path.with_stem(f"{owner.study}-{owner.content}")
+
+def result_path(folder: Path, study: str, content: str) -> Path | None:
+    """As `combined_path`, if there is one, of the study file of this content."""
+    path = combined_path(folder, study)
+    return path if global_attributes(path).get("content") == content else None
 
 
 def stored(
@@ -53,12 +34,13 @@ def stored(
     key: str,
     make: Callable[[], xr.Dataset],
     sources: Callable[[], Iterable[Path]] = list,
-    owner: Owner | None = None,
+    content: str = "",
 ) -> xr.Dataset:
     """What is stored for this key, here or under another name, else what `make` gives.
 
-    The results of a study are then stored at `path`.  Where the file is tells the encoding `source`
-    of what is returned.
+    The results of a study are then stored at `path`, in the place of those of another study of that
+    name, which can be combined again.  Where the file is tells the encoding `source` of what is
+    returned.
 
     Parameters
     ----------
@@ -67,8 +49,8 @@ def stored(
     sources
         Gives the files that it was made from; if one of them is missing it is made again, and if a
         bug has ended one of its cells.
-    owner
-        Of the result of a study.
+    content
+        Hash of what a study file says: a file that was renamed is still the same study.
     """
     dataset = None
     for place in (path, *sorted(path.parent.glob("[!.]*.nc"))):
@@ -77,14 +59,19 @@ def stored(
             dataset.encoding["source"] = str(place)
             if "status" in dataset and "error" in dataset["status"].values:
                 dataset = None
-            elif place == path or owner is None:
+            elif place == path or not content:
                 return dataset
             break
     make_folder(path.parent)
-    if path.exists() and global_attributes(path).get("source") != "vehiclemor":
+    held = global_attributes(path)
+    if path.exists() and held.get("source") != "vehiclemor":
         set_aside(path, path.parent, "not as it was written, or no result of this package")
     dataset = make() if dataset is None else dataset
-    dataset = dataset.assign_attrs({attribute: key} | (owner._asdict() if owner else {}))
+    dataset = dataset.assign_attrs({attribute: key})
+    if content:
+        dataset = dataset.assign_attrs(study=path.stem, content=content)
+        if held.get("content", content) != content:
+            _LOG.info("%s: in the place of the results of another %s.toml", path, path.stem)
     write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset

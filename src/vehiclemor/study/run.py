@@ -16,7 +16,7 @@ from vehiclemor.study.cluster import LOCAL, reached
 from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.grid_results import cells_digest, combined
-from vehiclemor.study.plans.loading import owner, studies_and_files
+from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
@@ -63,25 +63,24 @@ def run_studies(
         raise InputError("jobs: a scheduler at an address has its own workers")
     files = studies_and_files(study)
     protocols = [
-        load_protocol(str(path), seed if d.drawn else None)
-        for path, d in files.values()
-        if d.bounds
+        load_protocol(str(path), seed if found.drawn else None)
+        for path, found in files.values()
+        if found.bounds
     ]
     if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
         raise InputError(f"seed: {study} draws no test runs")
-    grids = [(path, _expanded(n, d)) for n, (path, d) in files.items() if not d.bounds]
+    grids = [_expanded(name, found) for name, (_, found) in files.items() if not found.bounds]
     with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
-        for path, grid in grids:
-            of = owner(grid.name, path, grid.definition, folder)
+        for grid in grids:
             workers = Workers(grid.name, folder, jobs, elsewhere, set(grid.unique))
             results[grid.name] = stored(
-                combined_path(folder, of),
+                combined_path(folder, grid.name),
                 "cells",
                 cells_digest(grid),
                 partial(_combined, grid, workers),
                 lambda grid=grid: (cell_path(folder, key) for key in grid.unique),
-                of,
+                content_hash(grid.definition),
             )
             tell(grid.name, len(grid.unique), len(grid.unique))
     return results

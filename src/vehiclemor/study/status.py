@@ -12,13 +12,14 @@ import numpy as np
 
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.combined import Owner, combined_path
+from vehiclemor.study.combined import result_path
 from vehiclemor.study.plans.grid import Grid, expand
-from vehiclemor.study.plans.loading import owner, studies_and_files
+from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import validation_experiments
 from vehiclemor.study.store import cell_end
 
+LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")
 
@@ -85,13 +86,14 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
         raise FileError(f"{folder}: not a folder")
     found: dict[str, StudyStatus] = {}
     for name, (path, definition) in studies_and_files(study).items():
-        later = ""
+        later = LATER if definition.bounds else ""
         if definition.bounds:
             experiments = validation_experiments(load_protocol(str(path)))
-            cells, later = {e.key: e.method for e in experiments}, "then the chosen ones are tested"
+            cells = {e.key: e.method for e in experiments}
         else:
             cells = _methods(expand(name, definition))
-        found[name] = _status(cells, owner(name, path, definition, folder), folder, later)
+        result = result_path(folder, name, content_hash(definition))
+        found[name] = _status(cells, result, folder, later)
     return found
 
 
@@ -102,10 +104,11 @@ def _methods(grid: Grid) -> dict[str, str]:
     return {key: label for label, own in zip(labels, keys, strict=True) for key in own}
 
 
-def _status(cells: Mapping[str, str], of: Owner, folder: Path, later: str = "") -> StudyStatus:
+def _status(
+    cells: Mapping[str, str], result: Path | None, folder: Path, later: str = ""
+) -> StudyStatus:
     """Of cells with their methods."""
-    result = combined_path(folder, of)
-    status = StudyStatus(len(cells), result=result if result.exists() else None, later=later)
+    status = StudyStatus(len(cells), result=result, later=later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     seconds: dict[str, list[float]] = defaultdict(list)
     missing: Counter[str] = Counter()

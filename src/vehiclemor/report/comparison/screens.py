@@ -312,9 +312,7 @@ def _protocol(rows: list[Row], explain: bool) -> list[str]:
     of_model = "" if known == first["model"] else f" ({first['model']})"
     head = f"{known}{of_model}: {first['runs']:.0f} runs (test set {first['test_set']})"
     if first["apart"]:
-        head += (
-            f", {first['apart']:.0f} more not judged: full order fails or is sensitive there"
-        )
+        head += f", {first['apart']:.0f} more not judged: full order fails or is sensitive there"
     parts = [wrapped(head)]
     if targets:
         lines = []

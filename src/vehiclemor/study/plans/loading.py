@@ -1,13 +1,11 @@
 """Study files by name or path: the study itself, or the members of a collection."""
 
 import hashlib
-import os
 from pathlib import Path
 
 from vehiclemor.errors import FileError
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.combined import Owner
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.toml_files import FileSchema, read_toml
 
@@ -50,29 +48,7 @@ def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
     return members
 
 
-def owner(study: str, path: Path, definition: FileSchema, folder: Path) -> Owner:
-    """Whose a combined dataset in a results folder is.
-
-    Parameters
-    ----------
-    study
-        Name of its results.
-    """
-    return Owner(study, _as_stored(path, folder), content_hash(definition))
-
-
 def content_hash(definition: FileSchema) -> str:
     """Short hash of what a file says."""
     text = definition.model_dump_json(exclude_defaults=True)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
-
-
-def _as_stored(path: Path, folder: Path) -> str:
-    """How results in a folder name the file that they come from: the package's own by its name."""
-    if data_folder() in path.parents:
-        return path.stem
-    try:
-        return os.path.relpath(path.resolve(), folder.resolve())
-    except ValueError:
-        # Another drive, where there are drives.
-        return str(path.resolve())

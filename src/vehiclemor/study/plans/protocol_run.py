@@ -21,7 +21,7 @@ from vehiclemor.study.combined import combined_path, stored
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
 from vehiclemor.study.plans.drawn_runs import drawn_sets
-from vehiclemor.study.plans.loading import owner
+from vehiclemor.study.plans.loading import content_hash
 from vehiclemor.study.plans.protocol import CONTENDER, FULL_ORDER, Entry, Protocol
 from vehiclemor.study.plans.protocol_results import protocol_dataset
 from vehiclemor.study.plans.sensitive import reasons, second_run
@@ -54,8 +54,7 @@ def run_protocol(
         sets |= drawn_sets(protocol)
     except InputError as error:
         raise FileError(f"{protocol.path}: {error}") from None
-    of = owner(protocol.study, protocol.path, protocol.definition, folder)
-    path = combined_path(folder, of)
+    path = combined_path(folder, protocol.study)
     rows = validate(
         protocol.model,
         protocol.definition,
@@ -79,7 +78,7 @@ def run_protocol(
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
         lambda: protocol_dataset(protocol, rows, found, (timed, apart)),
         lambda: (cell_path(folder, key) for key in keys),
-        of,
+        content_hash(protocol.definition),
     )
 
 
