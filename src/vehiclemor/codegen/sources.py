@@ -9,14 +9,55 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, FunctionType, ModuleType
 
 from vehiclemor.codegen.cache import fetched
+from vehiclemor.errors import PlugInError
 
 PACKAGE = Path(__file__).resolve().parents[1]
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def plug_in_digest(components: Sequence[object]) -> str:
+    """Hash of the plug-ins that components come from, as their files are now.
+
+    Raises
+    ------
+    PlugInError
+        If a file says something else than what is loaded: results would be those of neither.
+    """
+    files = {path for component in components for path in _plug_in_files(component)}
+    stats = [(str(path), path.stat()) for path in sorted(files)]
+    known = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
+    rest = [repr(c) for c in components if (m := _module_of(c)) is None or m.__file__ is None]
+    return _hash([("", _digest_of(known).encode()), *(("", text.encode()) for text in rest)])
+
+
+@lru_cache(maxsize=64)
+def _digest_of(files: tuple[tuple[str, int, int], ...]) -> str:
+    """Hash of what some files mean that are as they were loaded."""
+    texts = {name: Path(name).read_bytes() for name, *_ in files}
+    for module in list(sys.modules.values()):
+        name = getattr(module, "__file__", None)
+        if name in texts and not _is_loaded(module, texts[name]):
+            raise PlugInError(
+                f"{name} has changed since it was loaded: restart Python, or reload the module"
+            )
+    return _hash([("", _meaning(text)) for text in texts.values()])
+
+
+def _is_loaded(module: ModuleType, text: bytes) -> bool:
+    """Whether the functions of a module are those of a text."""
+    left = [compile(text, str(module.__file__), "exec")]
+    written = set()
+    while left:
+        code = left.pop()
+        written.add(code)
+        left += [part for part in code.co_consts if isinstance(part, CodeType)]
+    functions = (f for f in vars(module).values() if isinstance(f, FunctionType))
+    return all(f.__code__ in written for f in functions if f.__module__ == module.__name__)
 
 
 def source_digest(layers: Sequence[str], files: Sequence[str], components: Sequence[object]) -> str:
@@ -74,18 +115,25 @@ def _written(node: object) -> str:
 
 
 def _plug_in_texts(thing: object) -> list[bytes]:
-    """Source texts of the package, or of the single file with its neighbours, of a component."""
+    """Source texts of a component, if it is a plug-in's."""
     module = _module_of(thing)
     if module is None or module.__file__ is None:
         return [repr(thing).encode()]
+    return [path.read_bytes() for path in _plug_in_files(thing)]
+
+
+def _plug_in_files(thing: object) -> list[Path]:
+    """Files of the package, or the single one with its neighbours, of a component."""
+    module = _module_of(thing)
+    if module is None or module.__file__ is None:
+        return []
     top = module.__name__.split(".")[0]
     if top == "vehiclemor":
         return []
     folders = list(getattr(sys.modules.get(top), "__path__", ()))
     if folders:
-        paths = [path for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
-        return [path.read_bytes() for path in paths]
-    return [path.read_bytes() for path in sorted(_neighbours(module, set()))]
+        return [path for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
+    return sorted(_neighbours(module, set()))
 
 
 def _module_of(thing: object) -> ModuleType | None:

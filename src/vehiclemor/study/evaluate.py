@@ -61,8 +61,8 @@ class Fit(NamedTuple):
         What differs from it in the model that is reduced.
     settings
         As text.
-    function
-        The method's own, which may be written anew under the same name.
+    code, function
+        Hash of the source, and the method's own, which may be written anew under the same name.
     """
 
     model: Model
@@ -70,6 +70,7 @@ class Fit(NamedTuple):
     method: str
     settings: str
     training: tuple[Scenario, ...]
+    code: str
     function: Callable
 
 
@@ -111,7 +112,7 @@ def evaluate(
 def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -> xr.Dataset:
     refused = refusal(model, experiment)
     solve = kept_reference if kept else recent_reference
-    fitted = Fitted(refused) if refused else _kept(_wanted(model, experiment))
+    fitted = Fitted(refused) if refused else _shared(_wanted(model, experiment))
     outcomes: list[Outcome | Failure] = []
     for scenario in experiment.test:
         outcome: Any = refused
@@ -198,7 +199,7 @@ def _wanted(model: Model, experiment: Experiment) -> Fit:
     settings = _text(experiment.settings)
     car, method = experiment.test[0].parameters, experiment.method
     function = component("method", method).fit
-    return Fit(model, car, method, settings, experiment.training, function)
+    return Fit(model, car, method, settings, experiment.training, experiment.code, function)
 
 
 def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
@@ -208,7 +209,19 @@ def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
 
 def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     """As `fresh_fit`, but what was fitted before is used again."""
-    return _kept(_wanted(model, experiment)).reduced
+    return _shared(_wanted(model, experiment)).reduced
+
+
+def _shared(fit: Fit) -> Fitted:
+    """A fit that may be shared; a bug is not kept, since it may be mended before the next try."""
+    try:
+        return _kept(fit)
+    except _BrokenFitError as bug:
+        return Fitted(bug.args[0])
+
+
+class _BrokenFitError(Exception):
+    """Carries the failure of a fit."""
 
 
 # More than the fits of a study of protocols, some of which take a minute.
@@ -220,21 +233,27 @@ def _kept(fit: Fit) -> Fitted:
     online = {name: value for name, value in settings.items() if name in ONLINE}
     common = _text(settings | {name: defaults[name] for name in online})
     if common != fit.settings:
-        found: Any = _kept(fit._replace(settings=common)).reduced
+        found: Any = _shared(fit._replace(settings=common)).reduced
         if isinstance(found, Failure):
-            return Fitted(found)
+            return _unbroken(found)
         if all(hasattr(found, name) for name in online):
             return Fitted(replace(found, **online))
 
     def other(name: str, given: Any) -> ReducedModel:
         content, function = _text(given.model_dump()), component("method", name).fit
-        shared = _kept(fit._replace(method=name, settings=content, function=function)).reduced
+        shared = _shared(fit._replace(method=name, settings=content, function=function)).reduced
         if isinstance(shared, Failure):
             # Fitted again it fails as it does alone.
             return fitted(component("method", name), *_given(fit), given)
         return shared
 
-    return Fitted(_fit(fit, other))
+    return _unbroken(_fit(fit, other))
+
+
+def _unbroken(reduced: ReducedModel | Failure) -> Fitted:
+    if isinstance(reduced, Failure) and reduced.status == "error":
+        raise _BrokenFitError(reduced)
+    return Fitted(reduced)
 
 
 def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:

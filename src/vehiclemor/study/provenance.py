@@ -6,7 +6,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component
 
@@ -74,6 +74,10 @@ def attributes(title: str, kernel_hash: str, **further: object) -> dict[str, obj
 
 
 @cache
+def _own_source() -> str:
+    return source_digest(LAYERS, FILES, ())
+
+
 def code_digest(model: str, method: str) -> str:
     """Hash of the source that computes a result.
 
@@ -82,8 +86,8 @@ def code_digest(model: str, method: str) -> str:
     taken for finished ones.
     """
     used: Method = component("method", method)
-    source = source_digest(LAYERS, FILES, (component("model", model), used))
-    return " ".join([source, *map(_version, used.packages)])
+    plug_ins = plug_in_digest((component("model", model), used))
+    return " ".join([_own_source(), plug_ins, *map(_version, used.packages)])
 
 
 @cache

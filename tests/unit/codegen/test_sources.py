@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from vehiclemor.codegen.derivation import derivation
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.sources import plug_in_digest, source_digest
+from vehiclemor.errors import PlugInError
 
 EQUATIONS = "def derive():\n    return {}\n"
 PLUG_IN = """
@@ -125,3 +126,18 @@ def test_a_plug_in_whose_source_has_changed_is_derived_again(fresh, tmp_path, mo
         assert module.calls == (0 if factor in sources else 1)
         assert sources.setdefault(factor, found) == found
     assert sources[3] != sources[71]
+
+
+def test_what_was_edited_since_it_was_loaded_gives_no_results(fresh, tmp_path):
+    files = {"edited/__init__.py": "", "edited/method.py": "def fit():\n    return 1.0\n"}
+    module = fresh("edited.method", files)
+    first = plug_in_digest([SimpleNamespace(fit=module.fit)])
+    path = tmp_path / "edited" / "method.py"
+    path.write_text("def fit():\n    return 22.0\n")
+    with pytest.raises(PlugInError, match=f"{path} has changed since it was loaded"):
+        plug_in_digest([SimpleNamespace(fit=module.fit)])
+    importlib.reload(module)
+    second = plug_in_digest([SimpleNamespace(fit=module.fit)])
+    path.write_text(files["edited/method.py"])
+    importlib.reload(module)
+    assert plug_in_digest([SimpleNamespace(fit=module.fit)]) == first != second
