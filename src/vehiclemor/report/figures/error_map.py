@@ -38,8 +38,9 @@ def figure_map(
     figure, grid = panels(each * len(outputs), columns, size, sharex=True, sharey=True)
     across, up = (places_of(dataset, name).even() for name in axes)
     written = across.at.size * up.at.size <= WRITTEN
-    nominal = np.isclose(up.at, 0.0)[:, None] & np.isclose(across.at, 0.0)
-    nominal &= written and tuple(axes) == FACTORS
+    # Factors, though not their places, are 1 there.
+    one, other = (np.isclose(dataset[name], 1.0) for name in axes)
+    nominal = other[:, None] & one & (written and tuple(axes) == FACTORS)
     spare: list[Axes] = []
     for row, output in enumerate(outputs):
         block = grid[row * each : (row + 1) * each]

@@ -74,8 +74,8 @@ def figure_errors(
         elif sample or len(lines) > max(LINES, len(methods)):
             errors, words = _largest(dataset, [axis]) if sample else (_finished(dataset), "")
             lines = {m: (text, errors.sel(label=m, drop=True)) for m, text in methods.items()}
-            bands = f"medians over {_words(others)}, bands from the smallest to the largest error"
-            more += [f"{dataset.sizes[axis]} samples", words] if sample else [bands]
+            medians = f"medians over {_words(others)}, bands from the smallest to the largest error"
+            more += [f"{dataset.sizes[axis]} samples", words] if sample else [medians]
             numbers = [d for d in others if np.issubdtype(dataset[d].dtype, np.number)]
             if not sample and len(others) == len(numbers) == 1 and len(methods) <= MAPS:
                 across = axis, others[0]
@@ -115,7 +115,7 @@ def _largest(dataset: xr.Dataset, kept: Sequence[str]) -> tuple[xr.DataArray, st
 
 
 def _words(dimensions: Sequence[str]) -> str:
-    *head, last = (d.removeprefix(PARAMETER).replace("_", " ") for d in dimensions)
+    *head, last = (d.removeprefix(PARAMETER).replace("_", " ") for d in dimensions or [""])
     return f"{', '.join(head)} and {last}" if head else last
 
 
