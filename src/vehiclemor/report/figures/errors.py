@@ -128,7 +128,8 @@ def _axes(dataset: xr.Dataset) -> list[str]:
     """The dimension that lines go over, and the others without those of panels."""
     sizes = _sizes(dataset)
     numbers = [d for d in sizes if np.issubdtype(dataset[d].dtype, np.number)]
-    axis = max(numbers or sizes, key=lambda d: (_is_sample(d), d in FACTORS, sizes[d]))
+    largest = max(numbers or sizes, key=lambda d: (d in FACTORS, sizes[d]))
+    axis = next(filter(_is_sample, sizes), largest)
     panels = "start" if _starts(dataset, axis) and not _is_sample(axis) else ""
     return [axis, *(d for d in sizes if d not in (axis, panels))]
 
