@@ -162,6 +162,9 @@ def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, resu
         if line.get_marker() == "<" and line.get_ydata().size
     ]
     assert run["rms_error"].item() in marks
+    (published,) = (x for x in axis.lines if x.get_label() == "published RMS error")
+    low, high = axis.get_ylim()
+    assert all(low < height < high for height in (*marks, published.get_ydata()[0]))
     assert "\nin each 0.5 s" in axis.get_ylabel()
 
 

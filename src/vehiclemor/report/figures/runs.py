@@ -291,6 +291,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
     last = float(runs.full["time"][-1])
     period = (published.control_period if published else None) or last / 50.0
     ended: dict[str, str] = {}
+    marked: list[float] = []
     for number, curve in enumerate(runs.curves):
         edges, largest = _largest(abs(_error(curve, output)), period)
         largest[largest == 0.0] = np.nan
@@ -299,6 +300,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
         if status in FINISHED:
             rms = curve.run["rms_error"].sel(output=output).item()
             at = 1.0 + min(0.03, 0.12 / len(runs.curves)) * number, rms or np.nan
+            marked += [rms] if rms else []
             edge = axis.get_yaxis_transform()
             axis.plot(*at, color=color, transform=edge, clip_on=False, **RMS_MARK)
         elif status == "diverged" and np.isfinite(largest).any():
@@ -306,10 +308,11 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
             ended[DIVERGED] = color
             axis.plot(edges[end + 1], largest[end], color=color, **CROSS)
     axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
-    hide_rounding(axis)
     if published:
         line: Style = {"color": "black", "linestyle": ":", "label": "published RMS error"}
         axis.axhline(published.value, **line)
+    hide_rounding(axis)
+    axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
     tick_decades(axis.yaxis, *axis.get_ylim(), subs=(1.0, 3.0))
     words = f"largest error of {labels.label_of(output).symbol}"
     words = words if len(words) <= LINE else words.replace(" of ", "\nof ", 1)
