@@ -193,7 +193,7 @@ FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
         ({"rank": [*range(1, 9)], "snapshots": [*range(5, 11)]}, "rank", 4, 4),
         ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 4, 0),
         ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
-        ({"equation_seed": [*range(30)]}, "", 2, 0),
+        ({"equation_seed": [*range(30)]}, "equation seed, sorted by error", 2, 0),
     ],
 )
 def test_figures_follow_from_what_varies(dimensions, label, panels, meshes):

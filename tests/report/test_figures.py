@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
+import vehiclemor as vm
 from tests.report.figure_texts import check_texts
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
@@ -161,6 +162,9 @@ def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, resu
         if line.get_marker() == "<" and line.get_ydata().size
     ]
     assert run["rms_error"].item() in marks
+    (published,) = (x for x in axis.lines if x.get_label() == "published RMS error")
+    low, high = axis.get_ylim()
+    assert all(low < height < high for height in (*marks, published.get_ydata()[0]))
     assert "\nin each 0.5 s" in axis.get_ylabel()
 
 
@@ -193,11 +197,33 @@ def test_styles_and_resolution(tmp_path):
     assert drawn_with(dpi=50).shape == (50, 50, 4)
     assert drawn_with("dark_background").mean() < plain.mean()
     assert matplotlib.rcParams["savefig.dpi"] == matplotlib.rcParamsDefault["savefig.dpi"]
-    for wrong in (("no-such-style", None), ("", 5)):
+    for wrong in (("no-such-style", None), (3, None), ("", 5), ("", "a"), ("", float("nan"))):
         with pytest.raises(InputError):
             styled(*wrong)
     with pytest.raises(InputError, match="a figure is one of pdf, svg, png"):
         save_figure(panels(1, 1, (1.0, 1.0))[0], tmp_path / "a.gif")
+
+
+def test_fonts_are_embedded_and_text_is_text(drawn, tmp_path):
+    with styled():
+        pdf, svg = (save_figure(drawn["6"], tmp_path / f"6.{end}") for end in ("pdf", "svg"))
+    assert b"/Type3" not in pdf.read_bytes()
+    assert b"/FontFile2" in pdf.read_bytes()
+    assert ">time (s)</text>" in svg.read_text(encoding="utf-8")
+
+
+def test_failed_runs_of_two_methods_do_not_hide_each_other(drawn, results):
+    errors = results["equation-order"]["rms_error"]
+    failed = int((~np.isfinite(errors.sel(output="spindle_y"))).sum())
+    crosses = [line for line in drawn["equation-order"].axes[0].lines if line.get_marker() == "x"]
+    places = {tuple(point) for line in crosses for point in np.reshape(line.get_xydata(), (-1, 2))}
+    assert len(places) == failed > 2
+
+
+def test_a_full_order_that_stands_still_does_not_hide_the_others(drawn):
+    axis = drawn["vehicle-zero-steer"].axes[0]
+    assert axis.get_ylabel() == "lateral position Y (m)"
+    assert axis.get_ylim()[1] > 3.0
 
 
 def test_pareto_figures_are_drawn_where_their_study_is_stored(
@@ -262,6 +288,14 @@ def test_a_picture_shows_both_runs_and_their_difference(results):
 def test_what_cannot_be_drawn_is_said(results, study, kind, words):
     with pytest.raises(InputError, match=words):
         plot_result(results[study].isel(rank=0), None, kind)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"kind": "curve"}, {"kind": 3}, {"rank": 99}, {"start": ["dropped"]}, {"r": 3}]
+)
+def test_wrong_kinds_and_points_are_refused(results, wrong):
+    with pytest.raises(InputError):
+        vm.plot(results["figures-2-4"], **wrong)
 
 
 def test_errors_need_a_method_and_outputs(results):

@@ -10,7 +10,7 @@ import pytest
 from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.registry import component
-from vehiclemor.report.default_studies import legend, nominal, unseen
+from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures import theme
 from vehiclemor.report.frames import study_tables
 from vehiclemor.report.shown import tabled_outputs, timing_cases
@@ -92,5 +92,4 @@ def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
     for output in tabled_outputs(component("model", CAR)):
         errors = table[f"rms_{output}"]
         assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])
-    assert "mine" in legend(CAR)
     assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).with_name(f"{CAR}.toml").read_text()

@@ -93,12 +93,6 @@ def _has(model: Model, method: str, preset: str) -> bool:
     return True
 
 
-def legend(name: str) -> dict[str, str]:
-    """Label of each reduced model in the studies by default -> its text in a legend."""
-    labels = [label for label in methods(build(name)) if not label.startswith("full_order")]
-    return {label: label.replace("pod", "POD").replace("_", " ") for label in labels}
-
-
 def bounds(model: Model) -> dict[str, float]:
     """Largest RMS errors that count as good: published, or a share of the range."""
     published = rms_numbers(model.name)

@@ -10,7 +10,6 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import errors, paper, pareto, result_plot, runs, schematics
 from vehiclemor.report.figures.theme import Results
-from vehiclemor.report.shown import main_outputs
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
@@ -31,23 +30,12 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "pareto": pareto.figure_pareto,
     "result": result_plot.figure_result,
 }
-MOST_OUTPUTS = 4
-# Kind of the figures that every model has -> drawing, study, caption, its rows of panels.
-OF_A_MODEL: Mapping[str, tuple[str, Callable[[str, Path], str], str, dict[str, object]]] = {
-    "histories": (
-        "histories",
-        default_studies.nominal,
-        "nominal run, as trained",
-        {"rows": ["history"]},
-    ),
-    "errors": (
-        "histories",
-        default_studies.nominal,
-        "errors of the nominal run",
-        {"rows": ["largest error"]},
-    ),
-    "map": ("errors", default_studies.perturbed, "errors at perturbed, untrained inputs", {}),
-    "pareto": ("pareto", default_studies.unseen, "error on unseen inputs over time", {}),
+# Figures that every model has, of all registered methods: study, what is drawn of it.
+OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
+    "histories": (default_studies.nominal, "histories"),
+    "errors": (default_studies.nominal, "errors"),
+    "map": (default_studies.perturbed, "errors"),
+    "pareto": (default_studies.unseen, "pareto"),
 }
 
 
@@ -120,7 +108,9 @@ def find(name: str, results: Path) -> list[Entry]:
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
         raise unknown("figure", name, [*FIGURES, *known, *data_names("studies"), "FILE.toml"])
-    return [_of_a_model(kind, model, results)]
+    study, drawn = OF_A_MODEL[kind]
+    (entry,) = (e for e in find(study(model, results), results) if e.name.endswith(f"-{drawn}"))
+    return [entry.model_copy(update={"name": name})]
 
 
 def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
@@ -149,20 +139,3 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
         )
         for figure, (drawing, words, options) in found.items()
     ]
-
-
-def _of_a_model(kind: str, model: str, results: Path) -> Entry:
-    """One of the figures that every model has, of all registered methods."""
-    drawing, study, caption, rows = OF_A_MODEL[kind]
-    methods = default_studies.legend(model)
-    if kind == "map":
-        methods.pop("pod_literal", None)
-    outputs = list(main_outputs(component("model", model)))[:MOST_OUTPUTS]
-    options: dict[str, object] = {"outputs": outputs, "methods": methods} | rows
-    return Entry(
-        name=f"{kind}-{model}",
-        draw=drawing,
-        studies=[study(model, results)],
-        caption=f"{model}: {caption}",
-        options={} if drawing == "pareto" else options,
-    )

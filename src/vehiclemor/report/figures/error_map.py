@@ -15,9 +15,8 @@ from vehiclemor.report.labels import error_label, readable_unit, unit_of
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.study.plans.study_file import FACTORS
 
-# Columns of maps, cells of a map with their number, points of a contour in a cell, and cells that
-# it must enclose.
-COLUMNS, WRITTEN, FINE, ENCLOSED = 3, 100, 8, 4
+# Columns of maps, cells of a map with their number, and cells that a contour must enclose.
+COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
 
 
 def figure_map(
@@ -39,8 +38,9 @@ def figure_map(
     figure, grid = panels(each * len(outputs), columns, size, sharex=True, sharey=True)
     across, up = (places_of(dataset, name).even() for name in axes)
     written = across.at.size * up.at.size <= WRITTEN
-    nominal = np.isclose(up.at, 0.0)[:, None] & np.isclose(across.at, 0.0)
-    nominal &= written and tuple(axes) == FACTORS
+    # Factors, though not their places, are 1 there.
+    one, other = (np.isclose(dataset[name], 1.0) for name in axes)
+    nominal = other[:, None] & one & (written and tuple(axes) == FACTORS)
     spare: list[Axes] = []
     for row, output in enumerate(outputs):
         block = grid[row * each : (row + 1) * each]
@@ -57,9 +57,10 @@ def figure_map(
         for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
             values = factor * found[number]
             _draw_cells(axis, (across.at, up.at), values, LogNorm(*limits), written=written)
-            if published and not written and np.isfinite(values).all():
-                outlined = np.maximum(values, limits[0])
-                _outline(axis, (across.at, up.at), outlined, published.value)
+            if published and not written and np.sum(values < published.value) >= ENCLOSED:
+                logarithms = np.log(np.maximum(values, limits[0]))
+                level: Style = {"levels": [np.log(published.value)], "linestyles": "solid"}
+                axis.contour(across.at, up.at, logarithms, colors="white", linewidths=1.2, **level)
             axis.set_title(letter(row * len(methods) + number, text))
         bar = figure.colorbar(
             block[0, 0].collections[0],
@@ -117,18 +118,3 @@ def two_digits(value: float) -> str:
     rounded = float(f"{value:.1e}")
     decimals = (1 if rounded >= 0.01 else 0) - int(np.floor(np.log10(abs(rounded))))
     return f"{value:.{max(0, decimals)}f}"
-
-
-def _outline(
-    axis: Axes, places: tuple[np.ndarray, np.ndarray], values: np.ndarray, bound: float
-) -> None:
-    """Where the error has a value: its logarithm is interpolated between the cells."""
-    from scipy.interpolate import RectBivariateSpline
-
-    if np.sum(values < bound) < ENCLOSED:
-        return
-    across, up = (np.linspace(a[0], a[-1], FINE * len(a)) for a in places)
-    ky, kx = (min(2, n - 1) for n in values.shape)
-    spline = RectBivariateSpline(places[1], places[0], np.log(values), kx=ky, ky=kx)
-    lines: Style = {"colors": "white", "linewidths": 1.2, "linestyles": "solid"}
-    axis.contour(across, up, spline(up, across), levels=[np.log(bound)], **lines)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vehiclemor.report.figures.error_map import two_digits
-from vehiclemor.report.figures.errors import draw_band, draw_errors, scale_errors
+from vehiclemor.report.figures.errors import draw_band, figure_errors
 from vehiclemor.report.figures.runs import END, Runs, draw_history, draw_paths, runs_of
 from vehiclemor.report.figures.theme import (
     THIN,
@@ -19,7 +19,7 @@ from vehiclemor.report.figures.theme import (
     panels,
     styles,
 )
-from vehiclemor.report.labels import error_label, readable_unit
+from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.spectrum import spectrum
 
@@ -133,33 +133,18 @@ def figure_spread(results: Results) -> Figure:
 def figure_equation_order(results: Results) -> Figure:
     """Sorted errors of all variants of the same equations; what has diverged above the axes."""
     dataset, nominal = results["equation-order"], results["figures-6-7"]
-    numbers = rms_numbers(str(dataset.attrs["model"]))
-    figure, axes = panels(1, 2, (6.7, 3.6))
-    for number, (axis, output) in enumerate(zip(axes.flat, ("spindle_y", ANGLE), strict=True)):
-        for shift, (label, text) in enumerate(VARIANTS.items()):
+    numbers, outputs = rms_numbers(str(dataset.attrs["model"])), ("spindle_y", ANGLE)
+    figure = figure_errors({"": dataset}, outputs=outputs, methods=VARIANTS)
+    circle: Style = {"marker": "o", "markersize": 10, "markerfacecolor": "none", "color": "black"}
+    for axis, output in zip(figure.axes, outputs, strict=True):
+        for label in VARIANTS:
             values = dataset["rms_error"].sel(label=label, output=output).squeeze(drop=True).values
-            order = np.argsort(values)
-            # Crosses of both stand beside each other.
-            places = np.arange(1.0, len(values) + 1) + np.where(
-                np.isfinite(values[order]), 0, 0.4 * shift
-            )
-            color = ("#D55E00", "#0072B2")[shift]
-            look: Style = {"color": color, "marker": "o^"[shift], "markersize": 5}
-            look |= {"linestyle": "none", "markerfacecolor": (color, "none")[shift]}
-            draw_errors(axis, places, values[order], look, text)
-            natural = {"marker": "o", "markersize": 10, "markerfacecolor": "none"}
-            at = places[order == 0], values[:1]
-            axis.plot(*at, "k", linestyle="none", label="natural order", **natural)
+            place = np.sum(values < values[0]), values[0]
+            axis.plot(*place, linestyle="none", label="natural order", **circle)
         least = nominal["rms_error"].sel(label="pod", rank=3, output=output).item()
         axis.axhline(least, color="#009E73", linestyle="--", label="least squares")
         axis.axhline(numbers[output].value, label="published", **THIN)
-        scale_errors(axis)
-        axis.set_ylim(1e-7, 0.1)
-        axis.set_xticks([1, 5, 10, 15, 20, 25])
-        axis.set_ylabel(error_label(dataset, "RMS error", output))
-        axis.set_xlabel("variant, sorted by error")
-        axis.set_title(letter(number), pad=9)
-    legend_below(figure, axes.flat)
+    legend_below(figure, figure.axes)
     return figure
 
 

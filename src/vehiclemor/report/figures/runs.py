@@ -9,27 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vehiclemor.errors import InputError
+from vehiclemor.report import labels
 from vehiclemor.report.criteria.finding import at_point
+from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.scales import hide_rounding, tick_decades
-from vehiclemor.report.figures.theme import (
-    CROSS,
-    FULL,
-    Results,
-    Style,
-    legend_below,
-    letter,
-    panels,
-    styles,
-)
-from vehiclemor.report.labels import (
-    axis_label,
-    error_label,
-    label_of,
-    marked,
-    method_text,
-    readable_unit,
-    unit_of,
-)
+from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 
@@ -89,14 +73,14 @@ def legend_of(dataset: xr.Dataset, methods: Mapping[str, str] | None = None) -> 
     if methods is None:
         alone = "reference_outputs" not in dataset and "rms_error" not in dataset
         reduced = [label for label in known if alone or not label.startswith("full_order")]
-        methods = {label: method_text(label) for label in reduced}
+        methods = {label: labels.method_text(label) for label in reduced}
     texts: dict[str, str] = {}
     for label in [label for label in methods if label in known]:
         run = at_point(dataset, label)
         ends = run["status"].to_series() if run["status"].ndim else {"": run["status"].item()}
         bad = {at: end for at, end in ends.items() if end != "ok"}
         failed = "; ".join(f"{end}, {at} start" if at else end for at, end in bad.items())
-        texts[label] = marked(methods[label], run) + (f" ({failed})" if failed else "")
+        texts[label] = labels.marked(methods[label], run) + (f" ({failed})" if failed else "")
     return texts
 
 
@@ -111,7 +95,7 @@ def runs_of(dataset: xr.Dataset, texts: Mapping[str, str]) -> Runs:
     if several:
         raise InputError(f"choose a point of the grid first: {', '.join(several)}")
     with_full = (p for p in points.values() if bool(p["reference_outputs"].notnull().any()))
-    looks = styles(texts)
+    looks = theme.styles(texts)
     curves = [Curve(label, text, looks[label], points[label]) for label, text in texts.items()]
     return Runs(next(with_full, next(iter(points.values()))), curves)
 
@@ -160,7 +144,7 @@ def figure_histories(
     heights *= -(-len(outputs) // block)
     size = (6.7 if columns < MOST_BESIDE else 9.5, sum(heights) + 1.2)
     ratios = {"height_ratios": heights}
-    figure, axes = panels(len(heights), columns, size, sharex=True, gridspec_kw=ratios)
+    figure, axes = theme.panels(len(heights), columns, size, sharex=True, gridspec_kw=ratios)
     ended: dict[str, str] = {}
     for number, axis in enumerate(axes.flat):
         row, column = divmod(number, columns)
@@ -168,7 +152,7 @@ def figure_histories(
         output = outputs[row * block + column * beside]
         found = runs[0 if beside else column]
         start = f"{starts[column]} start" if len(starts) > 1 else ""
-        axis.set_title(letter(number, start))
+        axis.set_title(theme.letter(number, start))
         if rows[content] == "history":
             scale = _scale(dataset, output)
             ended |= draw_history(axis, found, output, scale)
@@ -183,7 +167,7 @@ def figure_histories(
         axis.set_xlim(float(time[0]), shown or float(time[-1]))
     for text, color in ended.items():
         axes[0, 0].plot([], [], color=color, label=text, **CROSS)
-    legend_below(figure, axes.flat)
+    theme.legend_below(figure, axes.flat)
     return figure
 
 
@@ -201,10 +185,10 @@ def draw_history(axis: Axes, runs: Runs, output: str, scale: float) -> dict[str,
 
     Lines end where they leave the surroundings of the full-order signal.
     """
-    factor, unit = readable_unit(scale, unit_of(runs.full, output))
+    factor, unit = labels.readable_unit(scale, labels.unit_of(runs.full, output))
     full = factor * runs.full["reference_outputs"].sel(output=output)
     histories = [factor * curve.run["outputs"].sel(output=output) for curve in runs.curves]
-    axis.set_ylabel(axis_label(runs.full, output, unit))
+    axis.set_ylabel(labels.axis_label(runs.full, output, unit))
     if bool(full.notnull().any()):
         axis.plot(full["time"], full, label="full order", **FULL)
     limits = _surroundings(full, histories, factor * scale)
@@ -265,7 +249,7 @@ def _draw_errors(axis: Axes, runs: Runs, output: str, content: str) -> dict[str,
         draw_errors(axis, runs, output)
         rms = runs.curves[0].run["rms_error"].sel(output=output).item()
         if len(runs.curves) == 1 and np.isfinite(rms):
-            words = f" RMS error {rms:.2g} {unit_of(runs.full, output)}"
+            words = f" RMS error {rms:.2g} {labels.unit_of(runs.full, output)}"
             axis.set_title(axis.get_title(loc="left") + words)
         return {}
     against = next(c.run["outputs"] for c in runs.curves if c.label == "replay")
@@ -287,7 +271,7 @@ def draw_errors(axis: Axes, runs: Runs, output: str, kind: str = "") -> None:
     """Errors over the time, and the RMS error of the best approximation by the first method."""
     found = [_error(curve, output) for curve in runs.curves]
     largest = np.fmax.reduce([float(abs(error).max()) for error in found])
-    factor, unit = readable_unit(float(largest), unit_of(runs.full, output))
+    factor, unit = labels.readable_unit(float(largest), labels.unit_of(runs.full, output))
     for curve, error in zip(runs.curves, found, strict=True):
         axis.plot(error["time"], factor * error, label=curve.text, **curve.style)
     held = [c.run["floor_rms_error"] for c in runs.curves if "floor_rms_error" in c.run]
@@ -296,7 +280,9 @@ def draw_errors(axis: Axes, runs: Runs, output: str, kind: str = "") -> None:
     if best is not None:
         shade = {"color": "#BBBBBB", "alpha": 0.5, "label": "RMS of the best approximation"}
         axis.axhspan(-best, best, **shade)
-    axis.set_ylabel(f"{kind} ({unit})" if kind else error_label(runs.full, "error", output, unit))
+    axis.set_ylabel(
+        f"{kind} ({unit})" if kind else labels.error_label(runs.full, "error", output, unit)
+    )
 
 
 def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
@@ -305,6 +291,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
     last = float(runs.full["time"][-1])
     period = (published.control_period if published else None) or last / 50.0
     ended: dict[str, str] = {}
+    marked: list[float] = []
     for number, curve in enumerate(runs.curves):
         edges, largest = _largest(abs(_error(curve, output)), period)
         largest[largest == 0.0] = np.nan
@@ -313,6 +300,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
         if status in FINISHED:
             rms = curve.run["rms_error"].sel(output=output).item()
             at = 1.0 + min(0.03, 0.12 / len(runs.curves)) * number, rms or np.nan
+            marked += [rms] if rms else []
             edge = axis.get_yaxis_transform()
             axis.plot(*at, color=color, transform=edge, clip_on=False, **RMS_MARK)
         elif status == "diverged" and np.isfinite(largest).any():
@@ -320,14 +308,15 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
             ended[DIVERGED] = color
             axis.plot(edges[end + 1], largest[end], color=color, **CROSS)
     axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
-    hide_rounding(axis)
     if published:
         line: Style = {"color": "black", "linestyle": ":", "label": "published RMS error"}
         axis.axhline(published.value, **line)
+    hide_rounding(axis)
+    axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
     tick_decades(axis.yaxis, *axis.get_ylim(), subs=(1.0, 3.0))
-    words = f"largest error of {label_of(output).symbol}"
+    words = f"largest error of {labels.label_of(output).symbol}"
     words = words if len(words) <= LINE else words.replace(" of ", "\nof ", 1)
-    axis.set_ylabel(f"{words}\nin each {period:.2g} s ({unit_of(runs.full, output)})")
+    axis.set_ylabel(f"{words}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
     return ended
 
 
@@ -365,17 +354,18 @@ def figure_paths(
     shown: list[tuple[str, float | None]] = list((parts or {"": None}).items())
     if runs.compared:
         shown.append((DISTANCE, shown[0][1]))
-    figure, axes = panels(len(shown), 1, (6.7, 1.4 + 1.5 * len(shown)))
+    figure, axes = theme.panels(len(shown), 1, (6.7, 1.4 + 1.5 * len(shown)), sharex=not parts)
     for number, (axis, (title, length)) in enumerate(zip(axes.flat, shown, strict=True)):
-        axis.set_title(letter(number, title))
+        axis.set_title(theme.letter(number, title))
         if title == DISTANCE:
             _draw_distances(axis, runs.curves)
         else:
             draw_paths(axis, runs)
             axis.set_ylabel("Y (m)")
-        axis.set_xlim(0.0, length)
+        if length:
+            axis.set_xlim(0.0, length)
     axes[-1, 0].set_xlabel("X (m), not to the scale of Y")
-    legend_below(figure, [axes[0, 0]])
+    theme.legend_below(figure, [axes[0, 0]])
     return figure
 
 

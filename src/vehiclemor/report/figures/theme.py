@@ -82,8 +82,10 @@ def letter(number: int, title: str = "") -> str:
 
 
 def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
-    """One legend below all panels, of the lines in some of them, in all columns with room."""
+    """The one legend, below all panels, of the lines in some of them, in all columns with room."""
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
+    for legend in list(figure.legends):
+        legend.remove()
     if not shown:
         return
     lengths = [len(text.replace("$", "")) for text in shown]
