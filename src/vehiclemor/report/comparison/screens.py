@@ -304,7 +304,8 @@ def _protocol(rows: list[Row], explain: bool) -> list[str]:
         for row in targets:
             mark = "*" if row["threshold_source"] == OWN else ""
             bound = shown(float(row["bound"]), ".3g") + mark
-            lines.append(row | {"bound": bound, "verdict": VERDICTS[row["verdict"]]})
+            item = row["item"].replace("silent", "undetected")
+            lines.append(row | {"item": item, "bound": bound, "verdict": VERDICTS[row["verdict"]]})
         columns = {"item": Column(f"target for {targets[0]['label']}"), "bound": Column("bound")}
         columns |= {key: column(key) for key in ("measured", "verdict", "reason")}
         parts[0] += "\n" + table(lines, columns) + ("\n*: bound of our own" if explain else "")
