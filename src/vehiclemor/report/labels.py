@@ -1,8 +1,11 @@
 """Words, symbols and short headings of outputs, for figures and printed tables."""
 
-from typing import NamedTuple
+from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Label(NamedTuple):
@@ -67,7 +70,7 @@ def method_text(label: str) -> str:
 
 def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
     """Which runs were in their own training; of a result that does not tell, none."""
-    return dataset.get("in_training", xr.zeros_like(dataset["status"], dtype=bool))
+    return dataset.get("in_training", dataset["status"].isnull() & False)
 
 
 def marked(text: str, run: xr.Dataset) -> str:

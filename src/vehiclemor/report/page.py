@@ -42,14 +42,9 @@ PICTURES = {
 }
 COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
 # Columns of tables, as `compare --json` names them.
-VERDICT = "item verdict variant start published bound reproduced unit measure reason"
+VERDICT = "item verdict variant start published bound reproduced signal_rms unit measure reason"
 TARGET = "item bound measured unit verdict reason threshold_source"
 CONTESTANT = "label role winner misses silent flagged score seconds ratio_equal offline_seconds"
-NOTE = (
-    "misses: runs outside of a bound; silent: of these with the status ok; flagged: runs of which "
-    "the model says that it has left what it knows; score: largest error over its bound; "
-    "ratio_equal: times faster than full order at equal error. Fewest silent misses first"
-)
 
 
 class Section(NamedTuple):
@@ -175,7 +170,9 @@ def _protocol(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Secti
         "Verdicts on what was chosen": targets.reindex(columns=TARGET.split()).replace(
             {"verdict": VERDICTS}
         ),
-        f"Contestants on the judged runs. {NOTE}": methods[[*CONTESTANT.split(), *errors]],
+        "Contestants on the judged runs, fewest undetected misses first": methods[
+            [*CONTESTANT.split(), *errors]
+        ],
     }
     made = partial(
         _svg, "Worst error over bound, over time", partial(figure_pareto, {name: dataset})

@@ -163,7 +163,7 @@ def table(
     to
         `terminal`: headings and formats of `COLUMNS`, within the width of the terminal, meanings
         below.  `csv`: names and all digits.  `markdown`, `latex` (needs booktabs): names and four
-        digits.  `html`: headings, three digits, all digits in the attribute `value`.
+        digits.  `html`: names, three digits, all digits in the attribute `value`, meanings below.
     group
         Column whose values stand in lines of their own above their rows.
     note
@@ -185,7 +185,9 @@ def table(
     if to == "html":
         cells = frame.rename(columns=lambda name: str(name).replace("_", " ")).map(_html_cell)
         cells.columns = [escape(name) for name in cells.columns]
-        return cells.to_html(index=False, escape=False, border=0)
+        own = {name.replace("_", " "): column(name).meaning for name in map(str, frame.columns)}
+        meanings = "; ".join(f"{name}: {text}" for name, text in own.items() if text and explain)
+        return cells.to_html(index=False, escape=False, border=0) + f"<p>{escape(meanings)}</p>"
     cells = frame.map(_four_digits)
     if to == "latex":
         return cells.to_latex(index=False, escape=True)

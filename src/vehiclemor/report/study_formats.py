@@ -11,7 +11,6 @@ from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_folder, write_text, write_whole
 from vehiclemor.registry import choice
-from vehiclemor.report.frames import column_meanings, frame
 from vehiclemor.report.result_selection import stored_result
 
 if TYPE_CHECKING:
@@ -49,6 +48,8 @@ def convert(
     VehiclemorError
         If there is no such result, a package is missing, or something is there already.
     """
+    from vehiclemor.report.frames import column_meanings, frame
+
     choice("format", to, FORMATS)
     engine = ENGINES.get(to)
     if engine and not find_spec(engine):

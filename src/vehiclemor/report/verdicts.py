@@ -7,7 +7,7 @@ VERDICTS = {
     MET: "met",
     MISSED: "missed",
     NOT_COMPARABLE: "not comparable",
-    OURS: "ours (from the dropped start)",
+    OURS: "not judged (start added by us)",
 }
 # The only start that what is published is judged by; the paper says nothing of another.
 PUBLISHED_START = "equilibrium"

@@ -19,4 +19,4 @@ def test_rounds_that_scatter_are_named_with_the_limit():
 
 def test_verdicts_are_counted_in_words():
     text = counted(["met", "missed", "met", "ours", "not_comparable"])
-    assert text.startswith("2 met, 1 missed, 1 not comparable, 1 ours")
+    assert text.startswith("2 met, 1 missed, 1 not comparable, 1 not judged")

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from vehiclemor.report.comparison.rows import ALL_MODELS, PARAMETERS
 from vehiclemor.report.costs import costs_text
 from vehiclemor.report.criteria.finding import IN_WORDS, INDISTINGUISHABLE, OWN, VISIBLE
 from vehiclemor.report.frames import ERRORS
-from vehiclemor.report.labels import label_of
 from vehiclemor.report.predictive.targets import chosen
 from vehiclemor.report.printing import ERROR, Column, column, shown, table, wrapped
 from vehiclemor.report.shown import main_outputs
@@ -85,25 +84,19 @@ def _paper(rows: list[Row]) -> list[str]:
     ]
 
 
-def _printed(rows: list[Row], value: Any) -> list[Row]:
+def _printed(rows: list[Row], text: Callable[[Row], str]) -> list[Row]:
     """A line of each printed number, by the published start: default and literal settings."""
     lines = []
     for own in _by([row for row in rows if row["start"] == PUBLISHED_START], "id").values():
-        found = {row["variant"]: row for row in own}
-        line = own[0] | {name: value(found.get(name)) for name in (DEFAULT, LITERAL)}
+        found = {row["variant"]: f"{text(row)} {VERDICTS[row['verdict']]}" for row in own}
+        line = own[0] | {name: found.get(name) for name in (DEFAULT, LITERAL)}
         item = own[0]["item"].removeprefix("RMS error of the ").partition(" (figure")[0]
         lines.append(line | {"item": item, "of": own[0]["model"].replace("_", " ")})
     return lines
 
 
-def _verdict(row: Row | None, text: str) -> str:
-    return "" if row is None else f"{text} {VERDICTS[row['verdict']]}"
-
-
 def _errors(rows: list[Row]) -> str:
-    lines = _printed(
-        rows, lambda row: _verdict(row, shown(row["reproduced"], ERROR) if row else "")
-    )
+    lines = _printed(rows, lambda row: shown(row["reproduced"], ERROR))
     columns = {
         "item": Column("RMS error, trained run"),
         "published": Column("paper", ERROR),
@@ -113,14 +106,14 @@ def _errors(rows: list[Row]) -> str:
         "unit": Column("unit"),
     }
     empty = [f"{r['item']} ({r['of']})" for r in lines if r["signal_rms"] <= r["published"]]
-    note = f"signal: {columns['signal_rms'].meaning}"
+    note = f"signal: {columns['signal_rms'].meaning}; literal: settings by the paper's words"
     note += f".  Empty bounds, which zero would meet: {', '.join(empty)}" if empty else ""
     return f"{table(lines, columns, group='of', explain=False)}\n{wrapped(f'({note}.)', 0, 1)}"
 
 
 def _times(rows: list[Row]) -> str:
     """Times over that of the full model, instead of the share that is saved."""
-    lines = _printed(rows, lambda r: _verdict(r, f"{1.0 - r['reproduced']:.2f}" if r else ""))
+    lines = _printed(rows, lambda row: f"{1.0 - row['reproduced']:.2f}")
     for line in lines:
         line["paper"] = 1.0 - line["published"]
         states = line["item"].removeprefix("simulation time saved").removeprefix(" with ")
@@ -133,8 +126,7 @@ def _times(rows: list[Row]) -> str:
         "strongest": Column(
             "best solver",
             ".2f",
-            "time of POD over that of the fastest full-order solver, the others over the same "
-            "solver; met only where the errors are met",
+            "time of POD over that of the fastest full-order solver; met: if the errors are, too",
         ),
     }
     return table(lines, columns)
@@ -160,12 +152,12 @@ def _missed(rows: list[Row]) -> str:
         listed = missed if len(missed) <= FEW else missed[:1]
         values = [f"{shown(r['reproduced'], '.3g')} ({r['variant']})" for r in listed]
         more = [f"{len(missed)} of {len(own)} missed"] * (len(missed) > FEW)
-        # Where the claim's words leave no threshold of ours, the number alone is not why.
-        why = [row["reason"].split("; ")[0]] * (row["threshold_source"] == IN_WORDS and not more)
-        measure = row["measure"].split("; ")[0]
         bound = f"bound {shown(row['bound'], '.3g')}"
-        found = "; ".join([", ".join(values), bound, *more])
-        parts.append(wrapped(f"- {row['item']}: {'; '.join([measure, *why])}: {found}", 0, 2))
+        found = f"{row['measure'].split('; ')[0]}: {'; '.join([', '.join(values), bound, *more])}"
+        if row["threshold_source"] == IN_WORDS and not more:
+            # No threshold of ours: what was seen says why.
+            found = row["reason"].split("; ")[0]
+        parts.append(wrapped(f"- {row['item']}: {found}", 0, 2))
     return "\n".join(parts)
 
 
@@ -222,24 +214,17 @@ def _model(name: str, rows: list[Row], folder: Path) -> list[str]:
     """Errors of every method in nominal and perturbed runs, costs, modes, unseen inputs."""
     outputs = main_outputs(component("model", name))
     kinds = _by(rows, "kind")
-    columns = {key: column(key) for key in ("label", "effective_rank")}
-    for output in outputs:
-        for kind in ("nominal", "perturbed"):
-            own = column(kind)
-            meaning = own.meaning if output == outputs[-1] else ""
-            heading = f"{label_of(output).short} {own.heading}"
-            columns[f"{kind}_{output}"] = own._replace(heading=heading, meaning=meaning)
     lines, reasons = [], []
-    for row in kinds["nominal"]:
-        place = (row["label"], row["start"])
-        same = [r for r in kinds["perturbed"] if (r["label"], r["start"]) == place]
-        line = {"from": f"start {row['start']}", **row}
-        for output in outputs:
-            line[f"nominal_{output}"] = row[f"rms_{output}"]
-            line[f"perturbed_{output}"] = _largest(same, f"rms_{output}")
-        lines.append(line)
-        reasons += [f"{row['label']}: {row['message']}"] if row["status"] != "ok" else []
-    head = [f"{name}: RMS errors, SI units", table(lines, columns, group="from")]
+    for output in outputs:
+        for row in kinds["nominal"]:
+            place = (row["label"], row["start"])
+            same = [r for r in kinds["perturbed"] if (r["label"], r["start"]) == place]
+            errors = {"nominal": row[f"rms_{output}"], "perturbed": _largest(same, f"rms_{output}")}
+            words = f"start {row['start']}: {output.replace('_', ' ')}"
+            lines.append({"of": words, **row, **errors})
+            reasons += [f"{row['label']}: {row['message']}"] if row["status"] != "ok" else []
+    columns = ("label", "effective_rank", "nominal", "perturbed")
+    head = [f"{name}: RMS errors, SI units", table(lines, columns, group="of")]
     head += [wrapped(reason, 0, 2) for reason in dict.fromkeys(reasons)]
     parts = ["\n".join(head), costs_text(name, folder)]
     if modes := kinds.get("spectrum"):
@@ -319,7 +304,8 @@ def _protocol(rows: list[Row], explain: bool) -> list[str]:
         for row in targets:
             mark = "*" if row["threshold_source"] == OWN else ""
             bound = shown(float(row["bound"]), ".3g") + mark
-            lines.append(row | {"bound": bound, "verdict": VERDICTS[row["verdict"]]})
+            item = row["item"].replace("silent", "undetected")
+            lines.append(row | {"item": item, "bound": bound, "verdict": VERDICTS[row["verdict"]]})
         columns = {"item": Column(f"target for {targets[0]['label']}"), "bound": Column("bound")}
         columns |= {key: column(key) for key in ("measured", "verdict", "reason")}
         parts[0] += "\n" + table(lines, columns) + ("\n*: bound of our own" if explain else "")

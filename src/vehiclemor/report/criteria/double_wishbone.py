@@ -19,6 +19,7 @@ from vehiclemor.report.criteria.finding import (
     Criterion,
     Finding,
     Results,
+    agree,
     at_point,
     deviation_history,
     largest_deviation,
@@ -34,15 +35,6 @@ SIMILAR_SUBSPACES = 0.1
 END = 0.8
 BOTH = DISPLACEMENT, ANGLE = "spindle_y", "second_euler_angle"
 DEVIATION = "largest deviation of the angle, as a share of its range"
-
-
-def _agree(study: str, outputs: tuple[str, ...], bound: float) -> Criterion:
-    """Criterion that outputs deviate by less than a share of their ranges, r = 3."""
-
-    def judge(results: Results, label: str) -> Finding:
-        return not_visible(at_point(results[study], label, rank=3), outputs, bound)
-
-    return Criterion(judge, (study,))
 
 
 def angle_diverges_at_end(results: Results, label: str) -> Finding:
@@ -210,13 +202,13 @@ OF_SUBSPACES = {"pod": "default, literal"}
 UNCUT = {"pod_uncut": "default, no rank cut", "pod_literal": "literal"}
 FIGURE_13 = ("figure-13-frequency", "figure-13-amplitude")
 CRITERIA = {
-    "dw_fig6_nearly_identical": _agree("figures-6-7", BOTH, INDISTINGUISHABLE),
-    "dw_fig11_displacement_unaffected": _agree("figure-11", (DISPLACEMENT,), VISIBLE),
+    "dw_fig6_nearly_identical": agree("figures-6-7", BOTH, INDISTINGUISHABLE),
+    "dw_fig11_displacement_unaffected": agree("figure-11", (DISPLACEMENT,), VISIBLE),
     "dw_fig11_angle_diverges_at_end": Criterion(angle_diverges_at_end, ("figure-11",)),
     "dw_fig11_shorter_period_reduces_deviation": Criterion(
         shorter_period_reduces_deviation, ("figure-11-control-period",)
     ),
-    "dw_fig12_no_divergence": _agree("figure-12", BOTH, VISIBLE),
+    "dw_fig12_no_divergence": agree("figure-12", BOTH, VISIBLE),
     "dw_fig12_basis_insensitive_to_amplitude": Criterion(
         basis_insensitive_to_amplitude, variants=OF_SUBSPACES, of_replay=False
     ),

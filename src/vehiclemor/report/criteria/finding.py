@@ -128,3 +128,12 @@ def worst_of(values: Mapping[str, float]) -> tuple[float, str]:
         return float("nan"), missing[0]
     name = max(values, key=lambda key: values[key])
     return values[name], name
+
+
+def agree(study: str, outputs: tuple[str, ...], bound: float = VISIBLE, rank: int = 3) -> Criterion:
+    """Criterion that no output deviates by more than a share of its range in a study."""
+
+    def judge(results: Results, label: str) -> Finding:
+        return not_visible(at_point(results[study], label, rank=rank), outputs, bound)
+
+    return Criterion(judge, (study,))

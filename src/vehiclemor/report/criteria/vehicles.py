@@ -11,6 +11,7 @@ from vehiclemor.report.criteria.finding import (
     Criterion,
     Finding,
     Results,
+    agree,
     at_point,
     largest_deviation,
     not_visible,
@@ -31,11 +32,6 @@ NOMINAL = {
     "figures-6-7": (3, BOTH),
     "figures-9-10": (1, HIGH_FIDELITY_OUTPUTS),
 }
-
-
-def follows_closely(results: Results, label: str) -> Finding:
-    """Figures 2 and 3: trajectory, pitch and yaw can hardly be told from the full model's."""
-    return not_visible(at_point(results["figures-2-4"], label, rank=3), OUTPUTS)
 
 
 def three_states_suffice(results: Results, label: str) -> Finding:
@@ -75,11 +71,6 @@ def longer_periods_save_time(
     return Finding(saved, bound, finished and saved < bound, text, seen)
 
 
-def one_state_suffices(results: Results, label: str) -> Finding:
-    """Figures 9 and 10: with one state path, lateral and vertical speed agree excellently."""
-    return not_visible(at_point(results["figures-9-10"], label, rank=1), HIGH_FIDELITY_OUTPUTS)
-
-
 def may_deviate(results: Results, label: str) -> Finding:
     """Section 4: in some situations the reduced model leaves the full one."""
     largest = largest_deviation(at_point(results["figure-14"], label, rank=3), ANGLE)
@@ -113,13 +104,13 @@ def precisely_followed(results: Results, label: str) -> Finding:
 
 PERIODS, FIRST = ("vehicle-control-period",), ("figures-2-4",)
 CRITERIA = {
-    "gv_fig3_closely_matches": Criterion(follows_closely, FIRST),
+    "gv_fig3_closely_matches": agree("figures-2-4", OUTPUTS),
     "gv_three_states_suffice": Criterion(three_states_suffice, FIRST, of_replay=False),
     "gv_control_periods_sharpen_basis": Criterion(
         shorter_periods_sharpen_basis, PERIODS, of_replay=False
     ),
     "gv_longer_period_saves_time": Criterion(longer_periods_save_time, PERIODS, of_replay=False),
-    "hfv_fig10_one_state_excellent": Criterion(one_state_suffices, ("figures-9-10",)),
+    "hfv_fig10_one_state_excellent": agree("figures-9-10", HIGH_FIDELITY_OUTPUTS, rank=1),
     "all_may_deviate": Criterion(may_deviate, ("figure-14",)),
     "all_three_equation_kinds": Criterion(all_kinds_reduced, tuple(NOMINAL), of_replay=False),
     "all_follow_precisely": Criterion(precisely_followed, tuple(NOMINAL)),

@@ -131,12 +131,11 @@ def _spread(part: xr.Dataset) -> float:
 
 def _failure(part: xr.Dataset) -> str:
     """The first failure of a row, empty if there is none."""
-    for scenario, status, message in zip(
-        part["scenario"].values, part["status"].values, part["message"].values, strict=True
-    ):
-        if status not in FINISHED:
-            return f"{status} in ({scenario}): {message}"
-    return ""
+    failed = ~np.isin(part["status"].values, FINISHED)
+    if not failed.any():
+        return ""
+    run = part.isel(scenario=int(failed.argmax()))
+    return f"{run['status'].item()} in ({run['scenario'].item()}): {run['message'].item()}"
 
 
 def _errors(part: xr.Dataset, protocol: StudyFile) -> Row:
