@@ -38,7 +38,7 @@ def run(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_with_a_hint(run, monkeypatch, capsys, number):
-    monkeypatch.setattr(study_run, "load_studies", lambda _: os.kill(os.getpid(), number) or {})
+    monkeypatch.setattr(study_run, "studies_and_files", lambda _: os.kill(os.getpid(), number) or {})
     before = signal.getsignal(number)
     assert run() == 128 + number
     (line,) = capsys.readouterr().err.splitlines()

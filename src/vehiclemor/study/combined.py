@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,16 +52,9 @@ def stored(
     content
         Hash of what a study file says: a file that was renamed is still the same study.
     """
-    dataset = None
-    for place in (path, *sorted(path.parent.glob("[!.]*.nc"))):
-        if global_attributes(place).get(attribute) == key and all(p.exists() for p in sources()):
-            dataset = read_dataset(place, "source", "vehiclemor")
-            dataset.encoding["source"] = str(place)
-            if "status" in dataset and "error" in dataset["status"].values:
-                dataset = None
-            elif place == path or not content:
-                return dataset
-            break
+    dataset = next(_current(path, attribute, key, sources), None)
+    if dataset is not None and (not content or dataset.encoding["source"] == str(path)):
+        return dataset
     make_folder(path.parent)
     held = global_attributes(path)
     if path.exists() and held.get("source") != "vehiclemor":
@@ -75,3 +68,16 @@ def stored(
     write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
+
+
+def _current(
+    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
+) -> Iterator[xr.Dataset]:
+    """What is stored for a key, at this path or beside it: its study may have been renamed."""
+    for place in (path, *sorted(path.parent.glob("[!.]*.nc"))):
+        if global_attributes(place).get(attribute) == key and all(p.exists() for p in sources()):
+            dataset = read_dataset(place, "source", "vehiclemor")
+            dataset.encoding["source"] = str(place)
+            # What a bug has ended is tried again.
+            if "status" not in dataset or "error" not in dataset["status"].values:
+                yield dataset

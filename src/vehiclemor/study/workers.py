@@ -182,7 +182,7 @@ def is_stored(folder: Path, key: str) -> bool:
     """Whether a finished result is stored, by its header."""
     try:
         return cell_end(folder, key)[1]
-    except FileError:
+    except (FileError, MachineError):
         return False
 
 
