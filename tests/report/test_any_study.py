@@ -136,6 +136,9 @@ def test_a_frame_has_a_row_for_each_run_of_a_grid_and_of_a_protocol(place):
         axes = [str(dimension) for dimension in dataset["status"].dims]
         assert {"label", "method"} <= set(runs), name
         assert not runs.duplicated(axes).any()
+        # In the order of the grid: the first dimension changes last.
+        first = dataset[axes[0]].values
+        np.testing.assert_array_equal(runs[axes[0]], np.repeat(first, len(runs) // len(first)))
         for row in runs.sample(5, random_state=1).to_dict("records"):
             run = dataset.sel({axis: row[axis] for axis in axes})
             assert row["status"] == run["status"].item()

@@ -64,6 +64,8 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     for name in ("floor", "score", "misses"):
         assert plain.count(COLUMNS[name].meaning) == 1
     assert COLUMNS["floor"].meaning not in " ".join(table(rows, explain=False).split())
+    lines = table([{"of": o, "n": n} for n, o in enumerate("abab")], ("n",), group="of").split()
+    assert lines == ["n", "a", "0", "2", "b", "1", "3"]
     micro = {"t": Column("time, us", ".1f", scale=1e6)}
     assert table([{"t": 2.5e-6}], micro).split() == ["time,", "us", "2.5"]
 
