@@ -38,7 +38,8 @@ def run(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_with_a_hint(run, monkeypatch, capsys, number):
-    monkeypatch.setattr(study_run, "studies_and_files", lambda _: os.kill(os.getpid(), number) or {})
+    killed = lambda _: os.kill(os.getpid(), number) or {}  # noqa: E731
+    monkeypatch.setattr(study_run, "studies_and_files", killed)
     before = signal.getsignal(number)
     assert run() == 128 + number
     (line,) = capsys.readouterr().err.splitlines()

@@ -59,8 +59,9 @@ def _is_loaded(module: ModuleType, text: bytes) -> bool:
         code = left.pop()
         written.add(code)
         left += [part for part in code.co_consts if isinstance(part, CodeType)]
-    functions = (f for f in vars(module).values() if isinstance(f, FunctionType))
-    return all(f.__code__ in written for f in functions if f.__module__ == module.__name__)
+    functions = (f.__code__ for f in vars(module).values() if isinstance(f, FunctionType))
+    # What a decorator gives, and what is imported, is of other files.
+    return all(code in written for code in functions if code.co_filename == module.__file__)
 
 
 def source_digest(layers: Sequence[str], files: Sequence[str], components: Sequence[object]) -> str:
