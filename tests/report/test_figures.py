@@ -78,7 +78,10 @@ def protocol_results(small, name):
         found[variable][:] = factor * seconds
     found["status"] = found["status"].astype(object)
     found["status"][-1, 0] = "diverged"
-    found.attrs |= {"configuration": protocol.definition.model_dump_json(), "study": name}
+    found.attrs |= {
+        "configuration": protocol.definition.model_dump_json(exclude_defaults=True),
+        "study": name,
+    }
     return found
 
 

@@ -92,4 +92,4 @@ def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
     for output in tabled_outputs(component("model", CAR)):
         errors = table[f"rms_{output}"]
         assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])
-    assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).with_name(f"{CAR}.toml").read_text()
+    assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).read_text()

@@ -65,7 +65,6 @@ def test_key_changes_with_all_that_determines_the_result(cell, field, value):
 
 def test_versions_count_where_a_method_declares_them(cell, monkeypatch):
     def key() -> str:
-        provenance.code_digest.cache_clear()
         return make_cell(build("double_wishbone"), sine_travel, "pod", {"rank": 3}).key
 
     declared = dataclasses.replace(pod.METHOD, packages=("scipy",))
@@ -79,7 +78,6 @@ def test_versions_count_where_a_method_declares_them(cell, monkeypatch):
         monkeypatch.setattr(cache, "compiler_identity", lambda: "another")
         monkeypatch.setattr(provenance, "version", lambda _: "0.0")
         assert key() == cell.key
-    provenance.code_digest.cache_clear()
     assert len({cell.key, *keys}) == 3
 
 

@@ -17,7 +17,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
@@ -131,7 +131,8 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
             _LOG.warning("%s is made again: %s", folder / name, reason)
     path, derived = folders[-1] / name, name.startswith("derivations")
     what = path.stem.partition("-")[0]
-    with making(what, derived=derived), locked(path), _no_collection():
+    told = nullcontext() if name.startswith("sources") else making(what, derived=derived)
+    with told, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
             content = make()

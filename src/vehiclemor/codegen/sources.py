@@ -51,9 +51,10 @@ def _digest_of(files: tuple[tuple[str, int, int], ...]) -> str:
 
 def _is_loaded(module: ModuleType, text: bytes) -> bool:
     """Whether the functions of a module are those of a text; pytest, and others, rewrite them."""
-    if type(module.__loader__) is not SourceFileLoader:
+    loader = module.__loader__
+    if type(loader) is not SourceFileLoader:
         return True
-    left = [compile(text, str(module.__file__), "exec")]
+    left = [loader.source_to_code(text, str(module.__file__))]
     written = set()
     while left:
         code = left.pop()
