@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.codegen.cache import cache_folder, fetched
 from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
-from vehiclemor.codegen.sources import source_digest
+from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def is_derived(name: str, derive: Callable[[], Program]) -> bool:
 
 
 def _file(name: str, derive: Callable[[], Program]) -> str:
-    parts = [source_digest(LAYERS, (), (derive,)), name, f"sympy {version('sympy')}"]
+    parts = [source_digest(LAYERS), plug_in_digest((derive,)), name, f"sympy {version('sympy')}"]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
     return f"derivations/{name}_{digest}.json"
 

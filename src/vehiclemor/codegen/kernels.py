@@ -119,7 +119,7 @@ def _checked(source: KernelSource, place: int, array: Any) -> int:
 @once
 def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
-    parts = [source.text, str(lanes), source_digest(("codegen",), (), ()), compiler_identity()]
+    parts = [source.text, str(lanes), source_digest(("codegen",)), compiler_identity()]
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
     def make() -> bytes:

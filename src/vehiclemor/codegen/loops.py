@@ -240,7 +240,7 @@ def _loops(
 def loops_digest(modules: Sequence[str]) -> str:
     """Hash of the source of loops, and of this layer, which compiles them."""
     files = [f"{name.replace('.', '/')}.py" for name in modules]
-    return source_digest(("codegen",), files, ())
+    return source_digest(("codegen",), files)
 
 
 def _entry(modules: Sequence[ModuleType], name: str) -> Any:

@@ -29,11 +29,13 @@ def plug_in_digest(components: Sequence[object]) -> str:
     PlugInError
         If a file says something else than what is loaded: results would be those of neither.
     """
-    files = {path for component in components for path in _plug_in_files(component)}
-    stats = [(str(path), path.stat()) for path in sorted(files)]
+    found = [_plug_in_files(component) for component in components]
+    files = sorted({path for paths in found for path in paths or ()})
+    stats = [(str(path), path.stat()) for path in files]
     known = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
-    rest = [repr(c) for c in components if (m := _module_of(c)) is None or m.__file__ is None]
-    return _hash([("", _digest_of(known).encode()), *(("", text.encode()) for text in rest)])
+    # What was written at a prompt has no file.
+    rest = [repr(c).encode() for c, paths in zip(components, found, strict=True) if paths is None]
+    return _hash([("", text) for text in (_digest_of(known).encode(), *rest)])
 
 
 @lru_cache(maxsize=64)
@@ -65,8 +67,8 @@ def _is_loaded(module: ModuleType, text: bytes) -> bool:
     return all(code in written for code in functions if code.co_filename == module.__file__)
 
 
-def source_digest(layers: Sequence[str], files: Sequence[str], components: Sequence[object]) -> str:
-    """Hash of layers and files of this package, and of plug-ins.
+def source_digest(layers: Sequence[str], files: Sequence[str] = ()) -> str:
+    """Hash of layers and files of this package.
 
     Parameters
     ----------
@@ -74,13 +76,10 @@ def source_digest(layers: Sequence[str], files: Sequence[str], components: Seque
         Folders of the package, with all that is in them.
     files
         Further files of the package.
-    components
-        Of a plug-in, all of its top-level package counts.
     """
     paths = [path for layer in layers for path in sorted((PACKAGE / layer).rglob("*.py"))]
     paths += [PACKAGE / name for name in files]
     texts = [(path.relative_to(PACKAGE).as_posix(), path.read_bytes()) for path in paths]
-    texts += [("", text) for component in components for text in _plug_in_texts(component)]
     # This file decides what a text means.
     written = _hash([("", Path(__file__).read_bytes()), *texts])
     name = f"sources/source-{written}"
@@ -119,19 +118,11 @@ def _written(node: object) -> str:
     return f"{type(node).__name__}({', '.join(fields)})"
 
 
-def _plug_in_texts(thing: object) -> list[bytes]:
-    """Source texts of a component, if it is a plug-in's."""
+def _plug_in_files(thing: object) -> list[Path] | None:
+    """Files of the top-level package, or the single one with its neighbours; None without any."""
     module = _module_of(thing)
     if module is None or module.__file__ is None:
-        return [repr(thing).encode()]
-    return [path.read_bytes() for path in _plug_in_files(thing)]
-
-
-def _plug_in_files(thing: object) -> list[Path]:
-    """Files of the package, or the single one with its neighbours, of a component."""
-    module = _module_of(thing)
-    if module is None or module.__file__ is None:
-        return []
+        return None
     top = module.__name__.split(".")[0]
     if top == "vehiclemor":
         return []

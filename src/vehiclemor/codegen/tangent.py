@@ -23,7 +23,7 @@ FEW = 4
 
 def tangent_source(source: KernelSource, arguments: Sequence[str]) -> KernelSource:
     """Source of the tangent of a kernel, see `tangent_text`; kept on disk."""
-    parts = [source.text, *arguments, source_digest(("codegen",), (), ())]
+    parts = [source.text, *arguments, source_digest(("codegen",))]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
     def make() -> bytes:

@@ -75,7 +75,7 @@ def attributes(title: str, kernel_hash: str, **further: object) -> dict[str, obj
 
 @cache
 def _own_source() -> str:
-    return source_digest(LAYERS, FILES, ())
+    return source_digest(LAYERS, FILES)
 
 
 def code_digest(model: str, method: str) -> str:
@@ -94,4 +94,4 @@ def code_digest(model: str, method: str) -> str:
 def layout_digest() -> str:
     """Hash of the source that combines cells: a dataset laid out by other source is made again."""
     files = [f"study/{name}.py" for name in ("plans/grid_results", "plans/protocol_results")]
-    return source_digest((), (*files, "study/variables.py"), ())
+    return source_digest((), (*files, "study/variables.py"))

@@ -114,7 +114,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def digest() -> str:
-    return sources.source_digest(("models",), ("other.py",), ())
+    return sources.source_digest(("models",), ("other.py",))
 
 
 def test_a_digest_follows_the_source_files_of_its_layers_alone(package: Path) -> None:
@@ -135,7 +135,7 @@ def test_a_digest_follows_the_source_files_of_its_layers_alone(package: Path) ->
     (package / "models" / "a.py").unlink()
     seen.add(digest())
     assert len(seen) == 7
-    assert sources.source_digest(("models", "symbolic"), ("other.py",), ()) not in seen
+    assert sources.source_digest(("models", "symbolic"), ("other.py",)) not in seen
 
 
 def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
@@ -146,7 +146,6 @@ def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
     layers = ("models",)
-    own = sources.source_digest(layers, (), (definition.ModelDefinition,))
-    assert own == sources.source_digest(layers, (), ())
-    plugged = sources.source_digest(layers, (), (standard_problems,))
-    assert plugged != sources.source_digest(layers, (), ())
+    none = sources.plug_in_digest(())
+    assert sources.plug_in_digest((definition.ModelDefinition,)) == none
+    assert sources.plug_in_digest((standard_problems,)) != none

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from vehiclemor.codegen.derivation import derivation
-from vehiclemor.codegen.sources import plug_in_digest, source_digest
+from vehiclemor.codegen.sources import plug_in_digest
 from vehiclemor.errors import PlugInError
 
 EQUATIONS = "def derive():\n    return {}\n"
@@ -51,7 +51,7 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def digest(component: object) -> str:
-    return source_digest((), (), (component,))
+    return plug_in_digest((component,))
 
 
 @pytest.mark.parametrize("extra", [{}, {"plug/__init__.py": ""}], ids=["namespace", "package"])
