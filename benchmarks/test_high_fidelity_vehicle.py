@@ -92,12 +92,13 @@ def test_full_order(benchmark, model, references, label, start):
     run = model.simulate(rack_lane_change, start, None, solver, tolerance)
     whole = whole_space(2 * len(model.coordinates))
     how = Solver(solver, tolerance, rack_lane_change.times)
-    loop, arguments = model.system.prepared(rack_lane_change, model.start(start), whole, how)
+    space = model.system.workspace(rack_lane_change, whole, how)
+    space.start[:] = model.start(start)
 
     def whole_run():
         # The loop stops at a number of calls, which its counts add up.
-        arguments.output.counts[:] = 0
-        return loop(*arguments)
+        space.output.counts[:] = 0
+        return space.call()
 
     assert benchmark(whole_run) == FINISHED
     benchmark.extra_info |= run.counts

@@ -75,12 +75,13 @@ def test_full_order(benchmark, model, reference, label):
     run = model.simulate(lane_change, None, None, solver, tolerance)
     whole = whole_space(2 * len(model.coordinates))
     how = Solver(solver, tolerance, lane_change.times)
-    loop, arguments = model.system.prepared(lane_change, model.start(), whole, how)
+    space = model.system.workspace(lane_change, whole, how)
+    space.start[:] = model.start()
 
     def whole_run():
         # The loop stops at a number of calls, which its counts add up.
-        arguments.output.counts[:] = 0
-        return loop(*arguments)
+        space.output.counts[:] = 0
+        return space.call()
 
     assert benchmark(whole_run) == FINISHED
     error = np.abs(run.outputs - reference.outputs).max(axis=0)

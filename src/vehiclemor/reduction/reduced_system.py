@@ -29,10 +29,10 @@ from vehiclemor.simulation.kernel_derivatives import (
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along
-from vehiclemor.simulation.run_plans import Run, Solver
 from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.workspaces import Run, Solver
 from vehiclemor.sizes import require
 
 # Encoded starts that are kept.

@@ -8,7 +8,7 @@ from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.newton_loops import SAMPLE, Solution
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.spare_spaces import SpareSpaces
+from vehiclemor.simulation.workspaces import Spare
 
 
 class LaneRun(NamedTuple):
@@ -44,7 +44,7 @@ class LaneRuns:
         self, loop: Loop, mechanism: Ready, kernels: Ready, sizes: tuple[int, int, int]
     ) -> None:
         self._loop, self._mechanism, self._kernels = loop, mechanism, kernels
-        self._sizes, self._spare = sizes, SpareSpaces[LaneRun]()
+        self._sizes, self._spare = sizes, Spare[LaneRun]()
 
     def solved(
         self, samples: Ready, iteration: Ready

@@ -13,29 +13,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Prepared, ready
+from vehiclemor.codegen.loops import ready
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.sample_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
-from vehiclemor.simulation.run_plans import NO_POINTS, Solver
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
+from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Solver, Spare, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
 
 
 class StepSpace(NamedTuple):
-    """Arrays of one step at a time, and the loop that reads them.
+    """A workspace of one step at a time, and what is overwritten for each.
 
     Attributes
     ----------
-    state, end, counts, buffer
-        At the beginning (n,), at the end (1, n); counts and scratch space of the loop.
     times
-        What is overwritten with the length of the step, wherever it stands last.
+        Arrays that end with the length of the step.
     window
         Number (1,) of the projection window.
     coefficients
@@ -46,11 +44,7 @@ class StepSpace(NamedTuple):
         The word of the first step to try, as a number.
     """
 
-    call: Prepared
-    state: np.ndarray
-    end: np.ndarray
-    counts: np.ndarray
-    buffer: np.ndarray
+    space: Workspace
     times: tuple[np.ndarray, ...]
     window: np.ndarray
     coefficients: np.ndarray
@@ -83,7 +77,7 @@ class Stepper:
     ) -> None:
         self.system, self.windows, self.moved = system, windows, moved
         self.solver = Solver(solver, tolerance)
-        self._spare: list[StepSpace] = []
+        self._spare: Spare[StepSpace] = Spare()
 
     def step(
         self,
@@ -100,32 +94,30 @@ class Stepper:
         ConvergenceError
             If the integration fails.
         """
-        try:
-            space = self._spare.pop()
-        except IndexError:
-            space = self._space()
-        space.state[:] = state
+        held = self._spare.taken(None, self._packed)
+        space, coefficients = held.space, held.coefficients
+        space.start[:] = state
         slope = None if next_inputs is None else (next_inputs - inputs) / dt
         for begin, length, window in self._parts(time, dt):
-            space.coefficients[0, :, 0] = inputs
-            space.coefficients[0, :, 1] = 0.0
+            coefficients[0, :, 0] = inputs
+            coefficients[0, :, 1] = 0.0
             if slope is not None:
-                space.coefficients[0, :, 0] += begin * slope
-                space.coefficients[0, :, 1] = length * slope
-            for array in space.times:
+                coefficients[0, :, 0] += begin * slope
+                coefficients[0, :, 1] = length * slope
+            for array in held.times:
                 array[-1] = length
-            space.first.value = length
-            space.window[0] = window
+            held.first.value = length
+            held.window[0] = window
             if self.moved:
-                space.means[window] = space.state
-            space.counts.fill(0)
+                held.means[window] = space.start
+            space.output.counts.fill(0)
             status = space.call()
             if status:
                 reached = time + begin + space.buffer[0]
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
-            space.state[:] = space.end[0]
-        found = space.state.copy()
-        self._spare.append(space)
+            space.start[:] = space.output.path[0]
+        found = space.start.copy()
+        self._spare.give_back(None, held)
         return found
 
     def _parts(self, time: float, dt: float) -> Iterator[tuple[float, float, int]]:
@@ -140,37 +132,23 @@ class Stepper:
         for window, (begin, end) in enumerate(pairwise(cuts), start=first):
             yield begin, end - begin, window
 
-    def _space(self) -> StepSpace:
+    def _packed(self) -> StepSpace:
         edges, coefficients = np.zeros(2), np.zeros((1, self.system.inputs, 6))
         span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
         counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
         signal = ready(Pieces(edges, one, np.empty(0), coefficients))
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
-        n = len(self.system.error_scale)
-        output = Output(sample, np.empty((1, n)), counts, *NO_POINTS, np.inf)
+        path = np.empty((1, len(self.system.error_scale)))
         windows = self.windows
         if self.moved:
             windows = replace(windows, means=windows.means.copy())
-        loop, given, (n, floats, integers) = self.system.loop(
-            windows, self.solver, signal, spans, output
-        )
-        arguments = given._replace(
-            start=np.empty(n), buffer=np.empty(floats), integers=np.empty(integers, dtype=np.int64)
-        )
-        call = loop.prepared(*arguments)
-        first = c_double.from_buffer(call.words, 8 * call.address("control.first"))
-        return StepSpace(
-            call,
-            arguments.start,
-            output.path,
-            counts,
-            arguments.buffer,
-            (edges, span, sample),
-            window,
-            coefficients,
-            windows.means,
-            first,
-        )
+        drive = Drive(signal, spans, NO_POINTS[0])
+        output = Output(sample, path, counts, *NO_POINTS, np.inf)
+        space = self.system.packed(windows, self.solver, drive, output)
+        words = space.call.words
+        first = c_double.from_buffer(words, 8 * space.call.address("control.first"))
+        times = edges, span, sample
+        return StepSpace(space, times, window, coefficients, windows.means, first)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (n,) of a state; of a projected one where its subspace is nearest."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.loops import Loop, Ready, ready
+from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
@@ -29,22 +29,12 @@ from vehiclemor.simulation.integrators.structures import (
 from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.run_plans import (
-    NO_BUNDLE,
-    NO_POINTS,
-    Drive,
-    Plan,
-    Run,
-    RunArguments,
-    Solver,
-    Space,
-)
 from vehiclemor.simulation.run_timer import timed
+from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
+from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Run, Solver, Spare, Workspace
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
-# Plans that are kept.
-MOST_PLANS = 64
 REASONS = {
     TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side",
     NOT_FINITE: "a state is not finite",
@@ -243,123 +233,89 @@ class System(ShortRepr):
         InputError
             If a value is out of bounds or a name is unknown.
         """
-        plan = self._found(maneuver, windows, solver, direct_until)
-        signal, space = signal_of(maneuver), plan.spare_space()
-        if space is None:
-            space = Space(plan, self._drive(maneuver, plan, solver))
-        elif space.signal is not signal:
-            space.take(self._drive(maneuver, plan, solver))
-        start, output = space.arguments.start, space.arguments.output
-        assert len(state) == len(start), f"{len(state)} states, not {len(start)}"
-        start[:] = state
-        output.counts.fill(0)
-        status, seconds = timed(space.call)
-        failure = ""
-        if status:
-            failure = f"{REASONS[status]} at t = {space.arguments.buffer[0]:.6g} s"
-        return Run(output.samples, output.path, output.counts, seconds, failure, (plan, space))
-
-    def prepared(
-        self,
-        maneuver: Maneuver,
-        state: np.ndarray,
-        windows: ProjectionWindows,
-        solver: Solver,
-        direct_until: float = np.inf,
-    ) -> tuple[Loop, RunArguments]:
-        """The compiled loop of a run and its arguments; see `run`."""
-        plan = self._found(maneuver, windows, solver, direct_until)
-        arguments, _ = plan.fresh(self._drive(maneuver, plan, solver))
-        arguments.start[:] = state
-        arguments.output.counts.fill(0)
-        return plan.loop, arguments
-
-    def _found(
-        self,
-        maneuver: Maneuver,
-        windows: ProjectionWindows,
-        solver: Solver,
-        direct_until: float,
-    ) -> Plan:
-        """Plan of a run; kept if it is over a whole maneuver, for all with its output times."""
         name, tolerance, times, longest, begin = solver
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
         if longest is not None:
             check_positive("longest_step", longest)
-        if times is not None or begin:
-            return self._plan(maneuver, windows, solver, direct_until)
-        length = maneuver.duration, maneuver.samples
-        key = length, id(windows), name, tolerance, longest, direct_until
-        plan = self._plans.get(key)
-        if plan is None:
-            plan = self._plan(maneuver, windows, solver, direct_until)
-            if len(self._plans) >= MOST_PLANS:
-                self._plans.clear()
-            self._plans[key] = plan
-        return plan
 
-    def _drive(self, maneuver: Maneuver, plan: Plan, solver: Solver) -> Drive:
-        """What of a maneuver goes into a run of a plan."""
-        signal, times = signal_of(maneuver), plan.arguments.output.samples
-        end = float(times[-1]) if len(times) else maneuver.duration
-        spans = plan.windows.spans(signal.bundle.edges, end, solver.begin)
-        return Drive(signal, spans, recorded_inputs(maneuver)[1])
+        def make() -> Workspace:
+            return self.workspace(maneuver, windows, solver, direct_until)
+
+        if times is not None or begin:
+            space, left = make(), None
+        else:
+            # Of runs over whole maneuvers with the same output times.
+            length = maneuver.duration, maneuver.samples
+            kind = length, id(windows), name, tolerance, longest, direct_until
+            space, left = self._spare.taken(kind, make), partial(self._spare.give_back, kind)
+            if space.signal is not signal_of(maneuver):
+                space.take(self._drive(maneuver, windows, space.output.samples))
+        output = space.output
+        assert len(state) == len(space.start), f"{len(state)} states, not {len(space.start)}"
+        space.start[:] = state
+        output.counts.fill(0)
+        status, seconds = timed(space.call)
+        failure = f"{REASONS[status]} at t = {space.buffer[0]:.6g} s" if status else ""
+        return Run(output.samples, output.path, output.counts, seconds, failure, space, left)
 
     @cached_property
-    def _plans(self) -> dict[tuple, Plan]:
-        return {}
+    def _spare(self) -> Spare[Workspace]:
+        return Spare()
 
-    def _plan(
+    def workspace(
         self,
         maneuver: Maneuver,
         windows: ProjectionWindows,
         solver: Solver,
-        direct_until: float,
-    ) -> Plan:
-        """What runs over the output times of a maneuver share."""
-        times, nothing = output_times(solver.times, maneuver, begin=solver.begin), np.empty(0)
-        output = Output(times, nothing, nothing, *NO_POINTS, direct_until)
-        loop, arguments, sizes = self.loop(windows, solver, NO_BUNDLE, NO_BUNDLE, output)
-        modules = catalogue.integrator(solver.name).modules
-        whole = solver.times is None and not solver.begin
-        points = whole and "cubic" in modules
-        points = points and len(times) >= LANES and direct_until < times[-1]
-        return Plan(loop, arguments, sizes, whole, points, windows, [])
+        direct_until: float = np.inf,
+    ) -> Workspace:
+        """Arrays of a run over a maneuver, its start still to be written; see `run`."""
+        times = output_times(solver.times, maneuver, begin=solver.begin)
+        drive = self._drive(maneuver, windows, times, solver.begin)
+        path = np.empty((len(times), len(self.error_scale)))
+        counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
+        given, points = NO_POINTS[0], NO_POINTS[1:]
+        if solver.times is None and not solver.begin:
+            given = drive.inputs.copy()
+            cubic = "cubic" in catalogue.integrator(solver.name).modules
+            if cubic and len(times) >= LANES and direct_until < times[-1]:
+                points = np.empty(given.shape), np.empty(len(times)), np.empty((len(times), 2))
+        output = Output(times, path, counts, given, *points, direct_until)
+        return self.packed(windows, solver, drive, output)
 
-    def loop(
-        self,
-        windows: ProjectionWindows,
-        solver: Solver,
-        signal: Ready,
-        spans: Ready,
-        output: Output,
-    ) -> tuple[Loop, RunArguments, tuple[int, int, int]]:
-        """The compiled time loop, its arguments but for space, and the sizes of that."""
+    def _drive(
+        self, maneuver: Maneuver, windows: ProjectionWindows, times: np.ndarray, begin: float = 0.0
+    ) -> Drive:
+        """What of a maneuver goes into a run."""
+        signal = signal_of(maneuver)
+        end = float(times[-1]) if len(times) else maneuver.duration
+        spans = windows.spans(signal.bundle.edges, end, begin)
+        return Drive(signal, spans, recorded_inputs(maneuver)[1])
+
+    def packed(
+        self, windows: ProjectionWindows, solver: Solver, drive: Drive, output: Output
+    ) -> Workspace:
+        """The time loop with all its arguments, see `integrators/loop.integrate`."""
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
         catalogue.check_formulation(name, full)
         whole_steps = full and self.whole_steps(name)
-        active = self.active if full else np.arange(windows.ranks.max())
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
-        nothing = np.empty(0)
         longest = float(solver.longest_step or np.inf)
-        arguments = RunArguments(
-            nothing,
+        start = np.empty(n)
+        buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, whole_steps))
+        call = catalogue.time_loop(chosen, formulation, whole_steps).prepared(
+            start,
             self.called(formulation, name if whole_steps else ""),
-            signal,
-            spans,
+            drive.signal,
+            drive.spans,
             windows.subspaces,
-            self.method(name, active),
+            self.method(name, self.active if full else np.arange(dim)),
             catalogue.control_of(solver.name, float(solver.tolerance), longest),
             output,
-            nothing,
-            nothing,
+            buffer,
+            np.empty(dim + 8, dtype=np.int64),
         )
-        floats = catalogue.scratch_size(chosen, n, dim, self.inputs, whole_steps)
-        return (
-            catalogue.time_loop(chosen, formulation, whole_steps),
-            arguments,
-            (n, floats, dim + 8),
-        )
+        return Workspace(call, start, output, buffer, windows, drive.signal)

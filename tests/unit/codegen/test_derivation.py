@@ -145,7 +145,6 @@ def test_what_the_derivation_goes_by_is_in_its_layers() -> None:
 
 
 def test_components_of_the_package_are_counted_by_their_layers_alone() -> None:
-    layers = ("models",)
     none = sources.plug_in_digest(())
     assert sources.plug_in_digest((definition.ModelDefinition,)) == none
     assert sources.plug_in_digest((standard_problems,)) != none

@@ -37,8 +37,8 @@ from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.spare_spaces import SpareSpaces
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.workspaces import Spare
 from vehiclemor.sizes import apart, require, shaped, within
 
 # Above this degree, powers lose digits to rounding.
@@ -126,8 +126,8 @@ class PathMapModel(ShortRepr):
         return dict.fromkeys(self.model.counts, 0)
 
     @cached_property
-    def _spare(self) -> SpareSpaces[Prepared]:
-        return SpareSpaces()
+    def _spare(self) -> Spare[Prepared]:
+        return Spare()
 
     def _packed(self, given: Ready, size: int) -> Prepared:
         """The loop for some inputs, to be given space of so many numbers."""

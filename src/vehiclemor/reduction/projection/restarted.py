@@ -16,9 +16,9 @@ import numpy as np
 
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.projection.dynamic import DynamicProjection
-from vehiclemor.simulation.run_plans import Solver
 from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.workspaces import Solver
 
 
 @dataclass(frozen=True, eq=False)

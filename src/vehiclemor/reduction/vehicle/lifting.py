@@ -20,8 +20,8 @@ from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
-from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.trajectory import Trust
+from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require
 
 # Part of a transient below which it needs no samples of its own.

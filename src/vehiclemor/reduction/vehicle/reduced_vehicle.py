@@ -20,9 +20,9 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require, shaped
 
 # Step of the reduced coordinates in differences.

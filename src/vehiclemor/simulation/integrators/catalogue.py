@@ -24,30 +24,9 @@ from vehiclemor.simulation.integrators.structures import Control
 STEP_GRID = 2.0 ** (0.125 * np.arange(-128, 25))
 # A run that needs more evaluations of its right-hand side than this is going nowhere.
 MOST_CALLS = 100_000
-# Longest first step (s) after a break point of the inputs.
-RESTART = 0.05
 # A kernel of whole steps for more states than these would be too long.
 MOST_STATES = 64
 NOTHING = np.zeros((1, 1, 1))
-
-
-@dataclass(frozen=True)
-class StepControl:
-    """How step sizes follow the errors, see `structures.Control`."""
-
-    exponent: float
-    rejected_exponent: float
-    memory_exponent: float = 0.0
-    memory_start: float = 1.0
-    memory_floor: float = 1e-4
-    shrink_least: float = 0.1
-    shrink: float = 0.2
-    grow: float = 6.0
-    safety: float = 0.9
-    keep_least: float = 1.0
-    keep_most: float = 1.0
-    halve_last: bool = True
-    shortest_first: float = 0.0
 
 
 class Stored(NamedTuple):
@@ -112,7 +91,7 @@ class Integrator:
 
     summary: str
     order: int
-    control: StepControl
+    control: Control
     modules: tuple[str, ...]
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
     operators: Callable[[np.ndarray, np.ndarray], Stored] | None = None
@@ -157,13 +136,13 @@ INTEGRATORS = {
     "dopri5": Integrator(
         "Dormand-Prince 5(4), explicit",
         5,
-        StepControl(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=False),
+        Control(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=0.0),
         ("dopri5",),
     ),
     "rodas4": Integrator(
         "Rosenbrock method of order 4, fresh Jacobians",
         4,
-        StepControl(1.0 / 4.0, 1.0 / 4.0),
+        Control(1.0 / 4.0, 1.0 / 4.0),
         ("cubic", "dense_solves", "rodas4"),
         tableaus.rodas4(),
         squares=2,
@@ -171,7 +150,7 @@ INTEGRATORS = {
     "ros34pw2": Integrator(
         "W-method of order 3, one Jacobian for all runs",
         3,
-        StepControl(1.0 / 3.0, 1.0 / 3.0),
+        Control(1.0 / 3.0, 1.0 / 3.0),
         ("step_grid", "cubic", "ros34pw2"),
         tableaus.ros34pw2(),
         inverses,
@@ -182,7 +161,7 @@ INTEGRATORS = {
     "etdrk4": Integrator(
         "exponential method of order 4, with the same",
         4,
-        StepControl(
+        Control(
             0.175,
             0.25,
             0.1,
@@ -203,7 +182,7 @@ INTEGRATORS = {
     "exponential_adams": Integrator(
         "exponential Adams method of order up to 6, with the same",
         6,
-        StepControl(
+        Control(
             1.0 / 6.0,
             1.0 / 4.0,
             shrink_least=0.3,
@@ -245,27 +224,7 @@ def check_formulation(name: str, full: bool) -> None:
 def control_of(name: str, tolerance: float, longest: float) -> Ready:
     """Limits and step-size control of a run."""
     own = integrator(name).control
-    control = Control(
-        tolerance,
-        longest,
-        own.shortest_first,
-        RESTART,
-        float(MOST_CALLS),
-        own.safety,
-        own.exponent,
-        own.memory_exponent,
-        own.memory_start,
-        own.memory_floor,
-        own.rejected_exponent,
-        own.shrink_least,
-        own.shrink,
-        own.grow,
-        own.keep_least,
-        own.keep_most,
-        float(own.halve_last),
-        0.0,
-    )
-    return ready(control)
+    return ready(own._replace(tolerance=tolerance, longest=longest, most_calls=float(MOST_CALLS)))
 
 
 def _problem_modules(formulation: str) -> tuple[str, ...]:

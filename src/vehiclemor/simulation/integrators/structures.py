@@ -1,5 +1,6 @@
 """What goes through the compiled time loop, in named bundles."""
 
+import math
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
@@ -100,50 +101,52 @@ class Control(NamedTuple):
 
     Attributes
     ----------
-    tolerance
-        Largest local error of a state relative to its scale plus its own size.
-    longest, shortest_first
-        Longest step, and shortest first guess of one, in s.
-    restart
-        Longest first step after a break point of the inputs in s.
-    most_calls
-        Evaluations of the right-hand side after which a run is given up.
-    safety
-        Share of the step size that the error asks for.
-    exponent, memory_exponent
-        Of this error and of the one before in the factor of the next step.
+    exponent, rejected_exponent
+        Of the error in the factor of the next step, and after a rejected step.
+    memory_exponent
+        Of the error before.
     memory_start, memory_floor
         What counts as the error before the first step, and at least as that before any other.
-    rejected_exponent
-        Of the error in the factor after a rejected step.
     shrink_least, shrink, grow
         Smallest factor after a rejected and after an accepted step, largest factor.
+    safety
+        Share of the step size that the error asks for.
     keep_least, keep_most
         Factors between which the step size stays.
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
+    shortest_first
+        Shortest first guess of a step in s.
+    tolerance
+        Largest local error of a state relative to its scale plus its own size.
+    longest
+        Longest step in s.
+    restart
+        Longest first step after a break point of the inputs in s.
+    most_calls
+        Evaluations of the right-hand side after which a run is given up.
     first
         First step to try in s; 0 if it is to be guessed.
     """
 
-    tolerance: Float
-    longest: Float
-    shortest_first: Float
-    restart: Float
-    most_calls: Float
-    safety: Float
     exponent: Float
-    memory_exponent: Float
-    memory_start: Float
-    memory_floor: Float
     rejected_exponent: Float
-    shrink_least: Float
-    shrink: Float
-    grow: Float
-    keep_least: Float
-    keep_most: Float
-    halve_last: Float
-    first: Float
+    memory_exponent: Float = 0.0
+    memory_start: Float = 1.0
+    memory_floor: Float = 1e-4
+    shrink_least: Float = 0.1
+    shrink: Float = 0.2
+    grow: Float = 6.0
+    safety: Float = 0.9
+    keep_least: Float = 1.0
+    keep_most: Float = 1.0
+    halve_last: Float = 1.0
+    shortest_first: Float = 0.0
+    tolerance: Float = 0.0
+    longest: Float = math.inf
+    restart: Float = 0.05
+    most_calls: Float = 0.0
+    first: Float = 0.0
 
 
 # Points of a step: the Chebyshev points of a cubic.

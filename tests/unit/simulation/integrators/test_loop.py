@@ -170,10 +170,10 @@ def test_the_calls_that_are_counted_are_those_that_are_made(solver):
 
     system = python_system(pendulum, [0.0, 0.0], 3)
     corners = maneuver(driven, 8.0, (2.0, 5.0))
-    arguments = corners, np.array([1.0, 0.0]), whole_space(2), Solver(solver, 1e-4)
-    system.prepared(*arguments)
+    how = whole_space(2), Solver(solver, 1e-4)
+    system.workspace(corners, *how)
     made.clear()
-    run = system.run(*arguments)
+    run = system.run(corners, np.array([1.0, 0.0]), *how)
     np.testing.assert_allclose(run.path[:, 0], np.cos(run.times), atol=5e-3)
     assert len(made) == run.counts[0] > 50
 

@@ -7,12 +7,14 @@ import pytest
 
 from tests.unit.python_system import python_system
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.loops import Prepared, address_of_array
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.vehicle.feature_system import feature_system
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.simulation.system import Solver, System
+from vehiclemor.simulation.system import System
+from vehiclemor.simulation.workspaces import Solver
 
 GUARD, MARK = 64, 12345
 HEAD = "(_x, _u, _constants, _work, _result):"
@@ -62,26 +64,33 @@ def two_windows(formulation: str, n: int, rank: int) -> ProjectionWindows:
     return ProjectionWindows(formulation, edges, np.zeros((2, n)), trial, trial.copy(), ranks)
 
 
-def guarded(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A copy with marks before and behind it, and the whole."""
-    whole = np.full(array.size + 2 * GUARD, MARK, dtype=array.dtype)
-    inner = whole[GUARD:-GUARD].reshape(array.shape)
-    inner[...] = array
-    return inner, whole
+def guarded(call: Prepared, name: str, dimensions: int, dtype: type) -> np.ndarray:
+    """An array of the loop with marks before and behind it, in place of its own."""
+    place = call.address(name)
+    size = int(np.prod(call.words[place + 1 : place + 1 + dimensions]))
+    whole = np.full(size + 2 * GUARD, MARK, dtype=dtype)
+    call.words[place] = address_of_array(whole) + GUARD * whole.itemsize
+    return whole
 
 
 def check(system: System, inputs: int, windows: ProjectionWindows, solver: str) -> None:
-    start = np.linspace(1.0, 2.0, len(system.reference))
-    loop, given = system.prepared(steered(inputs), start, windows, Solver(solver, 1e-5))
-    buffer, floats = guarded(given.buffer)
-    integers, whole = guarded(given.integers)
-    path, states = guarded(given.output.path)
-    output = given.output._replace(path=path)
-    assert loop(*given._replace(buffer=buffer, integers=integers, output=output)) == 0
+    space = system.workspace(steered(inputs), windows, Solver(solver, 1e-5))
+    space.start[:] = np.linspace(1.0, 2.0, len(system.reference))
+    arrays = [
+        guarded(space.call, name, dimensions, dtype)
+        for name, dimensions, dtype in (
+            ("buffer", 1, float),
+            ("integers", 1, int),
+            ("output.path", 2, float),
+        )
+    ]
+    assert space.call() == 0
+    path = arrays[-1][GUARD:-GUARD]
     assert np.isfinite(path).all()
-    for guard in (floats, whole, states):
-        assert (guard[:GUARD] == MARK).all()
-        assert (guard[-GUARD:] == MARK).all()
+    assert not (path == MARK).any()
+    for array in arrays:
+        assert (array[:GUARD] == MARK).all()
+        assert (array[-GUARD:] == MARK).all()
 
 
 @pytest.mark.parametrize("inputs", [1, 3])

@@ -13,9 +13,8 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Observer
 from vehiclemor.simulation.paths import path_loops
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.run_plans import Solver
-from vehiclemor.simulation.spare_spaces import MOST_KINDS, SpareSpaces
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.workspaces import MOST_KINDS, Solver, Spare
 
 CASES = {
     "independent_suspension_vehicle": ("ros34pw2", ("equilibrium", "dropped")),
@@ -87,7 +86,7 @@ def test_a_run_keeps_its_path_until_it_gives_it_back():
 
 
 def test_spare_spaces_are_found_by_kind_and_are_few():
-    spare: SpareSpaces[list] = SpareSpaces()
+    spare: Spare[list] = Spare()
     mine = spare.taken("a", list)
     spare.give_back("a", mine)
     assert spare.taken("b", list) is not mine

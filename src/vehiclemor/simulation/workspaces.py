@@ -1,20 +1,49 @@
-"""Plans of runs: what those over the same maneuver share, and the space that one of them takes."""
+"""Workspaces: the arrays of one run at a time, packed once with the compiled loop that uses them.
+
+Packing takes as long as a short run, so a workspace that a run has left serves the next one of its
+kind.  It belongs to one run at a time, in whichever thread: lists are popped and appended at once.
+"""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable, Hashable
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, Ready
+from vehiclemor.codegen.loops import Prepared, Ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.integrators.structures import NODES, Output
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 
-NO_BUNDLE = Ready(None, b"")
+Kept = TypeVar("Kept")
+# Kinds of runs whose workspaces are kept.
+MOST_KINDS = 64
 # Of a run that is recorded at the samples: no inputs, points and places.
 NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
+
+
+class Spare(Generic[Kept]):
+    """What no run holds at present, by what all runs of a kind share."""
+
+    def __init__(self) -> None:
+        self._kept: dict[Hashable, list[Kept]] = {}
+
+    def taken(self, kind: Hashable, make: Callable[[], Kept]) -> Kept:
+        """One of that kind, made if none is left."""
+        try:
+            return self._kept[kind].pop()
+        except (KeyError, IndexError):
+            return make()
+
+    def give_back(self, kind: Hashable, held: Kept) -> None:
+        """Leave it to the next run."""
+        spare = self._kept.get(kind)
+        if spare is None:
+            if len(self._kept) >= MOST_KINDS:
+                self._kept.clear()
+            spare = self._kept.setdefault(kind, [])
+        spare.append(held)
 
 
 class Points(NamedTuple):
@@ -57,21 +86,6 @@ class Solver(NamedTuple):
     begin: float = 0.0
 
 
-class RunArguments(NamedTuple):
-    """Arguments of the compiled time loop, see `integrators/loop.integrate`."""
-
-    start: np.ndarray
-    equations: Ready
-    signal: Ready
-    spans: Ready
-    subspaces: Ready
-    method: Ready
-    control: Ready
-    output: Output
-    buffer: np.ndarray
-    integers: np.ndarray
-
-
 class Drive(NamedTuple):
     """What of a maneuver goes into a run.
 
@@ -88,28 +102,38 @@ class Drive(NamedTuple):
     inputs: np.ndarray
 
 
-class Space:
-    """Arrays of one run at a time and, packed once, the loop that writes them.
+class Workspace:
+    """Arrays of one run at a time and, packed once, the loop that uses them.
 
     Attributes
     ----------
-    arguments
-        Of the loop; those of a maneuver may have been replaced.
     call
-        The loop with these.
+        The time loop with its arguments.
+    start
+        Where the run begins (n,).
+    output, buffer
+        Of the loop, see `integrators/loop.integrate`.
+    windows
+        Kept alive: a workspace is found by the object.
     signal
         Of the last run.
-    given
-        Inputs at the samples (samples, inputs); none if its plan is not kept.
     kept
-        What other loops have made of the run; their spaces last as long.
+        What other loops have made of the run; their arrays last as long.
     """
 
-    __slots__ = ("arguments", "call", "given", "kept", "signal")
+    __slots__ = ("buffer", "call", "kept", "output", "signal", "start", "windows")
 
-    def __init__(self, plan: Plan, drive: Drive) -> None:
-        self.arguments, self.given = plan.fresh(drive)
-        self.call, self.signal = plan.loop.prepared(*self.arguments), drive.signal
+    def __init__(
+        self,
+        call: Prepared,
+        start: np.ndarray,
+        output: Output,
+        buffer: np.ndarray,
+        windows: ProjectionWindows,
+        signal: Ready,
+    ) -> None:
+        self.call, self.start, self.output, self.buffer = call, start, output, buffer
+        self.windows, self.signal = windows, signal
         self.kept: dict[str, Any] = {}
 
     def take(self, drive: Drive) -> None:
@@ -117,64 +141,7 @@ class Space:
         self.call.give("signal", drive.signal)
         self.call.give("spans", drive.spans)
         self.signal = drive.signal
-        if self.given is not None:
-            self.given[:] = drive.inputs
-
-
-class Plan(NamedTuple):
-    """What runs of a system over the same output times share.
-
-    Attributes
-    ----------
-    arguments
-        Those that are not shared are empty.
-    sizes
-        Numbers of states, of floats of scratch space and of integers.
-    whole
-        Whether it is over whole maneuvers, and kept.
-    points
-        Whether its runs are recorded at points.
-    windows
-        Kept alive: a plan is found by the object.
-    spare
-        Spaces that no run holds.
-    """
-
-    loop: Loop
-    arguments: RunArguments
-    sizes: tuple[int, int, int]
-    whole: bool
-    points: bool
-    windows: ProjectionWindows
-    spare: list[Space]
-
-    def fresh(self, drive: Drive) -> tuple[RunArguments, np.ndarray | None]:
-        """Arguments with arrays of their own, the start still to be written; inputs of a space."""
-        (n, floats, integers), output = self.sizes, self.arguments.output
-        size, given = len(output.samples), drive.inputs.copy() if self.whole else None
-        counts = np.empty(len(DYNAMIC_COUNTS), dtype=np.int64)
-        output = output._replace(path=np.empty((size, n)), counts=counts)
-        if self.points and given is not None:
-            moments, places = np.empty(size), np.empty((size, 2))
-            output = output._replace(
-                given=given, inputs=np.empty(given.shape), moments=moments, places=places
-            )
-        arguments = self.arguments._replace(
-            start=np.empty(n),
-            signal=drive.signal,
-            spans=drive.spans,
-            output=output,
-            buffer=np.empty(floats),
-            integers=np.empty(integers, dtype=np.int64),
-        )
-        return arguments, given
-
-    def spare_space(self) -> Space | None:
-        """A space that no other run holds, in whichever thread; none if there is none left."""
-        try:
-            return self.spare.pop()
-        except IndexError:
-            return None
+        self.output.given[:] = drive.inputs
 
 
 class Run:
@@ -194,11 +161,11 @@ class Run:
         Time spent in the compiled loop.
     failure
         Why the run has ended early, empty if it has not.
-    plan, space
+    space
         Where its arrays are from; none of a path that is given.
     """
 
-    __slots__ = ("counts", "failure", "plan", "rows", "seconds", "space", "times", "whole")
+    __slots__ = ("_left", "counts", "failure", "rows", "seconds", "space", "times", "whole")
 
     def __init__(
         self,
@@ -207,11 +174,11 @@ class Run:
         counts: np.ndarray,
         seconds: float,
         failure: str,
-        held: tuple[Plan, Space] | None = None,
+        space: Workspace | None = None,
+        left: Callable[[Workspace], None] | None = None,
     ) -> None:
         self.times, self.whole, self.rows, self.counts = times, whole, len(whole), counts
-        self.seconds, self.failure = seconds, failure
-        self.plan, self.space = held or (None, None)
+        self.seconds, self.failure, self.space, self._left = seconds, failure, space, left
         places = self.places
         if len(places):
             reached = int(places[:, 0].argmax()) if failure else -1
@@ -227,7 +194,7 @@ class Run:
     @property
     def places(self) -> np.ndarray:
         """How the samples follow from points (samples, 2); empty (0, 2) if they are these."""
-        return NO_POINTS[-1] if self.space is None else self.space.arguments.output.places
+        return NO_POINTS[-1] if self.space is None else self.space.output.places
 
     @property
     def points(self) -> Points | None:
@@ -240,15 +207,12 @@ class Run:
     def recorded_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Times (s) and inputs of its rows, or of more; those at the samples are given.
 
-        Of a space that is used again they always stand in the same place.
+        Of a workspace that is used again they always stand in the same place.
         """
-        if self.space is None:
+        if self.space is None or self._left is None:
             return self.times, inputs
-        if not len(self.places):
-            own = self.space.given
-            return self.times, inputs if own is None else own
-        output = self.space.arguments.output
-        return output.moments, output.inputs
+        output = self.space.output
+        return (output.moments, output.inputs) if len(self.places) else (self.times, output.given)
 
     @property
     def kept(self) -> dict[str, Any]:
@@ -257,6 +221,6 @@ class Run:
 
     def give_back(self) -> None:
         """Leave its arrays to the next run: nothing may read them any more."""
-        if self.plan is not None and self.space is not None:
-            self.plan.spare.append(self.space)
-            self.plan = self.space = None
+        if self._left is not None and self.space is not None:
+            self._left(self.space)
+            self.space = self._left = None
