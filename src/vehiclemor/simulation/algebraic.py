@@ -325,6 +325,7 @@ class AlgebraicModel(Model):
             seconds=seconds,
             status=status,
             message=message,
+            names=self.outputs,
         )
 
     def loop(self, name: str, *further: str) -> Loop:

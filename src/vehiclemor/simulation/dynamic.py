@@ -5,30 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import number
-from vehiclemor.codegen.loops import Prepared, Ready, cache_lines, ready
-from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
     left_validity,
     lifted_wheels,
-    limits_of,
     loop_array,
 )
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.integrators.catalogue import integrator
-from vehiclemor.simulation.integrators.structures import Observer
 from vehiclemor.simulation.kernel_derivatives import By, chosen
 from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.recording import Recorder
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run, Solver
@@ -37,27 +33,6 @@ from vehiclemor.simulation.workspaces import Run, Solver
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
 # Tolerance of the full-order runs that others are measured against.
 REFERENCE_TOLERANCE = 1e-9
-
-
-class Delivery(NamedTuple):
-    """The loop that delivers a run, packed once for all runs in the same space.
-
-    Attributes
-    ----------
-    states, inputs
-        Where the run is recorded.
-    first
-        Where the loop writes when each limited output is first out of its limits.
-    rows, result
-        Words of the number of states and of the address of the result.
-    """
-
-    states: np.ndarray
-    inputs: np.ndarray
-    first: np.ndarray
-    call: Prepared
-    rows: int
-    result: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,83 +274,37 @@ class DynamicModel(Model):
         trust: Trust | None = None,
     ) -> Trajectory:
         """See `recorded`; a remark is added to what there is to remark."""
-        states, outputs, first = self._delivered(run, inputs, states)
-        (names, *_), times = self.limits, run.times
-        message = run.failure
-        if not message:
-            of_outputs = first[: len(names)]
-            message, sample = left_validity(self.definition, names, of_outputs, times, outputs)
+        recorder, times, n = self._recorder, run.times, len(self.coordinates)
+        recording, first = recorder.recorded(run, inputs, states)
+        watched, message, sample = len(recorder.names), run.failure, len(times)
+        if message or min(first[:watched], default=sample) < sample:
+            table = recording.table()
+            recording = recording._replace(points=table, places=run.places[:0])
             if message:
+                # From the failure on there are no numbers, which says nothing of limits.
+                sample = int(np.isfinite(table[:, : 2 * n]).all(axis=1).sum())
+                first = [len(times) if number == sample else number for number in first]
+            else:
+                names, outputs = recorder.names, table[:, 2 * n :]
+                found = left_validity(self.definition, names, first[:watched], times, outputs)
+                message, sample = found
                 # What follows means nothing.
-                states[sample:], outputs[sample:] = np.nan, np.nan
-        lifted = lifted_wheels(self.definition.loads, first[len(names) :], times)
-        n = len(self.coordinates)
+                table[sample:] = np.nan
+        lifted = lifted_wheels(self.definition.loads, first[watched:], times)
         found = Trajectory.of(
             time=times,
             inputs=inputs,
-            coordinates=states[:, :n],
-            speeds=states[:, n:],
-            outputs=outputs,
+            recording=recording,
+            names=self.outputs,
             counts=dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
             seconds=run.seconds,
             status="diverged" if message else "ok",
             message=message,
             remark=f"{lifted}; {remark}" if lifted and remark else lifted or remark,
+            trust=trust,
         )
-        return found if trust is None else found.judged(trust)
+        return found.judged(trust) if trust is not None and trust.reason else found
 
     @cached_property
-    def limits(self) -> tuple[list[str], np.ndarray, np.ndarray]:
-        """What outputs are watched for, see `limits_of`."""
-        return limits_of(self.definition)
-
-    @cached_property
-    def _observers(self) -> dict[int, Ready]:
-        return {}
-
-    def observer(self, lanes: int) -> Ready:
-        """How outputs follow from states, so many samples at once."""
-        if lanes not in self._observers:
-            kernel = np.array([address_of(self.kernels, "outputs", lanes)], dtype=np.int64)
-            states = 2 * len(self.coordinates)
-            observer = Observer(kernel, self.constants, *self.limits[1:], states)
-            self._observers[lanes] = ready(observer)
-        return self._observers[lanes]
-
-    def _delivered(
-        self, run: Run, inputs: np.ndarray, states: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-        """States and outputs at the samples, and when each output is first out of its limits.
-
-        That is the number of all samples where it never is.
-        """
-        samples, n, m = len(run.times), 2 * len(self.coordinates), len(self.outputs)
-        held, at = run.kept.get("delivered"), run.recorded_at(inputs)[1]
-        if held is None or held.states is not states or held.inputs is not at:
-            held = run.kept["delivered"] = self._delivery(run, at, states)
-        # Rows of whole vectors.
-        width = -(-(n + m) // LANES) * LANES
-        result, address = cache_lines(samples, width)
-        words = held.call.words
-        words[held.rows], words[held.result] = run.rows, address
-        held.call()
-        found = held.first.tolist()
-        whole, outputs = result[:, :n], result[:, n : n + m]
-        if run.failure:
-            # From the failure on there are no numbers, which says nothing of limits.
-            reached = int(np.isfinite(whole).all(axis=1).sum())
-            found = [samples if sample == reached else sample for sample in found]
-        return whole, outputs, found
-
-    def _delivery(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> Delivery:
-        """The loop of `_delivered`, to be given a result; inputs are where the run is recorded."""
-        n, samples = 2 * len(self.coordinates), len(run.times)
-        width = -(-(n + len(self.outputs)) // LANES) * LANES
-        observer = self.observer(LANES if run.rows >= LANES else 1)
-        first = np.empty(len(self.limits[1]), dtype=np.int64)
-        scratch = cache_lines(len(states) + 1, width)[0].reshape(-1)
-        loop, result = path_loops()["delivered"], np.empty((0, width))
-        call = loop.prepared(states, inputs, run.places, observer, scratch, result, first)
-        rows, into = call.address("states") + 1, call.address("result")
-        call.words[into + 1] = samples
-        return Delivery(states, inputs, first, call, rows, into)
+    def _recorder(self) -> Recorder:
+        return Recorder(self)

@@ -26,7 +26,7 @@ from vehiclemor.simulation.integrators.structures import (
 OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
 INNER = 1.0 / ((NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0))
 
-INLINED = ("read_point", "cubics_within", "point_of", "note_outside")
+INLINED = ("read_point", "weights_of", "entry", "cubics_within", "point_of", "note_outside")
 
 
 def kernel_path(
@@ -49,64 +49,67 @@ def lane_path(
     return 0
 
 
-def delivered(
+def observed(
     states: Matrix,
     inputs: Matrix,
     places: Matrix,
     observer: Observer,
-    scratch: Vector,
-    result: Matrix,
+    space: Vector,
     first: IntVector,
 ) -> Int:
-    """States and outputs side by side at the samples of a run, from its states at points.
+    """States and outputs side by side at the points of a run: the space, as a table.
 
-    Where there are no places the points are the samples.  The first sample at which each limited
-    output is outside of its range is found too, if any.
+    The first sample at which each limited output is outside of its range is found too, if any; else
+    it is the number of samples.
 
     Parameters
     ----------
     states
         At the points (points, n or more); only the first n are read.
     places
-        See `structures.Output`.
-    scratch
-        As long as a result for the points.
-    result
-        Rows of n states, of the outputs and of what fills up to a whole number of vectors.
+        See `structures.Output`; where there are none the points are the samples.
+    space
+        As long as the table and a row more.
     """
-    samples = len(result)
-    points = matrix(scratch, 0, len(states), result.shape[1])
-    observed(states, inputs, observer, scratch, points)
-    for k in range(len(first)):
-        first[k] = samples
-    known, within = -1, False
-    for sample in range(samples):
-        row, z = point_of(places, sample)
-        read_point(points, row, z, result[sample])
-        if z < 0.0:
-            within = False
-        elif row != known:
-            within = cubics_within(points, row, observer)
-        known = row
-        if not within:
-            note_outside(result[sample], observer, sample, samples, first)
-    return 0
-
-
-def observed(states, inputs, observer, scratch, points):
-    """States and outputs side by side at the points, the scratch space."""
-    n, width = observer.states, points.shape[1]
+    n, width = observer.states, observer.width
+    points = matrix(space, 0, len(states), width)
     for row in range(len(states)):
         for i in range(n):
             points[row, i] = states[row, i]
         # What happens to stand behind the outputs may take a hundred times as long to add.
         for i in range(max(n, width - LANES + 1), width):
             points[row, i] = 0.0
-    outputs = matrix(scratch, n, len(states), width)
+    outputs = matrix(space, n, len(states), width)
     if len(states) >= LANES:
         lane_path(states, inputs, observer.kernel, observer.constants, outputs)
     else:
         kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
+    samples = len(places) if len(places) else len(states)
+    for k in range(len(first)):
+        first[k] = samples
+    known, within = -1, False
+    for sample in range(samples):
+        row, z = point_of(places, sample)
+        if z < 0.0:
+            within = False
+        elif row != known:
+            within = cubics_within(points, row, observer)
+        known = row
+        if not within:
+            note_outside(points, row, z, observer, sample, samples, first)
+    return 0
+
+
+def sampled(points: Matrix, places: Matrix, columns: IntVector, result: Matrix) -> Int:
+    """Some columns of the table at the samples; all, in whole vectors, where none are named."""
+    for sample in range(len(result)):
+        row, z = point_of(places, sample)
+        if not len(columns):
+            read_point(points, row, z, result[sample])
+        else:
+            for k in range(len(columns)):
+                result[sample, k] = entry(points, row, z, columns[k])
+    return 0
 
 
 def point_of(places, sample):
@@ -116,18 +119,36 @@ def point_of(places, sample):
     return sample, -1.0
 
 
-def note_outside(row, observer, sample, samples, first):
+def note_outside(points, row, z, observer, sample, samples, first):
     """Note which limited outputs are outside of their ranges for the first time."""
     for k in range(len(first)):
-        value = row[observer.states + observer.limited[k]]
+        value = entry(points, row, z, observer.states + observer.limited[k])
         # What is no number lies outside too.
         inside = observer.ranges[k, 0] <= value <= observer.ranges[k, 1]
         if not inside and first[k] == samples:
             first[k] = sample
 
 
+def weights_of(z):
+    """Weights of the points of a step where its part z has passed: Lagrange's polynomials."""
+    a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
+    return b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
+
+
+def entry(points, row, z, column):
+    """A column of the table at a point of a run, or where the part z of a step has passed."""
+    if row < 0:
+        return math.nan
+    if z < 0.0:
+        return points[row, column]
+    p, q, r, s = weights_of(z)
+    return (p * points[row, column] + q * points[row + 1, column]) + (
+        r * points[row + 2, column] + s * points[row + 3, column]
+    )
+
+
 def read_point(points, row, z, into):
-    """What is known at a point of a run, or where the part z of a step has passed."""
+    """All columns of the table, as `entry`."""
     if row < 0:
         for i in range(len(into)):
             into[i] = math.nan
@@ -135,10 +156,7 @@ def read_point(points, row, z, into):
         for i in range(len(into)):
             into[i] = points[row, i]
     else:
-        # Lagrange's polynomials at the points.
-        a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
-        p, q, r, s = b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
-        mixed_rows(points[row:], (p, q, r, s), into)
+        mixed_rows(points[row:], weights_of(z), into)
 
 
 def cubics_within(points, row, observer):

@@ -74,5 +74,5 @@ def address_of(kernels: Kernels, name: str, lanes: int = 1) -> int:
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    entries = "kernel_path", "lane_path", "delivered", "jacobian_at"
+    entries = "kernel_path", "lane_path", "observed", "sampled", "jacobian_at"
     return loops(PATH_LOOPS, entries)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.sizes import shaped
 
@@ -81,6 +82,8 @@ class Trajectory(ShortRepr):
         What else there is to know, such as wheels that leave the ground.
     trust
         What a reduced model tells of this run; none of a model that is the full one.
+    names
+        Of the outputs.
     """
 
     time: np.ndarray
@@ -94,6 +97,7 @@ class Trajectory(ShortRepr):
     message: str = ""
     remark: str = ""
     trust: Trust | None = None
+    names: tuple[str, ...] = ()
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if histories are of other samples than the times."""
@@ -104,10 +108,39 @@ class Trajectory(ShortRepr):
 
     @classmethod
     def of(cls, **fields: Any) -> Trajectory:
-        """A trajectory of these fields, in a third of the time that the constructor takes."""
+        """A trajectory of these fields, in a third of the time that the constructor takes.
+
+        A `recording` in the place of coordinates, speeds and outputs gives these when one of them
+        is first read.
+        """
         found = object.__new__(cls)
         found.__dict__.update(fields)
         return found
+
+    def __getattr__(self, name: str) -> Any:
+        """Histories that nobody has read so far, see `of`."""
+        if name not in ("coordinates", "speeds", "outputs") or "recording" not in self.__dict__:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        self.__dict__.update(self.__dict__.pop("recording").histories())
+        return self.__dict__[name]
+
+    def __getitem__(self, output: str) -> np.ndarray:
+        """History (samples,) of an output, without the others.
+
+        Raises
+        ------
+        InputError
+            If there is no such output.
+        """
+        number = self.names.index(choice("output", output, self.names))
+        if "recording" in self.__dict__:
+            return self.__dict__["recording"].output(number)
+        return self.outputs[:, number]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All fields, read."""
+        assert self.outputs is not None
+        return self.__dict__
 
     @property
     def finished(self) -> bool:

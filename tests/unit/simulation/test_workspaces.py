@@ -116,12 +116,16 @@ def test_limits_are_watched_between_the_points_of_a_step(rng):
         expected = np.concatenate([states[0], np.polyval(cubic, parts), states[5]])
         low, high = np.sort(rng.normal(scale=4.0, size=2))
         ranges = np.array([[low, high], [-np.inf, 2.5]])
-        observer = Observer(address, np.zeros(1), np.array([0, 1]), ranges, 1)
+        observer = Observer(address, np.zeros(1), np.array([0, 1]), ranges, 1, 8)
         first, result = np.empty(2, dtype=np.int64), cache_lines(43, 8)[0]
-        scratch = np.empty(7 * 8)
-        path_loops()["delivered"](
-            states, np.zeros((6, 1)), places, observer, scratch, result, first
+        table = np.empty((7, 8))
+        path_loops()["observed"](
+            states, np.zeros((6, 1)), places, observer, table.reshape(-1), first
         )
+        path_loops()["sampled"](table, places, np.zeros(0, dtype=np.int64), result)
+        single = np.empty((43, 2))
+        path_loops()["sampled"](table, places, np.array([2, 0]), single)
+        np.testing.assert_allclose(single, result[:, [2, 0]], rtol=1e-12)
         if np.isfinite(states).all():
             np.testing.assert_allclose(result[:, 0], expected, atol=1e-12)
         for k, (a, b) in enumerate(ranges):

@@ -201,6 +201,7 @@ class PathMapModel(ShortRepr):
             status=status,
             message=message,
             trust=Trust(indicator, until, reason),
+            names=model.outputs,
         )
 
     def _outside(self, inputs: np.ndarray) -> str:

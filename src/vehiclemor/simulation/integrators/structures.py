@@ -201,8 +201,8 @@ class Observer(NamedTuple):
         Of the kernel.
     limited, ranges
         Numbers (limits,) of outputs, and their smallest and largest values (limits, 2).
-    states
-        Number of states.
+    states, width
+        Number of states, and length of a row of these and the outputs: whole vectors.
     """
 
     kernel: IntVector
@@ -210,6 +210,7 @@ class Observer(NamedTuple):
     limited: IntVector
     ranges: Matrix
     states: Int
+    width: Int
 
 
 class Problem(NamedTuple):

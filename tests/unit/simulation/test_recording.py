@@ -1,0 +1,65 @@
+"""Histories are made when they are read, and are the same however they are read."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.registry import component
+
+DYNAMIC = ("independent_suspension_vehicle", "high_fidelity_vehicle")
+
+
+def run(name: str, solver: str = "ros34pw2", amplitude: float = 1.0):
+    model = vm.model(name)
+    maneuver = component("maneuver", model.definition.maneuver).perturbed(1.0, amplitude)
+    return model.simulate(maneuver, solver=solver, tolerance=1e-4)
+
+
+@pytest.mark.parametrize("solver", ["dopri5", "ros34pw2"])
+@pytest.mark.parametrize("name", DYNAMIC)
+def test_one_output_is_that_of_all(name, solver):
+    one, all_of_them = run(name, solver), run(name, solver)
+    whole = all_of_them.outputs
+    for number, output in enumerate(one.names):
+        np.testing.assert_allclose(one[output], whole[:, number], rtol=1e-12, atol=1e-300)
+    np.testing.assert_array_equal(one.outputs, whole)
+    np.testing.assert_array_equal(one["yaw"], one.outputs[:, one.names.index("yaw")])
+
+
+def test_what_is_read_late_is_of_its_own_run():
+    first = run("independent_suspension_vehicle")
+    second = run("independent_suspension_vehicle", amplitude=0.5)
+    again = run("independent_suspension_vehicle")
+    np.testing.assert_array_equal(first.outputs, again.outputs)
+    assert not np.array_equal(first.outputs, second.outputs)
+
+
+def test_copies_hold_the_same_histories():
+    kept = run("independent_suspension_vehicle")
+    for copy in (pickle.loads(pickle.dumps(kept)), replace(kept, remark="seen")):  # noqa: S301
+        np.testing.assert_array_equal(copy.states, kept.states)
+        np.testing.assert_array_equal(copy["pitch"], kept["pitch"])
+
+
+def test_an_unknown_output_is_refused():
+    for name in (*DYNAMIC, "double_wishbone"):
+        with pytest.raises(InputError, match="steer_angle"):
+            run(name, "newton" if name == "double_wishbone" else "ros34pw2")["steer_angle"]
+
+
+def test_from_where_a_run_has_left_the_model_on_there_are_no_numbers():
+    model = vm.model("independent_suspension_vehicle")
+    wild = component("maneuver", "lane_change").perturbed(1.0, 8.0)
+    with pytest.raises(ConvergenceError) as caught:
+        model.simulate(wild, solver="ros34pw2", tolerance=1e-4)
+    found = caught.value.trajectory
+    finite = np.isfinite(found.states).all(axis=1)
+    left = int(finite.argmin())
+    assert 0 < left < len(finite)
+    assert not finite[left:].any()
+    assert np.isnan(found["yaw"][left:]).all()
+    assert np.isfinite(found["yaw"][:left]).all()
