@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import matplotlib
@@ -54,14 +55,16 @@ def pytest_configure(config: pytest.Config) -> None:
             process.wait()
 
 
-# First: the plugin reads the marks in its own hook.
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Where tests run in several processes, keep those together that share long computations."""
-    for item in items:
-        folder, _, rest = item.nodeid.removeprefix("tests/").partition("/")
-        shared = folder if folder == "report" else f"{folder}/{rest.partition('::')[0]}"
-        item.add_marker(pytest.mark.xdist_group(shared))
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return "report" if nodeid.startswith("tests/report/") else nodeid.partition("::")[0]
+
+    return ByFile(config, log)
 
 
 @pytest.fixture(scope="session")

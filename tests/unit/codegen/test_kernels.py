@@ -70,21 +70,20 @@ def test_another_text_compiler_or_processor_is_another_file(folder, monkeypatch)
 
 
 def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
-    identity = cache.compiler_identity.__wrapped__
-    before = identity()
-    for package in cache.COMPILER_PACKAGES:
-        with monkeypatch.context() as patch:
-            real = cache.version
-            patch.setattr(
-                cache, "version", lambda n, p=package, r=real: "0.0.1" if n == p else r(n)
-            )
-            assert identity() != before
     import llvmlite.binding as llvm
 
+    identity, real = cache.compiler_identity.__wrapped__, cache.version
+    before = identity()
     features = SimpleNamespace(flatten=lambda: "-avx2")
-    for function, value in (("get_host_cpu_name", "z80"), ("get_host_cpu_features", features)):
+    changes = [(llvm, "get_host_cpu_name", lambda: "z80")]
+    changes += [(llvm, "get_host_cpu_features", lambda: features)]
+    changes += [
+        (cache, "version", lambda n, p=package: "0.0.1" if n == p else real(n))
+        for package in cache.COMPILER_PACKAGES
+    ]
+    for where, name, changed in changes:
         with monkeypatch.context() as patch:
-            patch.setattr(llvm, function, lambda value=value: value)
+            patch.setattr(where, name, changed)
             assert identity() != before
     assert identity() == before
 

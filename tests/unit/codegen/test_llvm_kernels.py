@@ -1,5 +1,6 @@
 """Machine code written from a kernel's text computes what the text says."""
 
+import ctypes
 import math
 
 import numpy as np
@@ -10,7 +11,6 @@ from hypothesis import strategies as st
 from llvmlite import ir
 
 from tests.unit.programs import run
-from vehiclemor.codegen import exponential
 from vehiclemor.codegen.kernel_statements import KernelText
 from vehiclemor.codegen.kernel_text import kernel_source
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
@@ -105,29 +105,6 @@ def test_batches_with_and_without_padding(count, function):
     np.testing.assert_allclose(result_of(program, values), expected, rtol=1e-13, atol=1e-15)
 
 
-def test_exponential_at_all_sizes_and_beyond_the_range_of_floats(rng):
-    kernel = compiled("def edge(_x, _result):\n    _result[0] = math.exp(_x[0])\n")
-    result, numbers = np.empty(1), [*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), 0.0]
-    numbers += [-np.inf, -1e300, -746.0, -740.0, -708.5, 709.7, 711.0, 1e300, np.inf, np.nan]
-    for number in numbers:
-        kernel(np.array([number]), result)
-        with np.errstate(all="ignore"):
-            np.testing.assert_allclose(result[0], np.exp(number), rtol=1e-15, atol=5e-324)
-        if abs(number) <= 700.0:
-            assert exponential.exp(number) == pytest.approx(result[0], rel=5e-16)
-
-
-def test_arctangent_and_sine_alone_at_all_sizes(rng):
-    lines = "    s, c = sincos_one(_x[0])\n" + "".join(
-        f"    _result[{k}] = {value}\n" for k, value in enumerate(("s", "c", "atan(_x[0])"))
-    )
-    kernel, result = compiled(f"def alone(_x, _result):\n{lines}"), np.empty(3)
-    for x in (*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), -0.0, 5e-324, math.nan):
-        kernel(np.array([x]), result)
-        expected = [math.sin(x), math.cos(x), math.atan(x)]
-        np.testing.assert_allclose(result, expected, rtol=5e-16, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     "line",
     [
@@ -187,3 +164,52 @@ def test_weighted_sums_are_products_with_the_coefficients(targets, rng):
     # All that the vectors load must be there.
     with pytest.raises(TypeError, match="sums: constants must be"):
         kernel(x, np.zeros(first + terms * width - 1), result)
+
+
+# Statements on whole vectors
+
+
+def stepped(lines: str, size: int, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    result = np.full(size + 1, 7.0)
+    compiled(f"def step(_x, _u, _result):\n    {lines}\n")(x, u, result)
+    assert result[-1] == 7.0
+    return result[:-1]
+
+
+@pytest.mark.parametrize("n", [1, 4, 7])
+def test_vectors_are_combined_and_magnitudes_added(n, rng):
+    x, u = rng.normal(size=3 * n), rng.normal(size=1)
+    lines = f"combine(_result[0], {n}, 2.0, _x[0], _u[0], _x[{n}], -0.5, _x[{2 * n}])"
+    a, b, c = x.reshape(3, n)
+    np.testing.assert_allclose(stepped(lines, n, x, u), 2.0 * a + u * b - 0.5 * c, rtol=1e-14)
+    found = stepped(f"magnitudes(_result[0], {n}, _x[0], _x[{n}])", n, x, x)
+    np.testing.assert_array_equal(found, np.abs(a) + np.abs(b))
+
+
+@pytest.mark.parametrize(
+    ("n", "columns"), [(4, ()), (8, (5,)), (8, (0, 2, 7)), (28, range(0, 28, 2))]
+)
+def test_a_product_takes_some_columns_and_keeps_other_places(n, columns, rng):
+    rows, x = rng.normal(size=(len(columns), n)), rng.normal(size=n)
+    kept = tuple(i for i in range(n) if i not in columns)
+    lines = f"product(_result[0], {n}, _u[0], _x[0], {tuple(columns)}, {kept}, 0.25)"
+    expected = x[list(columns)] @ rows
+    expected[list(kept)] += 0.25 * x[list(kept)]
+    np.testing.assert_allclose(stepped(lines, n, x, np.append(rows, 0.0)), expected, atol=1e-13)
+
+
+def test_a_kernel_executes_another_by_its_address():
+    signature = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4)
+
+    def body(x, u, constants, result):
+        result[0] = x[0] + 10.0 * u[0] + 100.0 * constants[0]
+
+    inner = signature(body)
+    head = "def outer(_x, _u, _constants, _result, _kernels):"
+    text = f"{head}\n    execute(_kernels[0], _x[1], _u[2], _constants[0], _result[1])\n"
+    kernels = Kernels(kernel_sources(text))
+    outer = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(kernels.address("outer"))
+    x, result = np.array([1.0, 2.0, 3.0]), np.zeros(3)
+    addresses = np.array([ctypes.cast(inner, ctypes.c_void_p).value], dtype=np.int64)
+    outer(*(array.ctypes.data for array in (x, x, x, result, addresses)))
+    assert result.tolist() == [0.0, 2.0 + 30.0 + 100.0, 0.0]

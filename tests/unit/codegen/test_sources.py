@@ -1,15 +1,20 @@
-"""Digests of plug-ins follow all the source that they are made of."""
+"""Derivations are kept under digests that follow all the source that they are made of."""
 
 import importlib
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from tests.unit import standard_problems
+from vehiclemor.codegen import derivation as kept
+from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import derivation
 from vehiclemor.codegen.sources import plug_in_digest
 from vehiclemor.errors import PlugInError
+from vehiclemor.multibody import definition
 
 EQUATIONS = "def derive():\n    return {}\n"
 PLUG_IN = """
@@ -54,32 +59,33 @@ def digest(component: object) -> str:
     return plug_in_digest((component,))
 
 
-@pytest.mark.parametrize("extra", [{}, {"plug/__init__.py": ""}], ids=["namespace", "package"])
-def test_a_second_file_of_a_package_counts(fresh, extra):
-    files = {"plug/model.py": "NAME = 'plug'\n", **extra}
-    first = digest(fresh("plug.model", {**files, "plug/equations.py": EQUATIONS.format(1)}))
-    again = digest(fresh("plug.model", {**files, "plug/equations.py": EQUATIONS.format(1)}))
-    other = digest(fresh("plug.model", {**files, "plug/equations.py": EQUATIONS.format(2)}))
-    assert first == again != other
+MODEL = {"plug/model.py": "NAME = 'plug'\n"}
+PACKAGED = {**MODEL, "plug/__init__.py": ""}
 
 
 @pytest.mark.parametrize(
-    "how", ["import equations_of_single", "from equations_of_single import derive"]
-)
-def test_a_helper_beside_a_single_file_counts(fresh, how):
-    files = {"single_model.py": f"{how}\nNAME = 'single'\n"}
-    helper = "equations_of_single.py"
-    first = digest(fresh("single_model", {**files, helper: EQUATIONS.format(1)}))
-    other = digest(fresh("single_model", {**files, helper: EQUATIONS.format(22)}))
-    assert first != other
+    ("module", "files", "counted"),
+    [
+        ("plug.model", MODEL, "plug/equations.py"),
+        ("plug.model", PACKAGED, "plug/equations.py"),
+        ("single", {"single.py": "import equations_of_single\n"}, "equations_of_single.py"),
+        ("single", {"single.py": "from equations_of_single import derive\n"},
+         "equations_of_single.py"),
+    ],
+)  # fmt: skip
+def test_all_files_of_a_plug_in_count(fresh, module, files, counted):
+    first, again, other = (
+        digest(fresh(module, {**files, counted: EQUATIONS.format(number)})) for number in (1, 1, 22)
+    )
+    assert first == again != other
 
 
 def test_an_object_counts_by_the_source_of_its_functions(fresh):
-    def component(number: int) -> SimpleNamespace:
+    found = set()
+    for number in (1, 22):
         module = fresh("object_model", {"object_model.py": EQUATIONS.format(number)})
-        return SimpleNamespace(derive=module.derive)
-
-    assert digest(component(1)) != digest(component(22))
+        found.add(digest(SimpleNamespace(derive=module.derive)))
+    assert len(found) == 2
 
 
 WRITTEN = '''
@@ -141,3 +147,87 @@ def test_what_was_edited_since_it_was_loaded_gives_no_results(fresh, tmp_path):
     path.write_text(files["edited/method.py"])
     importlib.reload(module)
     assert plug_in_digest([SimpleNamespace(fit=module.fit)]) == first != second
+
+
+# Of this package
+
+
+def test_a_digest_follows_the_source_files_of_its_layers_alone(tmp_path, monkeypatch):
+    package = tmp_path / "package"
+    for name in ("models/a.py", "models/parts/b.py", "symbolic/c.py", "other.py"):
+        (package / name).parent.mkdir(parents=True, exist_ok=True)
+        (package / name).write_text(f"'{name}'; 1\n")
+    monkeypatch.setattr(sources, "PACKAGE", package)
+
+    def now() -> str:
+        return sources.source_digest(("models",), ("other.py",))
+
+    seen = {now()}
+    (package / "symbolic" / "c.py").write_text("changed\n")
+    (package / "models" / "notes.txt").write_text("no source\n")
+    assert seen == {now()}
+    for name in ("models/a.py", "models/parts/b.py", "other.py", "models/new.py"):
+        with (package / name).open("a") as file:
+            file.write("changed\n")
+        seen.add(now())
+    (package / "models" / "new.py").rename(package / "models" / "renamed.py")
+    seen.add(now())
+    (package / "models" / "a.py").unlink()
+    seen.add(now())
+    assert len(seen) == 7
+    assert sources.source_digest(("models", "symbolic"), ("other.py",)) not in seen
+
+
+def test_components_of_the_package_are_counted_by_their_layers_alone():
+    none = plug_in_digest(())
+    assert digest(definition.ModelDefinition) == none != digest(standard_problems)
+    # Changing a vehicle, the tape or the emitter changes the digest of a derivation.
+    files = {p.name for layer in kept.LAYERS for p in (sources.PACKAGE / layer).rglob("*.py")}
+    assert {"equations.py", "tape.py", "kernel_text.py", "llvm_kernels.py"} <= files
+
+
+# Derivations
+
+
+@pytest.fixture
+def derived(tmp_path, monkeypatch):
+    """Derives the plug-in model as a process of its own does; how often it was, by its runs."""
+    monkeypatch.setenv("VEHICLEMOR_CACHE", str(tmp_path))
+    made, real = [], standard_problems.derive
+    monkeypatch.setattr(standard_problems, "derive", lambda: made.append(1) or real())
+
+    def fetch(name: str = "standard_problems"):
+        kept._read.cache_clear()
+        return derivation(name, standard_problems.derive), len(made)
+
+    return fetch
+
+
+def test_a_model_is_derived_once_and_read_back_as_it_was(derived, tmp_path, monkeypatch):
+    (first, once), (second, twice) = derived(), derived()
+    assert once == twice == 1
+    assert first == second
+    assert first is not second
+    # Another source, SymPy or name is another one.
+    for number, (function, value) in enumerate((("source_digest", "other"), ("version", "0.1")), 2):
+        with monkeypatch.context() as patch:
+            patch.setattr(kept, function, lambda *_, value=value: value)
+            assert [derived()[1], derived()[1]] == [number, number]
+    assert derived("other") == (first, 4)
+    # All are kept, and the first one is still that of the source at hand.
+    assert len(list((tmp_path / "derivations").iterdir())) == 4
+    assert derived()[1] == 4
+
+
+def test_what_cant_be_derived_leaves_nothing(derived, tmp_path, monkeypatch):
+    monkeypatch.setattr(standard_problems, "derive", lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        derived()
+    assert not list(tmp_path.glob("derivations/*"))
+
+
+def test_the_source_read_back_computes_what_the_model_says(standard):
+    model = standard(rate=3.0, growth=0.5)
+    x, u = np.array([0.3, -0.7, 0.2, 1.1]), np.array([0.4, 0.9, -0.6])
+    expected = [0.2, 3.0 * (0.9 + 0.7) - 0.6, 0.4 - np.sin(0.3), 0.5 * 1.1**2]
+    np.testing.assert_allclose(model.derivative(x, u), expected, rtol=1e-15)

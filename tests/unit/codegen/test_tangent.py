@@ -92,18 +92,20 @@ def test_what_does_not_depend_on_the_argument_leaves_no_statement():
     assert tangent(_source(BATCHES), "_x", 2, 2).moving.tolist() == [0, 1]
 
 
-def test_at_a_kink_it_is_the_derivative_towards_larger_arguments():
-    text = "def kink(_x, _work, _result):\n    _result[0] = abs(_x[0]) + _x[0]\n"
-    found = tangent(_source(text), "_x", 1, 1)
-    slopes = [found.jacobian((np.array([x]),)).item() for x in (-1.0, 0.0, 1.0)]
-    assert slopes == [0.0, 2.0, 2.0]
-
-
-def test_a_norm_that_is_zero_has_the_derivative_between_its_slopes():
-    text = "def norm(_x, _work, _result):\n    _result[0] = math.sqrt(_x[0]*_x[0] + _x[1]*_x[1])\n"
-    found = tangent(_source(text), "_x", 1, 2)
-    assert found.jacobian((np.zeros(2),)).tolist() == [[0.0, 0.0]]
-    np.testing.assert_allclose(found.jacobian((np.array([3.0, -4.0]),)), [[0.6, -0.8]])
+@pytest.mark.parametrize(
+    ("result", "at", "slopes"),
+    [
+        # At a kink the derivative towards larger arguments.
+        ("abs(_x[0]) + _x[1]", (-1.0, 0.0), (-1.0, 1.0)),
+        ("abs(_x[0]) + _x[1]", (0.0, 0.0), (1.0, 1.0)),
+        # Of a norm that is zero that between its slopes.
+        ("math.sqrt(_x[0]*_x[0] + _x[1]*_x[1])", (0.0, 0.0), (0.0, 0.0)),
+        ("math.sqrt(_x[0]*_x[0] + _x[1]*_x[1])", (3.0, -4.0), (0.6, -0.8)),
+    ],
+)
+def test_kinks(result, at, slopes):
+    found = tangent(_source(f"def k(_x, _work, _result):\n    _result[0] = {result}\n"), "_x", 1, 2)
+    np.testing.assert_allclose(found.jacobian((np.array(at),)), [slopes], rtol=1e-15)
 
 
 def test_what_has_no_derivative_is_refused():

@@ -1,8 +1,6 @@
 """A declaration that contradicts itself is one line."""
 
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 
@@ -62,13 +60,3 @@ def test_planar_states_are_place_and_heading_and_cyclic_ones_place_and_spins(nam
     assert [state.lower() for state in definition.planar] == ["x", "y", "psi"]
     spins = tuple(f"gamma_{wheel}" for wheel in ("FL", "FR", "RL", "RR"))
     assert definition.cyclic == (*definition.planar[:2], *spins)
-
-
-def test_declarations_are_read_without_sympy():
-    text = (
-        "import sys; from vehiclemor.registry import component, names;"
-        "[component('model', name) for name in names('model')];"
-        "print([m for m in ('sympy', 'scipy', 'numba', 'xarray') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"

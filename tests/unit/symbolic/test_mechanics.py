@@ -1,215 +1,175 @@
-"""Kane's equations on textbook systems, the symmetric solve, and the order of batched calls."""
-
-from itertools import product
+"""Motions of joints in a moving frame, by Taylor polynomials, and momenta of free bodies."""
 
 import numpy as np
 import pytest
 import sympy as sp
 
-from tests.unit.programs import run
-from vehiclemor.symbolic import mechanics
-from vehiclemor.symbolic.elimination import eliminate_symmetric
-from vehiclemor.symbolic.geometry import vector
-from vehiclemor.symbolic.joints import along, free_rate
-from vehiclemor.symbolic.program import assemble
+from tests.oracles.taylor import axial, euler_321, times, turned
+from tests.unit.programs import function_of
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic import mechanics as m
+from vehiclemor.symbolic.joints import STILL, along, carried, free_rate, successive
 from vehiclemor.symbolic.tape import Tape
 
-one = sp.Symbol("one", real=True)
+TENSOR = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.4], [-0.2, 0.4, 4.5]])
 
 
 def real(names: str) -> tuple[sp.Symbol, ...]:
     return sp.symbols(names, real=True)
 
 
-def motion(value, columns, bias) -> mechanics.Motion:
-    named = {k: vector(column) for k, column in columns.items()}
-    return mechanics.Motion(vector(value), named, vector(bias))
+def exact(a) -> g.Vector:
+    return g.vector([sp.Float(float(e), 17) for e in a])
 
 
-class System:
-    """Mass matrix and forces of bodies, as numbers."""
-
-    def __init__(self, tape: Tape, speeds: int, bodies: list, symbols: list) -> None:
-        mass, force = mechanics.kane(tape, speeds, bodies)
-        rows = [e for j in range(speeds) for e in [*mass[j], force[j]]]
-        # A program has at least one constant.
-        results = {"f": ([*rows, one], (len(rows) + 1,))}
-        self.n, self.symbols = speeds, symbols
-        self.program = assemble(tape, {"x": symbols}, [one], results)
-
-    def __call__(self, *values: float) -> tuple[np.ndarray, np.ndarray]:
-        at = dict(zip(self.symbols, values, strict=True)) | {one: 1.0}
-        rows = run(self.program, "f", at)[:-1].reshape(self.n, self.n + 1)
-        return rows[:, :-1], rows[:, -1]
-
-    def accelerations(self, *values: float) -> np.ndarray:
-        return np.linalg.solve(*self(*values))
+def tensor_of(a: np.ndarray) -> m.Tensor:
+    return tuple(exact(row) for row in a)
 
 
-# Textbook systems
+def unit(rng: np.random.Generator) -> np.ndarray:
+    a = rng.standard_normal(3)
+    return a / np.linalg.norm(a)
 
 
-def test_double_pendulum_has_lagranges_equations(rng):
-    a, b, va, vb = symbols = real("a b va vb")
-    m1, m2, l1, l2, g = 1.3, 0.7, 0.9, 1.4, 9.81
-    tape = Tape()
-    # x forward, z up, angles from the vertical; components in the inertial frame.
-    first = (l1 * sp.cos(a), 0, l1 * sp.sin(a))
-    second = (l2 * sp.cos(b), 0, l2 * sp.sin(b))
-    turn1 = (-l1 * sp.sin(a) * va**2, 0, l1 * sp.cos(a) * va**2)
-    turn2 = (-l2 * sp.sin(b) * vb**2, 0, l2 * sp.cos(b) * vb**2)
-
-    def sums(*vectors):
-        return tuple(sum(parts) for parts in zip(*vectors, strict=True))
-
-    v1 = tuple(va * e for e in first)
-    v2 = sums(v1, tuple(vb * e for e in second))
-    bodies = [
-        mechanics.Body(sp.Float(m1), motion(v1, {0: first}, turn1), vector((0, 0, -m1 * g))),
-        mechanics.Body(
-            sp.Float(m2),
-            motion(v2, {0: first, 1: second}, sums(turn1, turn2)),
-            vector((0, 0, -m2 * g)),
-        ),
-    ]
-    system = System(tape, 2, bodies, list(symbols))
-    for _ in range(10):
-        x = rng.uniform(-3.0, 3.0, 4)
-        difference = x[0] - x[1]
-        c, s = np.cos(difference), np.sin(difference)
-        mass = [[(m1 + m2) * l1**2, m2 * l1 * l2 * c], [m2 * l1 * l2 * c, m2 * l2**2]]
-        force = [
-            -m2 * l1 * l2 * s * x[3] ** 2 - (m1 + m2) * g * l1 * np.sin(x[0]),
-            m2 * l1 * l2 * s * x[2] ** 2 - m2 * g * l2 * np.sin(x[1]),
-        ]
-        expected = np.linalg.solve(mass, force)
-        np.testing.assert_allclose(system.accelerations(*x), expected, rtol=1e-11)
+# A carrier on a ball joint of an arm whose pivot slides, all of it in a moving frame.
+NU = real("u v w p q_y r slid_rate arm_rate zeta_rate eta_rate xi_rate")
+JOINTS = real("slid arm zeta eta xi")
 
 
-INERTIA = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.4], [-0.2, 0.4, 4.5]])
-MASS = 1.7
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("in_space", [False, True])
+def test_motions_are_the_derivatives_of_positions(seed, in_space):
+    """Where velocities are those in space, the frame can count gravity as acceleration."""
+    rng, tape = np.random.default_rng(seed), Tape()
+    axis, slide, (lever, reach) = unit(rng), unit(rng), rng.uniform(-1.0, 1.0, (2, 3))
+    origin, attitude, q = (rng.uniform(-1.0, 1.0, (3, n)) for n in (3, 3, 5))
+    frame = euler_321(attitude)
+    back = frame[0].T
+    upwards = back @ [0.0, 0.0, 9.81] * in_space
 
-
-def exact(tensor: np.ndarray) -> tuple:
-    return tuple(vector([sp.Float(e) for e in row]) for row in tensor)
-
-
-def test_a_free_rigid_body_has_newtons_and_eulers_equations(rng):
-    speeds, loads = real("u v w p q r"), real("fx fy fz mx my mz")
-    tape = Tape()
-    frame = mechanics.MovingFrame(vector(speeds[:3]), vector(speeds[3:]), first=0)
-    body = mechanics.Body(
-        sp.Float(MASS),
-        frame.origin(tape),
-        vector(loads[:3]),
-        frame.rotation(tape, exact(INERTIA)),
-        exact(INERTIA),
-        vector(loads[3:]),
+    # By the package.
+    free = [free_rate(6 + k, rate) for k, rate in enumerate(NU[6:])]
+    moving = m.MovingFrame(
+        g.vector(NU[:3]), g.vector(NU[3:6]), 0, exact(upwards) if in_space else None
     )
-    system = System(tape, 6, [body], [*speeds, *loads])
-    for _ in range(10):
-        x = rng.uniform(-5.0, 5.0, 12)
-        v, w, f, m = x[:3], x[3:6], x[6:9], x[9:]
-        linear = f / MASS - np.cross(w, v)
-        angular = np.linalg.solve(INERTIA, m - np.cross(w, INERTIA @ w))
-        np.testing.assert_allclose(
-            system.accelerations(*x), [*linear, *angular], rtol=1e-12, atol=1e-12
-        )
-
-
-def carrier_with_slider_and_rotor():
-    """A free body that carries a mass on a slide and a spinning rotor; no loads."""
-    *speeds, slid, rate, spin = symbols = real("u v w p q r slid rate spin")
-    tape = Tape()
-    frame = mechanics.MovingFrame(vector(speeds[:3]), vector(speeds[3:]), first=0)
-    axis = vector([sp.Float(e) for e in (0.6, 0.0, 0.8)])
-    about = mechanics.axisymmetric_inertia(sp.Float(1.9), sp.Float(1.1), axis)
-    place = vector((sp.Float(0.5), sp.Float(-0.3), slid + sp.Float(0.2)))
-    none = mechanics.ZERO
-    bodies = [
-        mechanics.Body(
-            sp.Float(MASS),
-            frame.origin(tape),
-            none,
-            frame.rotation(tape, exact(INERTIA)),
-            exact(INERTIA),
-        ),
-        mechanics.Body(
-            sp.Float(0.9),
-            frame.point(tape, place, along(free_rate(6, rate), mechanics.UNIT[2])),
-            none,
-            frame.rotation(tape, about, spin=(7, spin, axis)),
-            about,
-        ),
+    on_arm = g.rotate_about_axis(tape, exact(lever), exact(axis), JOINTS[1])
+    carrier = g.euler_321(tape, *JOINTS[2:])
+    on_carrier = g.rotate(tape, carrier, exact(reach))
+    axes = m.UNIT[2], g.vector((-sp.sin(JOINTS[2]), sp.cos(JOINTS[2]), 0)), g.column(carrier, 0)
+    turn = successive(tape, free[2:], axes)
+    joint = carried(tape, along(free[0], exact(slide)), along(free[1], exact(axis)), on_arm)
+    relative = carried(tape, joint, turn, on_carrier)
+    place = exact(slide) * JOINTS[0] + on_arm + on_carrier
+    turning = moving.turning(tape, turn)
+    tensor = m.rotated_tensor(tape, tensor_of(TENSOR), carrier)
+    motions = (
+        moving.point(tape, place, relative),
+        turning,
+        m.with_inertia(tape, tensor, turning),
+        moving.point(tape, exact(reach)),
+    )
+    results = [
+        [list(e.value), [list(e.columns.get(k, m.ZERO)) for k in range(11)], list(e.bias)]
+        for e in motions
     ]
-    return System(tape, 8, bodies, list(symbols)), np.array([0.6, 0.0, 0.8])
+    arm_tensor = m.turned_tensor(tape, tensor_of(TENSOR), exact(axis), JOINTS[1])
+    results.append([list(row) for row in arm_tensor])
+
+    # By positions and rotations.
+    arm, turned_carrier = turned(axis, q[:, 1]), euler_321(q[:, 2:])
+    in_frame = q[:, :1] * slide + arm @ lever + turned_carrier @ reach
+    point = origin + times(frame, in_frame[..., None])[..., 0]
+    fixed = origin + frame @ reach
+    whole = times(frame, turned_carrier)
+    spin, spin_rate = axial(whole[1] @ whole[0].T), 2 * axial(whole[2] @ whole[0].T)
+    inertia = whole[0] @ TENSOR @ whole[0].T
+    changing = whole[1] @ TENSOR @ whole[0].T
+    momentum_rate = (changing + changing.T) @ spin + inertia @ spin_rate
+    u, w = back @ origin[1], back @ axial(frame[1] @ back)
+    rate = back @ (2 * origin[2]) - (0.0 if in_space else np.cross(w, u))
+    nu = [*u, *w, *q[1]]
+    nu_rate = np.array([*rate, *(back @ (2 * axial(frame[2] @ back))), *(2 * q[2])])
+    *found, of_arm = function_of(tape, [*JOINTS, *NU], results)(*q[0], *nu)
+    expected = (
+        (point[1], 2 * point[2]),
+        (spin, spin_rate),
+        (spin, momentum_rate),
+        (fixed[1], 2 * fixed[2]),
+    )
+    for k, ((value, columns, bias), (velocity, change)) in enumerate(
+        zip(found, expected, strict=True)
+    ):
+        np.testing.assert_allclose(value, back @ velocity, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(nu @ np.array(columns), value, rtol=0, atol=1e-13)
+        by_speeds = nu_rate @ np.array(columns)
+        if k == 2:
+            by_speeds = back @ inertia @ back.T @ by_speeds
+        counted = upwards if k in (0, 3) else 0.0
+        np.testing.assert_allclose(by_speeds + bias, back @ change + counted, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(of_arm, arm[0] @ TENSOR @ arm[0].T, rtol=0, atol=1e-13)
 
 
-def momenta(x: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Momentum and angular momentum about the frame's origin, by their definitions."""
-    v, w, slid, rate, spin = x[:3], x[3:6], *x[6:]
-    place = np.array([0.5, -0.3, 0.2 + slid])
-    speed = v + np.cross(w, place) + [0.0, 0.0, rate]
-    rotor = 1.1 * np.eye(3) + 0.8 * np.outer(axis, axis)
-    momentum = MASS * v + 0.9 * speed
-    turning = INERTIA @ w + np.cross(place, 0.9 * speed) + rotor @ (w + spin * axis)
-    return momentum, turning
+MASS, SLIDER, ABOUT, ACROSS = 1.7, 0.9, 1.9, 1.1
+AXLE, PLACE = np.array([0.6, 0.0, 0.8]), np.array([0.5, -0.3, 0.2])
+SPEEDS = real("u v w p q r rate spin")
 
 
-def test_momentum_and_angular_momentum_of_a_free_system_stay_constant(rng):
-    system, axis = carrier_with_slider_and_rotor()
+@pytest.mark.parametrize("as_rotor", [False, True])
+def test_a_free_body_with_a_slider_and_a_rotor_keeps_its_momenta(as_rotor, rng):
+    """The motor that drives the rotor changes the energy and nothing else."""
+    (slid, torque), tape = real("slid torque"), Tape()
+    frame = m.MovingFrame(g.vector(SPEEDS[:3]), g.vector(SPEEDS[3:6]), first=0)
+    of_rotor = ACROSS * np.eye(3) + (ABOUT - ACROSS) * np.outer(AXLE, AXLE)
+    motor = exact(AXLE) * torque
+    turning = frame.turning(tape, STILL)
+    if as_rotor:
+        tensor = tensor_of(TENSOR + of_rotor)
+        own = m.Rotor(7, SPEEDS[7], exact(AXLE), sp.Float(ABOUT), torque)
+        further = {"rotor": own, "acceleration": turning.bias}
+        rotation, bodies = m.with_inertia(tape, tensor, turning), []
+    else:
+        tensor, further = tensor_of(TENSOR), {"moment": motor * -1}
+        about = m.axisymmetric_inertia(sp.Float(ABOUT), sp.Float(ACROSS), exact(AXLE))
+        spun = frame.rotation(tape, about, spin=(7, SPEEDS[7], exact(AXLE)))
+        rotation = frame.rotation(tape, tensor)
+        bodies = [
+            m.Body(sp.Integer(0), frame.origin(tape), m.ZERO, spun, about, moment=motor),
+        ]
+    bodies.append(m.Body(sp.Float(MASS), frame.origin(tape), m.ZERO, rotation, tensor, **further))
+    now = exact(PLACE) + m.UNIT[2] * slid
+    moved = frame.point(tape, now, along(free_rate(6, SPEEDS[6]), m.UNIT[2]))
+    bodies.append(m.Body(sp.Float(SLIDER), moved, m.ZERO))
+    equations = function_of(tape, [*SPEEDS, slid, torque], list(m.kane(tape, 8, bodies)))
+
+    def momenta(nu: np.ndarray, slid: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Momentum, angular momentum about the frame's origin and energy, by their definitions."""
+        v, w, place = nu[:3], nu[3:6], PLACE + slid * np.eye(3)[2]
+        speed = v + np.cross(w, place) + [0.0, 0.0, nu[6]]
+        whole = w + nu[7] * AXLE
+        energy = MASS * v @ v + SLIDER * speed @ speed + w @ TENSOR @ w + whole @ of_rotor @ whole
+        turning = TENSOR @ w + np.cross(place, SLIDER * speed) + of_rotor @ whole
+        return MASS * v + SLIDER * speed, turning, energy / 2.0
+
     for _ in range(10):
-        x = rng.uniform(-2.0, 2.0, 9)
-        nu_dot = system.accelerations(*x)
-        v, w = x[:3], x[3:6]
-        step = 1e-6
-        change = step * np.array([*nu_dot[:6], x[7], nu_dot[6], nu_dot[7]])
-        later, earlier = momenta(x + change, axis), momenta(x - change, axis)
-        momentum, turning = momenta(x, axis)
-        rates = [(a - b) / (2 * step) for a, b in zip(later, earlier, strict=True)]
+        nu, (slid_now, motor_now) = rng.uniform(-2.0, 2.0, 8), rng.uniform(-1.0, 1.0, 2)
+        mass, force = (np.array(e, float) for e in equations(*nu, slid_now, motor_now))
+        np.testing.assert_array_equal(mass, mass.T)
+        change = np.linalg.solve(mass, force)
+        ends = [momenta(nu + h * change, slid_now + h * nu[6]) for h in (1e-5, -1e-5)]
+        rates = [(a - b) / 2e-5 for a, b in zip(*ends, strict=True)]
+        momentum, turning_now, _ = momenta(nu, slid_now)
+        v, w = nu[:3], nu[3:6]
         # Rates in the inertial frame, the second about a moving origin.
-        np.testing.assert_allclose(rates[0] + np.cross(w, momentum), 0.0, atol=1e-7)
-        balance = rates[1] + np.cross(w, turning) + np.cross(v, momentum)
-        np.testing.assert_allclose(balance, 0.0, atol=1e-7)
+        np.testing.assert_allclose(rates[0] + np.cross(w, momentum), 0.0, atol=1e-8)
+        about_origin = rates[1] + np.cross(w, turning_now) + np.cross(v, momentum)
+        np.testing.assert_allclose(about_origin, 0.0, atol=1e-8)
+        assert rates[2] == pytest.approx(motor_now * nu[7], abs=1e-8)
 
 
-def test_kinetic_energy_of_a_free_system_stays_constant(rng):
-    system, _ = carrier_with_slider_and_rotor()
-    for _ in range(10):
-        x, shift = rng.uniform(-2.0, 2.0, 9), np.zeros(9)
-        nu = np.array([*x[:6], *x[7:]])
-        shift[6] = 1e-6 * x[7]
-        change = (system(*(x + shift))[0] - system(*(x - shift))[0]) / 2e-6
-        assert nu @ system(*x)[1] + 0.5 * nu @ change @ nu == pytest.approx(0.0, abs=1e-7)
-
-
-# Symmetric elimination
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_symmetric_elimination_equals_a_dense_solve_in_any_order(seed):
-    rng = np.random.default_rng(seed)
-    n = 3 + seed % 6
-    factor = np.tril(rng.uniform(-1.0, 1.0, (n, n)) * (rng.random((n, n)) < 0.4), -1)
-    factor += np.diag(rng.uniform(0.5, 2.0, n))
-    shuffle = rng.permutation(n)
-    matrix = (factor @ factor.T)[shuffle][:, shuffle]
-    right_side = rng.standard_normal(n)
-    names = {
-        (i, j): sp.Symbol(f"a_{i}_{j}", real=True)
-        for i, j in product(range(n), repeat=2)
-        if i >= j and matrix[i, j] != 0.0
-    }
-    entries = [
-        [names.get((max(i, j), min(i, j)), sp.Integer(0)) for j in range(n)] for i in range(n)
-    ]
-    b = real(" ".join(f"b{i}" for i in range(n)))
-    tape = Tape()
-    order = [int(k) for k in rng.permutation(n)]
-    unknowns = eliminate_symmetric(tape, entries, list(b), order)
-    arguments = {"a": list(names.values()), "b": list(b)}
-    program = assemble(tape, arguments, [one], {"f": ([*unknowns, one], (n + 1,))})
-    values = {name: matrix[place] for place, name in names.items()}
-    values |= dict(zip(b, right_side, strict=True)) | {one: 1.0}
-    found = run(program, "f", values)[:n]
-    np.testing.assert_allclose(found, np.linalg.solve(matrix, right_side), rtol=1e-9, atol=1e-11)
+def test_a_point_mass_has_the_energy_of_its_turning(rng):
+    lever, turning = rng.uniform(-2.0, 2.0, (2, 3))
+    tensor = np.array(
+        [list(row) for row in m.point_mass_tensor(sp.Float(1.3), exact(lever))], float
+    )
+    momentum = 1.3 * np.cross(lever, np.cross(turning, lever))
+    np.testing.assert_allclose(tensor @ turning, momentum, rtol=0, atol=1e-14)
