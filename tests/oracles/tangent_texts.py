@@ -7,8 +7,7 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import KernelSource
 from vehiclemor.codegen.tangent import Tangent
-from vehiclemor.exporting.interpreter import evaluated
-from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine, entries, straight_line
+from vehiclemor.exporting.straight_line import FUNCTIONS, Lines, StraightLine, evaluated
 
 NUMPY = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
 IN_NUMPY = {name: getattr(np, NUMPY.get(name, name)) for name in FUNCTIONS} | {"select": np.where}
@@ -16,8 +15,9 @@ IN_NUMPY = {name: getattr(np, NUMPY.get(name, name)) for name in FUNCTIONS} | {"
 
 @cache
 def written_out(source: KernelSource) -> StraightLine:
-    pairs = zip(source.arguments, source.sizes, strict=True)
-    return straight_line(source.text, {name: entries(name, size) for name, size in pairs})
+    lines, pairs = Lines(), zip(source.arguments, source.sizes, strict=True)
+    given = {name: lines.entries(name, size) for name, size in pairs}
+    return lines.function(lines.include(source.text, given))
 
 
 def run_as_text(tangent: Tangent, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:

@@ -124,10 +124,10 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_module
-        from vehiclemor.codegen.kernel_statements import KernelText
         from vehiclemor.codegen.llvm_kernels import kernel_module
+        from vehiclemor.codegen.operations import Kernel
 
-        return compiled_module(kernel_module([KernelText(source.text)], lanes))
+        return compiled_module(kernel_module([Kernel(source.text)], lanes))
 
     code = MachineCode(fetched(f"kernels/{source.name}-{key}.o", make))
     address = code.address(source.name)
@@ -144,8 +144,8 @@ def kernel_sources(text: str) -> dict[str, KernelSource]:
 # Models with other parameters ask for the same again.
 @lru_cache(maxsize=64)
 def _source(text: str) -> KernelSource:
-    from vehiclemor.codegen.kernel_statements import KernelText
+    from vehiclemor.codegen.operations import Kernel
 
-    kernel = KernelText(text)
+    kernel = Kernel(text)
     sizes = tuple(kernel.sizes[name] for name in kernel.pointers)
     return KernelSource(kernel.name, text, tuple(kernel.pointers), sizes, kernel.dimensions)

@@ -7,25 +7,21 @@ address, which they get at run time: they are compiled once for all models.  Bat
 functions become vector instructions, from the text of the same scalar functions.
 """
 
-import ast
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from llvmlite import ir
 
 from vehiclemor.codegen import vector_statements, weighted_sums
-from vehiclemor.codegen.kernel_statements import SEED, KernelText, places
-from vehiclemor.codegen.llvm_expressions import LANE, Expressions
+from vehiclemor.codegen.llvm_arithmetic import ELEMENTARY, LANE, arithmetic, constant, elementary
+from vehiclemor.codegen.operations import SEED, VECTOR_STATEMENTS, Kernel, Operation
 from vehiclemor.codegen.vector_lanes import LANES, RESULTS, WIDTH
 from vehiclemor.codegen.weighted_sums import DOUBLE, VECTOR
 
 POINTER = DOUBLE.as_pointer()
-BATCHES = {f"{name}_batch": name for name in RESULTS}
-
-Key = str | tuple[str, int]
 
 
-def kernel_module(kernels: Sequence[KernelText], lanes: int = 1) -> ir.Module:
+def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
     """LLVM module of kernels, each a C function of pointers to floats by the kernel's name.
 
     Parameters
@@ -57,7 +53,7 @@ class Rows(NamedTuple):
     stride: Any = None
 
 
-def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int = 1) -> None:
+def emit(kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int = 1) -> None:
     """Write the instructions of a kernel where the builder stands.
 
     Parameters
@@ -66,160 +62,140 @@ def emit(kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int 
         Argument -> where it is; the scratch space is nowhere.
     lanes
         Samples at once, see `kernel_module`.
-
-    Raises
-    ------
-    ValueError
-        If the text has anything but straight-line arithmetic.
     """
     writer = _Writer(kernel, builder, rows, lanes)
-    for statement in kernel.statements:
-        writer.write(statement)
+    for number in kernel.anchors:
+        writer.value(number)
 
 
-class _Writer:
-    """Writes a kernel's statements; knows the values of its names and scratch space."""
+class Values:
+    """Values of operations, each written when it is first needed: registers are few."""
 
-    def __init__(
-        self, kernel: KernelText, builder: Any, rows: Mapping[str, Rows], lanes: int
-    ) -> None:
-        self._kernel, self._builder, self._rows, self._lanes = kernel, builder, rows, lanes
-        self._expressions = Expressions(builder)
-        self._values: dict[Key, Any] = {}
-        self._kind = DOUBLE if lanes == 1 else ir.VectorType(DOUBLE, lanes)
+    def __init__(self, operations: Sequence[Operation], builder: Any) -> None:
+        self.builder, self._operations = builder, operations
+        self._values: dict[int, Any] = {}
+
+    def value(self, number: int) -> Any:
+        """The value of an operation; of several results, or none, what there is."""
+        if number not in self._values:
+            self._values[number] = self.written(self._operations[number])
+        return self._values[number]
+
+    def written(self, operation: Operation) -> Any:
+        """Write the instructions of an operation whose arguments are floats or vectors."""
+        kind, arguments = operation.kind, [self.value(n) for n in operation.arguments]
+        if kind == "part":
+            return arguments[0][operation.detail]
+        if kind == "sincos":
+            return elementary(self.builder, kind, *arguments)
+        if kind in ELEMENTARY:
+            return elementary(self.builder, kind, *arguments)[0]
+        return arithmetic(self.builder, kind, self.alike(arguments))
+
+    def alike(self, values: Sequence[Any]) -> list[Any]:
+        """Values, floats among vectors in all lanes."""
+        wide = next((v.type for v in values if isinstance(v.type, ir.VectorType)), None)
+        if wide is None:
+            return list(values)
+        return [self._spread(value, wide.count) for value in values]
+
+    def _spread(self, value: Any, width: int) -> Any:
+        # The choice between vectors may be one for all lanes.
+        return weighted_sums.spread(self.builder, value, width) if value.type == DOUBLE else value
+
+
+class _Writer(Values):
+    """Writes the operations of a kernel, which reads and writes memory."""
+
+    def __init__(self, kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int) -> None:
+        super().__init__(kernel.operations, builder)
+        self._rows, self._lanes = rows, lanes
         laned = kernel.laned
         self._single = [name for name in kernel.arguments if name not in laned]
         # In other kernels than tangents every value has lanes.
-        self._mixed = lanes > 1 and any(name.startswith(SEED) for name in laned)
+        self._mixed = any(name.startswith(SEED) for name in laned)
 
-    def write(self, statement: ast.stmt) -> None:
-        values, value = self._values, self._value
-        match statement:
-            case ast.Assign([ast.Name(target)], expression):
-                values[target] = value(expression)
-            case ast.Assign([ast.Subscript(ast.Name("_work")) as target], expression):
-                values["_work", places(target)[0]] = value(expression)
-            case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
-                place = places(target)
-                if len(place) != self._kernel.dimensions:
-                    raise ValueError(f"{ast.unparse(target)}: other results have another shape")
-                self._store(value(expression), self._kernel.flat(place))
-            case ast.Assign(
-                [ast.Tuple(elements)], ast.Call(ast.Name("sincos_one"), [argument], [])
-            ) if len(elements) == 2:
-                results = self._expressions.elementary("sincos", value(argument))
-                values |= zip((ast.unparse(e) for e in elements), results, strict=True)
-            case ast.Assign(
-                [ast.Tuple(elements)],
-                ast.Call(
-                    ast.Name("weighted_sums"),
-                    [ast.Name(array), ast.Constant(int() as first), ast.Tuple(terms)],
-                    [],
-                ),
-            ):
+    def written(self, operation: Operation) -> Any:
+        kind, arguments, detail = operation
+        match kind:
+            case "number":
+                count = 1 if self._mixed else self._lanes
+                return constant(DOUBLE if count == 1 else ir.VectorType(DOUBLE, count), detail)
+            case "entry":
+                return self._load(*detail)
+            case "store":
+                return self._store(self.value(arguments[0]), detail)
+            case "sums":
+                array, first, targets = detail
                 # One by one, each used at once: registers are few.
-                kind = self._kind_of(ast.Tuple(terms))
-                factors = (value(term, kind) for term in terms)
-                single = kind == DOUBLE
-                sums = weighted_sums.weighted_sums if single else weighted_sums.sums_of_lanes
-                results = sums(self._builder, self._address(array, first), factors, len(elements))
-                values |= zip((ast.unparse(e) for e in elements), results, strict=True)
-            case ast.Expr(
-                ast.Call(ast.Name(name), [ast.Name("_work"), ast.Constant(int() as first)], [])
-            ) if name in BATCHES:
-                given = [values["_work", first + lane] for lane in range(LANES)]
-                results = _batch(self._builder, self._expressions, BATCHES[name], given)
-                values |= {
-                    ("_work", first + LANES + place): result for place, result in enumerate(results)
-                }
-            case ast.Expr(ast.Call(ast.Name(name)) as call) if name in vector_statements.NAMES:
-                vector_statements.write(call, self._builder, self._pointer, value)
-            case _:
-                raise ValueError(
-                    f"{ast.unparse(statement)}: {type(statement).__name__} is not straight-line"
-                )
-
-    def _value(self, node: ast.expr, kind: ir.Type | None = None) -> Any:
-        kind = kind or self._kind_of(node)
-        return self._expressions.value(
-            node, lambda part: self._spread(self._read(part), kind), kind
-        )
-
-    def _kind_of(self, node: ast.expr) -> ir.Type:
-        """Whether an expression is a float or has lanes."""
-        if not self._mixed:
-            return self._kind
-        names = [part.id for part in ast.walk(node) if isinstance(part, ast.Name)]
-        return next((self._kind for name in names if self._has_lanes(name)), DOUBLE)
-
-    def _has_lanes(self, name: str) -> bool:
-        return name.startswith(SEED) or (name in self._values and self._values[name].type != DOUBLE)
-
-    def _spread(self, value: Any, kind: Any) -> Any:
-        if value.type == kind:
-            return value
-        return weighted_sums.spread(self._builder, value, kind.count)
-
-    def _read(self, node: ast.expr) -> Any:
-        # Loads come where they are needed first: registers are few.
-        match node:
-            case ast.Name(name) if name in self._values:
-                return self._values[name]
-            case ast.Subscript(ast.Name(array)) if array in self._kernel.arguments:
-                place = places(node)
-                if array == "_work" and ("_work", place[0]) in self._values:
-                    return self._values["_work", place[0]]
-                if array != "_work" and len(place) == 1:
-                    return self._load(array, place[0])
-        raise ValueError(f"{ast.unparse(node)}: unknown, or of the wrong shape")
+                factors = (self.value(number) for number in arguments)
+                if self._lanes == 1:
+                    address = self._address(array, first)
+                    return weighted_sums.weighted_sums(self.builder, address, factors, targets)
+                values = self.alike(list(factors))
+                sums = weighted_sums.sums_of_lanes
+                if values[0].type == DOUBLE:
+                    sums = weighted_sums.weighted_sums
+                return sums(self.builder, self._address(array, first), values, targets)
+            case "batch":
+                return self._batch(detail, [self.value(number) for number in arguments])
+            case _ if kind in VECTOR_STATEMENTS:
+                pointers = [self._address(*d) if _is_entry(d) else d for d in detail]
+                factors = [self.value(number) for number in arguments]
+                return vector_statements.write(kind, self.builder, pointers, factors)
+        return super().written(operation)
 
     def _load(self, name: str, place: int) -> Any:
-        builder = self._builder
+        builder = self.builder
         number = builder.load(self._address(name, place))
         if self._lanes == 1 or name in self._single:
-            return number if self._mixed else self._spread(number, self._kind)
-        vector = builder.insert_element(ir.Constant(self._kind, ir.Undefined), number, LANE(0))
+            return number if self._mixed else self._spread_to_lanes(number)
+        kind = ir.VectorType(DOUBLE, self._lanes)
+        vector = builder.insert_element(ir.Constant(kind, ir.Undefined), number, LANE(0))
         for lane in range(1, self._lanes):
             number = builder.load(self._address(name, place, lane))
             vector = builder.insert_element(vector, number, LANE(lane))
         return vector
 
+    def _spread_to_lanes(self, value: Any) -> Any:
+        return value if self._lanes == 1 else self._spread(value, self._lanes)
+
     def _store(self, value: Any, place: int) -> None:
-        value = self._spread(value, self._kind)
+        value = self._spread_to_lanes(value)
         for lane in range(self._lanes):
             single = value
             if self._lanes > 1:
-                single = self._builder.extract_element(value, LANE(lane))
-            self._builder.store(single, self._address("_result", place, lane))
-
-    def _pointer(self, node: ast.expr) -> Any:
-        assert isinstance(node, ast.Subscript)
-        return self._address(ast.unparse(node.value), places(node)[0])
+                single = self.builder.extract_element(value, LANE(lane))
+            self.builder.store(single, self._address("_result", place, lane))
 
     def _address(self, name: str, place: int, lane: int = 0) -> Any:
         offset = ir.Constant(ir.IntType(64), place)
         if lane:
             stride = ir.Constant(ir.IntType(64), lane)
-            offset = self._builder.add(self._builder.mul(self._rows[name].stride, stride), offset)
-        return self._builder.gep(self._rows[name].first, [offset])
+            offset = self.builder.add(self.builder.mul(self._rows[name].stride, stride), offset)
+        return self.builder.gep(self._rows[name].first, [offset])
+
+    def _batch(self, name: str, lanes: Sequence[Any]) -> list[Any]:
+        """Results of an elementary function for a batch of arguments, lane by lane."""
+        builder, results, lanes = self.builder, len(RESULTS[name]), self.alike(lanes)
+        if lanes[0].type != DOUBLE:
+            # Vectors already, of samples.
+            found = [elementary(builder, name, lane) for lane in lanes]
+            return [values[k] for k in range(results) for values in found]
+        places = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
+        parts = []
+        for first in range(0, LANES, WIDTH):
+            vector = ir.Constant(VECTOR, ir.Undefined)
+            for lane, place in enumerate(places):
+                vector = builder.insert_element(vector, lanes[first + lane], place)
+            parts.append(elementary(builder, name, vector))
+        return [
+            builder.extract_element(part[result], place)
+            for result in range(results)
+            for part in parts
+            for place in places
+        ]
 
 
-def _batch(builder: Any, expressions: Expressions, name: str, lanes: Sequence[Any]) -> list[Any]:
-    """Results of an elementary function for a batch of arguments, lane by lane."""
-    if lanes[0].type != DOUBLE:
-        # Vectors already, of samples.
-        found = [expressions.elementary(name, lane) for lane in lanes]
-        return [results[k] for k in range(len(RESULTS[name])) for results in found]
-    places = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
-    parts = []
-    for first in range(0, LANES, WIDTH):
-        vector = ir.Constant(VECTOR, ir.Undefined)
-        for lane, place in enumerate(places):
-            vector = builder.insert_element(vector, lanes[first + lane], place)
-        parts.append(expressions.elementary(name, vector))
-    return [
-        builder.extract_element(part[result], place)
-        for result in range(len(RESULTS[name]))
-        for part in parts
-        for place in places
-    ]
+def _is_entry(detail: Any) -> bool:
+    return isinstance(detail, tuple) and bool(detail) and isinstance(detail[0], str)

@@ -10,8 +10,8 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from vehiclemor.codegen.kernel_statements import KernelText
 from vehiclemor.codegen.llvm_kernels import Rows, emit
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS, spread
 
@@ -148,7 +148,7 @@ def mixed_rows(typing_context: Any, rows: Any, weights: Any, result: Any) -> Any
 
 def inlined_kernel(text: str) -> Any:
     """A kernel whose instructions are written where a loop calls it, given its arrays."""
-    kernel = KernelText(text)
+    kernel = Kernel(text)
 
     @intrinsic
     def execute(typing_context: Any, *arrays: Any) -> Any:

@@ -12,8 +12,7 @@ Vectors of a product have whole lanes, n = `padded(n)`; it is a function of its 
 it is needed.
 """
 
-import ast
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from llvmlite import ir
@@ -23,37 +22,24 @@ from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS, VECTOR, spread
 
 WORD = ir.IntType(64)
 POINTER = DOUBLE.as_pointer()
-NAMES = ("combine", "magnitudes", "product", "execute")
-
-Address = Callable[[ast.expr], Any]
 
 
-def write(call: ast.Call, builder: Any, address: Address, value: Address) -> None:
+def write(name: str, builder: Any, arguments: Sequence[Any], factors: Sequence[Any]) -> None:
     """Write the instructions of a statement.
 
     Parameters
     ----------
-    address, value
-        Pointer to an array's entry, and the value of an expression.
+    arguments
+        As above, pointers for vectors, but for the factors of `combine`.
     """
-    assert isinstance(call.func, ast.Name)
-    arguments = call.args
-    match call.func.id:
-        case "combine":
-            to, n, *terms = arguments
-            factors = [value(term) for term in terms[::2]]
-            places = [address(term) for term in terms[1::2]]
-            _combine(builder, address(to), ast.literal_eval(n), factors, places)
-        case "magnitudes":
-            to, n, *terms = arguments
-            _magnitudes(builder, address(to), ast.literal_eval(n), [address(t) for t in terms])
-        case "product":
-            to, n, rows, x, *shape = arguments
-            sizes = [ast.literal_eval(part) for part in (n, *shape)]
-            function = _product(builder.module, *sizes)
-            builder.call(function, [address(to), address(rows), address(x)])
-        case "execute":
-            kernels, *pointers = [address(argument) for argument in arguments]
+    match name, arguments:
+        case "combine", [to, n, *places]:
+            _combine(builder, to, n, factors, places)
+        case "magnitudes", [to, n, *terms]:
+            _magnitudes(builder, to, n, terms)
+        case "product", [to, n, rows, x, *shape]:
+            builder.call(_product(builder.module, n, *shape), [to, rows, x])
+        case "execute", [kernels, *pointers]:
             kind = ir.FunctionType(ir.VoidType(), [POINTER] * len(pointers))
             first = builder.load(builder.bitcast(kernels, WORD.as_pointer()))
             builder.call(builder.inttoptr(first, kind.as_pointer()), pointers, attrs=("nounwind",))

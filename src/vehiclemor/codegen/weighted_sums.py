@@ -9,7 +9,6 @@ gives a = sum_j _constants[7 + width j] f_j, b the same one place further on, an
 coefficients are padded to `width`, a multiple of the vectors' length.
 """
 
-import ast
 from collections.abc import Iterable
 from typing import Any
 
@@ -64,15 +63,6 @@ def weighted_sums(
         totals.append(total)
     lane = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
     return [builder.extract_element(totals[i // WIDTH], lane[i % WIDTH]) for i in range(targets)]
-
-
-def reach(call: ast.Call, targets: int) -> int:
-    """How many floats of its array a call of `weighted_sums` reads, from the array's beginning."""
-    _, first, terms = call.args
-    assert isinstance(first, ast.Constant)
-    assert isinstance(first.value, int)
-    assert isinstance(terms, ast.Tuple)
-    return first.value + padded(targets) * len(terms.elts)
 
 
 def sums_of_lanes(

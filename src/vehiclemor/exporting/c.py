@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from vehiclemor.exporting.straight_line import StraightLine
+from vehiclemor.codegen import operations
+from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
 from vehiclemor.exporting.system import SIGNATURES, TANGENTS, TOOL, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
@@ -23,6 +23,17 @@ static double entry(double row, int place)
 {
     return vehiclemor_table[(long)row + place];
 }"""
+# Kind of operation -> how C writes it, see `operations.Printer`.
+FORMS = operations.FORMS | {
+    **{kind: f"{kind}({{}})" for kind in FUNCTIONS},
+    "abs": "fabs({})",
+    "atan2": "atan2({}, {})",
+    "max": "fmax({}, {})",
+    "min": "fmin({}, {})",
+    "power": "pow({}, {})",
+    "select": "select({}, {}, {})",
+    "table": "entry({}, {})",
+}
 # Parameters have their places whether anything here depends on them or not.
 START_ALONE = "of the start alone, no effect here"
 HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
@@ -147,17 +158,13 @@ def _array(name: str, values: np.ndarray) -> str:
 
 
 def _function(name: str, function: StraightLine) -> str:
-    """Definition of a function; arithmetic is written alike in C and Python."""
+    """Definition of a function."""
     *given, result = (SIGNATURES | TANGENTS)[name]
-    lines = [_signature(name), "{"]
-    lines += [
-        f"    const double {local} = {ast.unparse(expression)};"
-        for local, expression in function.assignments.items()
-    ]
-    lines += [
-        f"    {result}[{i}] = {ast.unparse(expression)};"
-        for i, expression in enumerate(function.results)
-    ]
+    printer = operations.Printer(function.operations, FORMS, "    const double {} = {};")
+    for number in function.needed:
+        printer.write(number)
+    stored = [f"    {result}[{i}] = {printer.texts[n]};" for i, n in enumerate(function.results)]
+    lines = [_signature(name), "{", *printer.lines, *stored]
     text = "\n".join(lines)
     # What is not read is said so, for compilers that ask.
     unread = [a for a in (*given, result) if f" {a}[" not in text and f"({a}[" not in text]

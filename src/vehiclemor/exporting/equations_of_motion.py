@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from vehiclemor.codegen.kernels import KernelSource
-from vehiclemor.exporting.straight_line import (
-    StraightLine,
-    entries,
-    numbers,
-    straight_line,
-    tangent_line,
-)
+from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import SEED, SIGNATURES, TRUST, ExportedSystem
-from vehiclemor.exporting.trust import trust, trust_tangent
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.simulation.constants import solved_parameters
@@ -29,8 +21,8 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
     definition, sources = model.definition, model.equations.sources
     flat = model.parameters.flat()
     solved = solved_parameters(definition, flat, model.equations)
-    given = full_arrays(model) | {"_x": entries("x", len(definition.states))}
-    seeds = seeds_of(given)
+    lines = Lines()
+    given = full_arrays(lines, model) | {"_x": lines.entries("x", len(definition.states))}
     return ExportedSystem(
         name,
         model.summary,
@@ -40,26 +32,28 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         parameter_quantities(model),
         np.concatenate([flat, [solved[key] for key in definition.solved]]),
         model.initial,
-        {key: straight_line(sources[key].text, given).pruned() for key in SIGNATURES},
+        {key: lines.function(lines.include(sources[key].text, given)) for key in SIGNATURES},
         lambda: {
-            f"{key}_tangent": tangent_line(sources[key], given, seeds).pruned()
+            f"{key}_tangent": lines.function(
+                lines.tangent(sources[key], given, seeds_of(lines, given))
+            )
             for key in SIGNATURES
         },
     )
 
 
-def full_arrays(model: Model) -> dict[str, list[ast.expr]]:
+def full_arrays(lines: Lines, model: Model) -> dict[str, list[int]]:
     """Arguments of a model's kernels, but for the state, in the entries of the exported arrays."""
     return {
-        "_u": entries("u", len(model.inputs)),
-        "_constants": entries("c", model.equations.constants),
-        "_parameters": entries("p", len(parameter_quantities(model))),
+        "_u": lines.entries("u", len(model.inputs)),
+        "_constants": lines.entries("c", model.equations.constants),
+        "_parameters": lines.entries("p", len(parameter_quantities(model))),
     }
 
 
-def seeds_of(arrays: Mapping[str, Sequence[ast.expr]]) -> dict[str, list[ast.expr]]:
+def seeds_of(lines: Lines, arrays: Mapping[str, Sequence[int]]) -> dict[str, list[int]]:
     """What the entries of arrays change by."""
-    return {key: entries(f"{key[1]}{SEED}", len(listed)) for key, listed in arrays.items()}
+    return {key: lines.entries(f"{key[1]}{SEED}", len(listed)) for key, listed in arrays.items()}
 
 
 def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
@@ -85,33 +79,34 @@ def reduced_system(
     """
     model, system = reduced.model, reduced.system
     definition, full = model.definition, 2 * len(model.coordinates)
-    own = {"_x": entries("x", len(reduced.states)), "_u": entries("u", system.inputs)}
-    seeds = seeds_of(own)
-    rates = system.kernels.sources["derivative"]
-    of_rates = own | {"_constants": numbers(system.constants)}
-    source = model.kernels.sources["outputs"]
-    lifted = StraightLine({}, own["_x"])
+    lines = Lines()
+    own = {
+        "_x": lines.entries("x", len(reduced.states)),
+        "_u": lines.entries("u", system.inputs),
+    }
+    rates, source = system.kernels.sources["derivative"], model.kernels.sources["outputs"]
+    of_rates = own | {"_constants": lines.numbers(system.constants)}
+    lifted, of_lift = own["_x"], own
     if lift is not None:
-        lifted = straight_line(lift[0].text, own | {"_constants": numbers(lift[1])}).named("full")
-    given = {"_x": lifted.results, "_u": own["_u"], "_constants": numbers(model.constants)}
-    outputs = straight_line(source.text, given, lifted)
-    used = lifted.results[full:]
+        of_lift = own | {"_constants": lines.numbers(lift[1])}
+        lifted = lines.include(lift[0].text, of_lift)
+    given = {"_x": lifted, "_u": own["_u"], "_constants": lines.numbers(model.constants)}
+    outputs, used = lines.include(source.text, given), lifted[full:]
+    nothing = lines.function(())
 
     def tangents() -> dict[str, StraightLine]:
-        moved = StraightLine(lifted.assignments, seeds["_x"])
-        if lift is not None:
-            of_lift = own | {"_constants": numbers(lift[1])}
-            moved = tangent_line(lift[0], of_lift, seeds, lifted).named("moved")
-        found = tangent_line(source, given, seeds | {"_x": moved.results}, moved)
-        further = [trust_tangent(used, moved.results[full:])] if used else []
+        seeds = seeds_of(lines, own)
+        moved = seeds["_x"] if lift is None else lines.tangent(lift[0], of_lift, seeds)
+        found = lines.tangent(source, given, seeds | {"_x": moved})
+        further = [lines.largest_tangent(used, moved[full:])] if used else []
         return {
-            "constants_tangent": StraightLine({}, []),
-            "derivative_tangent": tangent_line(rates, of_rates, seeds).pruned(),
-            "outputs_tangent": found.followed_by(further).pruned(),
+            "constants_tangent": nothing,
+            "derivative_tangent": lines.function(lines.tangent(rates, of_rates, seeds)),
+            "outputs_tangent": lines.function([*found, *further]),
         }
 
     known = {q.name: q for q in (*definition.coordinates, *definition.speeds)}
-    nothing = np.zeros(system.inputs)
+    at_rest = np.zeros(system.inputs)
     return ExportedSystem(
         name,
         f"reduced model of: {model.summary}",
@@ -120,11 +115,11 @@ def reduced_system(
         (*definition.outputs, *([TRUST] if used else [])),
         (),
         np.zeros(0),
-        {key: reduced.begin(key, nothing) for key in model.starts},
+        {key: reduced.begin(key, at_rest) for key in model.starts},
         {
-            "constants": StraightLine({}, []),
-            "derivative": straight_line(rates.text, of_rates).pruned(),
-            "outputs": outputs.followed_by([trust(used)] if used else []).pruned(),
+            "constants": nothing,
+            "derivative": lines.function(lines.include(rates.text, of_rates)),
+            "outputs": lines.function([*outputs, *([lines.largest(used)] if used else [])]),
         },
         tangents,
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-
 import numpy as np
 
 from vehiclemor.exporting.equations_of_motion import (
@@ -11,15 +9,8 @@ from vehiclemor.exporting.equations_of_motion import (
     parameter_quantities,
     seeds_of,
 )
-from vehiclemor.exporting.straight_line import (
-    StraightLine,
-    negative,
-    numbers,
-    straight_line,
-    tangent_line,
-)
+from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import ExportedSystem
-from vehiclemor.exporting.trust import trust
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.simulation.algebraic import AlgebraicModel
 
@@ -33,30 +24,26 @@ CORRECTION = Quantity(
 def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
     """A kinematic model: outputs from inputs, without states."""
     definition, sources = model.definition, model.equations.sources
-    given = full_arrays(model)
-    seeds = seeds_of(given)
-    line, correction = StraightLine({}, numbers(model.start())), StraightLine({}, [])
-    for step in range(STEPS):
-        arrays = given | {"_q": line.results}
-        correction = straight_line(sources["newton_step"].text, arrays, line).named(f"step{step}")
-        moved = [
-            ast.BinOp(q, ast.Sub(), change)
-            for q, change in zip(line.results, correction.results, strict=True)
-        ]
-        line = StraightLine(correction.assignments, moved).named(f"q{step}")
-    solved = given | {"_q": line.results}
-    outputs = straight_line(sources["outputs"].text, solved, line)
+    lines = Lines()
+    given, nothing = full_arrays(lines, model), lines.function(())
+    q, correction = lines.numbers(model.start()), []
+    for _ in range(STEPS):
+        correction = lines.include(sources["newton_step"].text, given | {"_q": q})
+        q = [lines.new("subtract", *pair) for pair in zip(q, correction, strict=True)]
+    solved = given | {"_q": q}
+    outputs = lines.include(sources["outputs"].text, solved)
 
     def tangents() -> dict[str, StraightLine]:
+        seeds = seeds_of(lines, given)
         # The residual is zero: the position changes by minus what the next step does.
-        falling = tangent_line(sources["newton_step"], solved, seeds, line)
-        moved = [negative(change) for change in falling.results]
-        change = StraightLine(falling.assignments, moved).named("moved")
-        found = tangent_line(sources["outputs"], solved, seeds | {"_q": change.results}, change)
+        falling = lines.tangent(sources["newton_step"], solved, seeds)
+        moved = [lines.new("negate", change) for change in falling]
+        found = lines.tangent(sources["outputs"], solved, seeds | {"_q": moved})
+        constants = lines.tangent(sources["constants"], given, seeds)
         return {
-            "constants_tangent": tangent_line(sources["constants"], given, seeds).pruned(),
-            "derivative_tangent": StraightLine({}, []),
-            "outputs_tangent": found.followed_by([ast.Constant(0.0)]).pruned(),
+            "constants_tangent": lines.function(constants),
+            "derivative_tangent": nothing,
+            "outputs_tangent": lines.function([*found, *lines.numbers([0.0])]),
         }
 
     return ExportedSystem(
@@ -69,9 +56,9 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         model.parameters.flat(),
         {model.starts[0]: np.zeros(0)},
         {
-            "constants": straight_line(sources["constants"].text, given).pruned(),
-            "derivative": StraightLine({}, []),
-            "outputs": outputs.followed_by([trust(correction.results)]).pruned(),
+            "constants": lines.function(lines.include(sources["constants"].text, given)),
+            "derivative": nothing,
+            "outputs": lines.function([*outputs, lines.largest(correction)]),
         },
         tangents,
     )

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import ast
-
 import numpy as np
 
 from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.exporting.straight_line import (
-    StraightLine,
-    call,
-    entries,
-    straight_line,
-    tangent_line,
-)
+from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import SEED, TRUST, ExportedSystem
-from vehiclemor.exporting.trust import trust, trust_tangent
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.polynomials.kernels import map_kernel
 
@@ -28,30 +19,30 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     kept = sorted(set(columns))
     table = np.zeros((*coefficients.shape[:2], padded(len(kept))))
     table[:, :, : len(kept)] = coefficients[:, :, kept]
-    size = table[0].size
-    n = len(definition.inputs)
-    before = straight_line(_cell_text(reduced, size), {"_u": entries("u", n)})
-    places, row, used = before.results[:n], before.results[n], before.results[n + 1 :]
+    lines, size, n = Lines(), table[0].size, len(definition.inputs)
+    places, row, used = _cell(lines, reduced, size)
     (source,) = kernel_sources(
         map_kernel(reduced.moving, reduced.degree, tuple(kept.index(c) for c in columns))
     ).values()
-    rows = [call("entry", row, ast.Constant(i)) for i in range(size)]
-    given = {"_x": places, "_coefficients": rows}
-    outputs = straight_line(source.text, given, before)
+    given = {
+        "_x": places,
+        "_coefficients": [lines.new("table", row, detail=place) for place in range(size)],
+    }
+    outputs, nothing = lines.include(source.text, given), lines.function(())
 
     def tangents() -> dict[str, StraightLine]:
         scales, halves = reduced.cells.scales, reduced.cells.halves
-        seeds = entries(f"u{SEED}", n)
-        moved = [_times(scale, seed) for scale, seed in zip(scales, seeds, strict=True)]
-        steps = [_times(2.0 * half, step) for half, step in zip(halves, moved, strict=True)]
-        found = tangent_line(source, given, {"_x": steps}, before)
+        seeds = lines.entries(f"u{SEED}", n)
+        moved = [lines.new("multiply", *p) for p in zip(lines.numbers(scales), seeds, strict=True)]
+        doubled = lines.numbers(2.0 * halves)
+        steps = [lines.new("multiply", *pair) for pair in zip(doubled, moved, strict=True)]
+        found = lines.tangent(source, given, {"_x": steps})
         return {
             "constants_tangent": nothing,
             "derivative_tangent": nothing,
-            "outputs_tangent": found.followed_by([trust_tangent(used, moved)]).pruned(),
+            "outputs_tangent": lines.function([*found, lines.largest_tangent(used, moved)]),
         }
 
-    nothing = StraightLine({}, [])
     return ExportedSystem(
         name,
         f"reduced model of: {reduced.model.summary}",
@@ -64,32 +55,28 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
         {
             "constants": nothing,
             "derivative": nothing,
-            "outputs": outputs.followed_by([trust(used)]).pruned(),
+            "outputs": lines.function([*outputs, lines.largest(used)]),
         },
         tangents,
         table.ravel(),
     )
 
 
-def _times(factor: float, value: ast.expr) -> ast.expr:
-    return ast.BinOp(ast.Constant(float(factor)), ast.Mult(), value)
-
-
-def _cell_text(reduced: PathMapModel, size: int) -> str:
-    """Kernel that gives places in a cell, where its coefficients begin, and places in the box.
+def _cell(lines: Lines, reduced: PathMapModel, size: int) -> tuple[list[int], int, list[int]]:
+    """Places in a cell, where its coefficients begin, and places in the box.
 
     It does what `map_loops.map_path` does for a sample.
     """
-    centres, scales, halves, tops, counts, _ = reduced.cells
-    lines, row, n = [], "0.0", len(centres)
-    for i in range(len(centres)):
-        lines += [
-            f"p{i} = (_u[{i}] - {float(centres[i])!r}) * {float(scales[i])!r}",
-            f"q{i} = (p{i} + 1.0) * {float(halves[i])!r}",
-            f"n{i} = min(max(np.floor(q{i}), 0.0), {float(tops[i])!r})",
-            f"_result[{i}] = 2.0 * (q{i} - n{i}) - 1.0",
-        ]
-        row = f"({row} * {float(counts[i])!r} + n{i})"
-        lines.append(f"_result[{n + 1 + i}] = p{i}")
-    lines += [f"row = {row} * {float(size)!r}", f"_result[{n}] = row"]
-    return "\n    ".join(["def cell(_u, _result):", *lines]) + "\n"
+    new, (one, two, zero) = lines.new, lines.numbers([1.0, 2.0, 0.0])
+    places, within, row = [], [], zero
+    cells = reduced.cells
+    for i, u in enumerate(lines.entries("u", len(cells.centres))):
+        numbers = (a[i] for a in (cells.centres, cells.scales, cells.halves, cells.tops))
+        centre, scale, half, top = lines.numbers(numbers)
+        (count,) = lines.numbers([cells.numbers[i]])
+        within.append(new("multiply", new("subtract", u, centre), scale))
+        place = new("multiply", new("add", within[-1], one), half)
+        cell = new("min", new("max", new("floor", place), zero), top)
+        places.append(new("subtract", new("multiply", two, new("subtract", place, cell)), one))
+        row = new("add", new("multiply", row, count), cell)
+    return places, new("multiply", row, *lines.numbers([size])), within

@@ -1,240 +1,198 @@
-"""Kernels as assignments of scalar expressions alone, in which every name is assigned once.
+"""Kernels written out as operations with one result each, for other languages and libraries.
 
-The text of a kernel also has batches of elementary functions and weighted sums, which are for the
-vector units; here they are written out.  What is left are numbers, names, entries of the arguments,
-`+ - * /`, comparisons and calls: short enough for any printer or interpreter.
+Kernels also have batches of elementary functions and sums with weights, which are for vector units.
+What is left here is short enough for any printer or interpreter: operations with one result, `min`,
+`max`, and `table` (a number of a table, of a row and at a place).
 """
 
-import ast
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from __future__ import annotations
 
-from vehiclemor.codegen.kernel_statements import SEED, KernelText, places
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
 from vehiclemor.codegen.kernels import KernelSource
+from vehiclemor.codegen.operations import SEED, Kernel, Operation, needed, uses
 from vehiclemor.codegen.tangent import tangent_source
-from vehiclemor.codegen.vector_lanes import LANES, padded
+from vehiclemor.codegen.vector_lanes import padded
 
-# Names of C's library, of which other systems have their own.  Besides these there are `pow`,
-# `select(test, then, otherwise)`, and `entry(row, place)` of a table.
+# Functions that other systems must have, by the names of C's library.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
     *("atan2", "fabs", "fmax", "fmin", "floor"),
 )
-RENAMED = {"abs": "fabs", "np.abs": "fabs", "np.floor": "floor", "max": "fmax", "min": "fmin"}
+RENAMED = {"abs": "fabs", "max": "fmax", "min": "fmin"}
 # Function that has batches -> what gives its results.
-BATCHES = {"sincos": ("sin", "cos"), "atan": ("atan",)}
+PARTS = {"sincos": ("sin", "cos"), "atan": ("atan",)}
+OPERATORS: dict[str, Callable[..., Any]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "power": operator.pow,
+    "negate": operator.neg,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+Given = Mapping[str, Sequence[int]]
 
 
 class StraightLine(NamedTuple):
-    """A function of arrays.
+    """A function of arrays: the operations that give its results, among others."""
 
-    Attributes
-    ----------
-    assignments
-        Name -> expression, in order.
-    results
-        Expressions of the results, row by row.
-    """
+    operations: Sequence[Operation]
+    results: Sequence[int]
 
-    assignments: dict[str, ast.expr]
-    results: Sequence[ast.expr]
-
-    def named(self, name: str) -> "StraightLine":
-        """The same with a name for each result, for those who read it several times."""
-        assignments, results = dict(self.assignments), list(self.results)
-        for i, result in enumerate(self.results):
-            if not isinstance(result, ast.Name | ast.Constant | ast.Subscript):
-                results[i] = ast.Name(f"{name}_{i}")
-                assignments[f"{name}_{i}"] = result
-        return StraightLine(assignments, results)
-
-    def followed_by(self, results: Sequence[ast.expr]) -> "StraightLine":
-        """The same with further results."""
-        return StraightLine(self.assignments, [*self.results, *results])
-
-    def pruned(self) -> "StraightLine":
-        """The same without assignments that no result needs."""
-        needed = {n.id for e in self.results for n in ast.walk(e) if isinstance(n, ast.Name)}
-        kept: dict[str, ast.expr] = {}
-        for name, expression in reversed(self.assignments.items()):
-            if name in needed:
-                kept[name] = expression
-                needed |= {n.id for n in ast.walk(expression) if isinstance(n, ast.Name)}
-        return StraightLine(dict(reversed(kept.items())), self.results)
+    @property
+    def needed(self) -> list[int]:
+        """Numbers of the operations that the results depend on, in order."""
+        return needed(self.operations, self.results)
 
     def read(self, array: str) -> set[int]:
         """Places of the entries of an array that the results depend on."""
-        used = self.pruned()
-        return {
-            places(node)[0]
-            for expression in (*used.assignments.values(), *used.results)
-            for node in ast.walk(expression)
-            if isinstance(node, ast.Subscript) and ast.unparse(node.value) == array
-        }
+        found = (self.operations[number] for number in self.needed)
+        return {op.detail[1] for op in found if op.kind == "entry" and op.detail[0] == array}
 
 
-def straight_line(
-    text: str, given: Mapping[str, Sequence[ast.expr]], before: StraightLine | None = None
-) -> StraightLine:
-    """A kernel's text written out.
+class Lines:
+    """Operations that several functions share, written one after the other."""
+
+    def __init__(self) -> None:
+        self.operations: list[Operation] = []
+
+    def new(self, kind: str, *arguments: int, detail: Any = None) -> int:
+        """Write an operation; its number."""
+        self.operations.append(Operation(kind, arguments, detail))
+        return len(self.operations) - 1
+
+    def entries(self, array: str, count: int) -> list[int]:
+        """Entries of an array."""
+        return [self.new("entry", detail=(array, place)) for place in range(count)]
+
+    def numbers(self, values: Iterable[float]) -> list[int]:
+        """Numbers."""
+        return [self.new("number", detail=float(value)) for value in values]
+
+    def function(self, results: Sequence[int]) -> StraightLine:
+        """The function of these results."""
+        return StraightLine(self.operations, results)
+
+    def include(self, text: str, given: Given) -> list[int]:
+        """Write a kernel out; its results, row by row.
+
+        Parameters
+        ----------
+        given
+            Argument as the text names it -> number of each of its entries.
+        """
+        kernel, numbers, stored = Kernel(text), [], {}
+        for kind, arguments, detail in kernel.operations:
+            values = [numbers[n] for n in arguments]
+            match kind:
+                case "entry":
+                    found: Any = given[detail[0]][detail[1]]
+                case "store":
+                    found = stored[detail] = values[0]
+                case "sincos":
+                    found = [self.new(name, *values) for name in PARTS[kind]]
+                case "batch":
+                    found = [self.new(name, v) for name in PARTS[detail] for v in values]
+                case "sums":
+                    found = self._sums(given, values, *detail)
+                case "part":
+                    found = values[0][detail]
+                case _:
+                    found = self.new(kind, *values, detail=detail)
+            numbers.append(found)
+        return [stored[place] for place in sorted(stored)]
+
+    def tangent(self, source: KernelSource, given: Given, seeds: Given) -> list[int]:
+        """The derivative of a kernel along seeds of some of its arguments, see `tangent_text`."""
+        moved = {name: seed for name, seed in seeds.items() if name in source.arguments}
+        text = tangent_source(source, tuple(moved)).text
+        return self.include(text, {**given} | {SEED + name: seed for name, seed in moved.items()})
+
+    def _sums(
+        self, given: Given, factors: Sequence[int], array: str, first: int, targets: int
+    ) -> list[int]:
+        rows, found = given[array][first:], []
+        for column in range(targets):
+            weights = rows[column :: padded(targets)]
+            pairs = zip(weights, factors, strict=False)
+            terms = [p for weight, factor in pairs if (p := self._product(weight, factor)) >= 0]
+            found.append(self._total(terms))
+        return found
+
+    def _product(self, weight: int, factor: int) -> int:
+        """A weight times a factor; -1 where it is zero, the weight alone where the other is one."""
+        if self.operations[weight] == Operation("number", (), 0.0):
+            return -1
+        if self.operations[factor] == Operation("number", (), 1.0):
+            return weight
+        return self.new("multiply", weight, factor)
+
+    def _total(self, terms: Sequence[int]) -> int:
+        """Sum of terms in pairs: shallow for whoever walks through it, and rounded less."""
+        if len(terms) < 2:
+            return terms[0] if terms else self.new("number", detail=0.0)
+        half = len(terms) // 2
+        return self.new("add", self._total(terms[:half]), self._total(terms[half:]))
+
+    def largest(self, values: Sequence[int]) -> int:
+        """The largest magnitude: what tells how far a state goes in what a model knows."""
+        first, *others = [self.new("abs", value) for value in values]
+        for value in others:
+            first = self.new("max", first, value)
+        return first
+
+    def largest_tangent(self, values: Sequence[int], moved: Sequence[int]) -> int:
+        """Derivative of the largest magnitude, of values that change so."""
+        zero, largest, found = self.new("number", detail=0.0), self.largest(values), None
+        for value, change in zip(values, moved, strict=True):
+            falls = self.new("<", value, zero)
+            own = self.new("select", falls, self.new("negate", change), change)
+            if found is not None:
+                here = self.new(">=", self.new("abs", value), largest)
+                own = self.new("select", here, own, found)
+            found = own
+        assert found is not None
+        return found
+
+
+def evaluated(
+    function: StraightLine,
+    arrays: Mapping[str, Any],
+    functions: Mapping[str, Callable[..., Any]],
+    let: Callable[[Any], Any] | None = None,
+) -> list[Any]:
+    """Results of a function over values of another system: symbols, or arrays of a batch.
 
     Parameters
     ----------
-    given
-        Argument as the text names it -> expression of each of its entries.
-    before
-        What these expressions need.
+    arrays
+        Name -> values of its entries, by number.
+    functions
+        Name of `FUNCTIONS`, `select` and, of a table, `entry` -> what computes it.
+    let
+        Value that is used more than once -> what stands for it from there on.
     """
-    kernel = KernelText(text)
-    reader = _Reader(given, {} if before is None else dict(before.assignments))
-    for statement in kernel.statements:
-        reader.read(statement, kernel)
-    return StraightLine(reader.assignments, [reader.results[i] for i in sorted(reader.results)])
-
-
-def tangent_line(
-    source: KernelSource,
-    given: Mapping[str, Sequence[ast.expr]],
-    seeds: Mapping[str, Sequence[ast.expr]],
-    before: StraightLine | None = None,
-) -> StraightLine:
-    """The derivative of a kernel along seeds of some of its arguments, see `tangent_text`."""
-    moved = {name: seed for name, seed in seeds.items() if name in source.arguments}
-    text = tangent_source(source, tuple(moved)).text
-    return straight_line(
-        text, {**given} | {SEED + name: seed for name, seed in moved.items()}, before
-    )
-
-
-def entries(name: str, count: int) -> list[ast.expr]:
-    """Expressions of the entries of an array."""
-    return [ast.Subscript(ast.Name(name), ast.Constant(i)) for i in range(count)]
-
-
-def numbers(values: Iterable[float]) -> list[ast.expr]:
-    """Expressions of numbers."""
-    return [ast.Constant(float(value)) for value in values]
-
-
-def call(name: str, *arguments: ast.expr) -> ast.expr:
-    """Expression of a call."""
-    return ast.Call(ast.Name(name), list(arguments), [])
-
-
-def negative(value: ast.expr) -> ast.expr:
-    """Minus a value; in C two signs in a row are a decrement."""
-    match value:
-        case ast.Constant(value=float() as number):
-            return ast.Constant(-number)
-        case ast.UnaryOp(ast.USub(), operand):
-            return operand
-    return ast.UnaryOp(ast.USub(), value)
-
-
-class _Reader:
-    """Reads the statements of a kernel one after the other."""
-
-    def __init__(
-        self, given: Mapping[str, Sequence[ast.expr]], assignments: dict[str, ast.expr]
-    ) -> None:
-        self._given, self.assignments = given, assignments
-        self.results: dict[int, ast.expr] = {}
-        # What the text's names and scratch space stand for by now.
-        self._known: dict[str, ast.expr] = {}
-        self._work: dict[int, ast.expr] = {}
-        self._copies: dict[str, int] = {}
-
-    def read(self, statement: ast.stmt, kernel: KernelText) -> None:
-        match statement:
-            case ast.Assign([ast.Name(target)], expression):
-                self._let(target, self._value(expression))
-            case ast.Assign([ast.Subscript(ast.Name("_work")) as target], expression):
-                self._work[places(target)[0]] = self._value(expression)
-            case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
-                self.results[kernel.flat(places(target))] = self._value(expression)
-            case ast.Assign([ast.Tuple(targets)], ast.Call(ast.Name("sincos_one"), [argument])):
-                angle = self._value(argument)
-                for target, name in zip(targets, BATCHES["sincos"], strict=True):
-                    self._let(ast.unparse(target), call(name, angle))
-            case ast.Assign(
-                [ast.Tuple(targets)],
-                ast.Call(
-                    ast.Name("weighted_sums"),
-                    [ast.Name(array), ast.Constant(int() as first), ast.Tuple(terms)],
-                ),
-            ):
-                factors = [self._named("term", self._value(term)) for term in terms]
-                rows = self._given[array][first:]
-                for column, target in enumerate(targets):
-                    weights = rows[column :: padded(len(targets))]
-                    pairs = zip(weights, factors, strict=False)
-                    products = [p for weight, factor in pairs if (p := _product(weight, factor))]
-                    self._let(ast.unparse(target), _total(products))
-            case ast.Expr(ast.Call(ast.Name(name), [_, ast.Constant(int() as first)])) if (
-                batch := name.removesuffix("_batch")
-            ) in BATCHES:
-                for part, function in enumerate(BATCHES[batch], 1):
-                    for place in range(first, first + LANES):
-                        self._work[place + part * LANES] = call(function, self._work[place])
-            case _:
-                raise ValueError(f"{ast.unparse(statement)}: not straight-line")
-
-    def _let(self, name: str, value: ast.expr) -> None:
-        """Give a name of the text to a value; names and numbers need none of their own."""
-        self._known[name] = self._named(name, value)
-
-    def _named(self, name: str, value: ast.expr) -> ast.expr:
-        if isinstance(value, ast.Name | ast.Constant):
-            return value
-        # A letter first: names of the text may be reserved words elsewhere.
-        own = unused = f"v_{name.lstrip('_')}"
-        while unused in self.assignments:
-            self._copies[own] = self._copies.get(own, 0) + 1
-            unused = f"{own}_{self._copies[own]}"
-        self.assignments[unused] = value
-        return ast.Name(unused)
-
-    def _value(self, node: ast.expr) -> ast.expr:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return ast.Constant(float(number))
-            case ast.Name(name):
-                return self._known[name]
-            case ast.Subscript(ast.Name("_work")):
-                return self._work[places(node)[0]]
-            case ast.Subscript(ast.Name(array)):
-                return self._given[array][places(node)[0]]
-            case ast.BinOp(left, ast.Pow(), right):
-                return call("pow", self._value(left), self._value(right))
-            case ast.BinOp(left, operator, right):
-                return ast.BinOp(self._value(left), operator, self._value(right))
-            case ast.UnaryOp(ast.USub(), operand):
-                return negative(self._value(operand))
-            case ast.Compare(left, [operator], [right]):
-                return ast.Compare(self._value(left), [operator], [self._value(right)])
-            case ast.IfExp(test, then, otherwise):
-                return call("select", *map(self._value, (test, then, otherwise)))
-            case ast.Call(function, arguments):
-                name = ast.unparse(function)
-                name = RENAMED.get(name, name.removeprefix("math."))
-                if name in FUNCTIONS:
-                    return call(name, *map(self._value, arguments))
-        raise ValueError(f"{ast.unparse(node)}: not straight-line")
-
-
-def _product(weight: ast.expr, factor: ast.expr) -> ast.expr | None:
-    """A weight times a factor; nothing where it is zero, the number alone where one of both is."""
-    match weight, factor:
-        case (ast.Constant(value=0.0), _):
-            return None
-        case (_, ast.Constant(value=1.0)):
-            return weight
-    return ast.BinOp(weight, ast.Mult(), factor)
-
-
-def _total(terms: Sequence[ast.expr]) -> ast.expr:
-    """Sum of terms in pairs: shallow for whoever walks through it, and rounded less."""
-    if len(terms) < 2:
-        return terms[0] if terms else ast.Constant(0.0)
-    half = len(terms) // 2
-    return ast.BinOp(_total(terms[:half]), ast.Add(), _total(terms[half:]))
+    computed = OPERATORS | dict(functions)
+    counts, known = uses(function.operations), {}
+    for number in function.needed:
+        kind, arguments, detail = function.operations[number]
+        values = [known[n] for n in arguments]
+        if kind == "number":
+            found = detail
+        elif kind == "entry":
+            found = arrays[detail[0]][detail[1]]
+        elif kind == "table":
+            found = functions["entry"](*values, detail)
+        else:
+            found = computed[RENAMED.get(kind, kind)](*values)
+            found = let(found) if let and counts[number] > 1 else found
+        known[number] = found
+    return [known[number] for number in function.results]

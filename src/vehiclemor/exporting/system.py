@@ -79,4 +79,4 @@ class ExportedSystem(ShortRepr):
         constants, rates, outputs = (self.functions[name] for name in SIGNATURES)
         used = sorted(rates.read("c") | outputs.read("c"))
         of_these = [constants.results[place] for place in used]
-        return StraightLine(constants.assignments, of_these).read("p")
+        return StraightLine(constants.operations, of_these).read("p")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vehiclemor.exporting.interpreter import evaluated
 from vehiclemor.exporting.packages import needed
-from vehiclemor.exporting.straight_line import FUNCTIONS
+from vehiclemor.exporting.straight_line import FUNCTIONS, evaluated
 from vehiclemor.exporting.system import ExportedSystem
 
 if TYPE_CHECKING:

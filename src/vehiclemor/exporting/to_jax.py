@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.exporting.interpreter import evaluated
 from vehiclemor.exporting.packages import needed
-from vehiclemor.exporting.straight_line import FUNCTIONS
+from vehiclemor.exporting.straight_line import FUNCTIONS, evaluated
 from vehiclemor.exporting.system import ExportedSystem
 
 # Where JAX has another name.

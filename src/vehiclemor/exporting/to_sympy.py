@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.exporting.interpreter import evaluated
-from vehiclemor.exporting.straight_line import FUNCTIONS
+from vehiclemor.exporting.straight_line import FUNCTIONS, evaluated
 from vehiclemor.exporting.system import ExportedSystem
 from vehiclemor.short_repr import ShortRepr
 

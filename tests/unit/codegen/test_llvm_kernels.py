@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from llvmlite import ir
 
 from tests.unit.programs import run
-from vehiclemor.codegen.kernel_statements import KernelText
 from vehiclemor.codegen.kernel_text import kernel_source
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.llvm_kernels import Rows, emit
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
@@ -134,7 +134,7 @@ def test_what_is_not_straight_line_is_refused(line):
     rows = {name: Rows(given) for name, given in zip(("_x", "_result"), function.args, strict=True)}
     builder = ir.IRBuilder(function.append_basic_block())
     with pytest.raises(ValueError, match=r"straight-line|unknown|index|shape"):
-        emit(KernelText(text), builder, rows)
+        emit(Kernel(text), builder, rows)
 
 
 def test_arrays_of_another_kind_are_refused():
