@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vehiclemor.maneuver import Maneuver
+    from vehiclemor.inputs.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
     from vehiclemor.study.plans.training import Given
@@ -208,7 +208,7 @@ def _scenario(
     factors: tuple[float, float],
 ) -> Scenario:
     """What is simulated, checked."""
-    from vehiclemor.maneuver import FACTORS, checked_factor
+    from vehiclemor.inputs.maneuver import FACTORS, checked_factor
     from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.study.scenario import Scenario, check
 

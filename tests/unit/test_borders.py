@@ -9,7 +9,7 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.errors import VehiclemorError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 
 SUSPENSION, CAR = "double_wishbone", "independent_suspension_vehicle"

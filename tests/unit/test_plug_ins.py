@@ -221,7 +221,7 @@ def test_the_machine_or_the_user_stops_a_method(faulty, capsys, fit, status, wor
 
 TRAVEL = """
 from dataclasses import replace
-from vehiclemor.maneuver import sine_travel
+from vehiclemor.inputs.suspension import sine_travel
 MANEUVER = replace(sine_travel, name="faulty", %s)
 """
 

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError, VehiclemorError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.dynamic import DynamicModel
 

@@ -13,7 +13,7 @@ from vehiclemor.arguments import number
 from vehiclemor.codegen.loops import Prepared, Ready, cache_lines, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
     left_validity,
     lifted_wheels,

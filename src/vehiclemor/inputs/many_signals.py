@@ -10,8 +10,8 @@ import numpy as np
 
 from vehiclemor.arguments import real_array
 from vehiclemor.errors import InputError, one_line
-from vehiclemor.piecewise import through
-from vehiclemor.signals import OUTPUT_STEP, Signal
+from vehiclemor.inputs.piecewise import through
+from vehiclemor.inputs.signal import OUTPUT_STEP, Signal
 
 
 def many_signals(

@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import InputError
-from vehiclemor.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
+from vehiclemor.inputs.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 
 # Times that differ by so little, relative to what they are, are one.
 ROUNDING = 1e-12
@@ -95,7 +95,7 @@ def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
 
 @cache
 def _loop() -> Loop:
-    return loops(("sample_loops",), ("through",))["through"]
+    return loops(("inputs.sample_loops",), ("through",))["through"]
 
 
 def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:

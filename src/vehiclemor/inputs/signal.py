@@ -12,11 +12,11 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
-from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
-from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
+from vehiclemor.inputs.columns import array_columns, csv_columns
+from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
+from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through
+from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.registry import choice
-from vehiclemor.sample_loops import Pieces
-from vehiclemor.signal_columns import array_columns, csv_columns
 from vehiclemor.units import base_units
 
 if TYPE_CHECKING:
