@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.inputs.maneuver import maneuver as maneuver
-    from vehiclemor.inputs.many_signals import many_signals as many_signals
     from vehiclemor.inputs.signal import Signal as Signal
+    from vehiclemor.inputs.signal import many_signals as many_signals
     from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
@@ -47,7 +47,7 @@ _DEFINED_IN = {
     "compare": "vehiclemor.report.comparison.kinds",
     "figures": "vehiclemor.report.regenerate",
     "maneuver": "vehiclemor.inputs.maneuver",
-    "many_signals": "vehiclemor.inputs.many_signals",
+    "many_signals": "vehiclemor.inputs.signal",
     "write_report": "vehiclemor.report.page",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),

@@ -51,7 +51,7 @@ def test_pictures_are_named_and_written(tmp_path, capsys, monkeypatch):
     arguments = ["simulate", "double_wishbone", "--method", "pod", "--out", "run.nc"]
     assert main([*arguments, "--plot"]) == 0
     assert main([*arguments, "--plot", "mine.svg"]) == 0
-    assert main(["run", "figures-6-7", "--out", "results"]) == 0
+    assert main(["run", "figures-6-7", "--results", "results"]) == 0
     assert main(["plot", "run.nc", "--kind", "errors"]) == 0
     assert main(["plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf"]) == 0
     text = capsys.readouterr().out
@@ -66,5 +66,5 @@ def test_a_result_draws_itself(tmp_path):
     dataset = vm.simulate("double_wishbone", "pod")
     dataset.vehiclemor.plot("histories", tmp_path / "a.png")
     write_dataset(dataset, tmp_path / "run.nc")
-    vm.plot(tmp_path / "run.nc", path=tmp_path / "b.png")
+    vm.plot(tmp_path / "run.nc", out=tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

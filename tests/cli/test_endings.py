@@ -33,7 +33,7 @@ def run(tmp_path):
     """Run the study; its exit status."""
     path = tmp_path / "車.toml"
     path.write_text(STUDY)
-    return lambda: main(["run", str(path), "--out", str(tmp_path / "out")])
+    return lambda: main(["run", str(path), "--results", str(tmp_path / "out")])
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

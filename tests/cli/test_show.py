@@ -5,7 +5,7 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.cli.app import COMMANDS
-from vehiclemor.cli.key_values import parsed
+from vehiclemor.cli.options import key_values
 from vehiclemor.codegen import cache, derivation
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
@@ -111,8 +111,8 @@ def test_bounds_and_overrides_are_shown():
 def test_text_of_the_command_line_gets_its_kind():
     texts = ["3", "-2", "2.5", "1e-6", "fast", "3a", "1,2.5", "theta,alpha"]
     values = [3, -2, 2.5, 1e-6, "fast", "3a", [1.0, 2.5], "theta,alpha"]
-    assert list(map(repr, map(parsed, texts))) == list(map(repr, values))
-    assert parsed("") == ""
+    found = [key_values("--set", [f"a={text}"])["a"] for text in [*texts, ""]]
+    assert list(map(repr, found)) == list(map(repr, [*values, ""]))
 
 
 def test_the_handbook_is_where_the_help_says(capsys):
@@ -150,7 +150,7 @@ def test_simulations_and_studies(printed, tmp_path):
     for model in names("model"):
         for arguments in ([], ["--method", "pod", "--all-outputs"]):
             assert "nan" not in printed("simulate", model, *arguments)
-    printed("run", "figures-6-7", "--out", tmp_path)
+    printed("run", "figures-6-7", "--results", tmp_path)
 
 
 def test_help(printed):

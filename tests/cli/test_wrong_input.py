@@ -117,7 +117,7 @@ def test_wrong_arguments(fails, command, word, tmp_path, monkeypatch):
 def test_files_that_are_wrong_are_named(fails, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(parameter_path("double_wishbone").read_text().replace('"m"', '"mm"'))
-    fails([*TRAVEL.split(), "--parameters", path], str(path), "'mm'")
+    fails([*TRAVEL.split(), "--parameter-file", path], str(path), "'mm'")
     path.write_bytes(bytes(range(256)))
     fails(["run", path], str(path), "UTF-8")
 
@@ -128,21 +128,21 @@ def test_output_that_is_something_else_is_kept(fails, tmp_path):
     simulate = [*TRAVEL.split(), "--out"]
     fails([*simulate, out], "result.nc", "move it away")
     fails([*simulate, tmp_path], "folder")
-    fails(["run", "figures-6-7", "--out", out], "not a folder")
+    fails(["run", "figures-6-7", "--results", out], "not a folder")
     fails(["figures", "--only", "5", "--out", out], "not a folder")
     assert out.read_text() == "my notes"
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a place where nobody writes")
 def test_an_unwritable_output_folder(fails):
-    fails(["run", "figures-6-7", "--out", "/proc/self/results"], "can't be written")
+    fails(["run", "figures-6-7", "--results", "/proc/self/results"], "can't be written")
     fails(["figures", "--only", "5", "--out", "/proc/self/figures"], "can't be written")
 
 
 def test_names_that_are_too_long(fails, tmp_path):
     long = tmp_path / ("n" * 300)
     fails([*TRAVEL.split(), "--out", f"{long}.nc"], "too long")
-    fails(["run", "figures-6-7", "--out", long], "too long")
+    fails(["run", "figures-6-7", "--results", long], "too long")
     fails(["run", f"{long}.toml"], "too long")
 
 
@@ -251,7 +251,7 @@ def test_a_study_that_cant_be(fails, tmp_path, old, new, word):
     assert old in STUDY
     path = tmp_path / "mine.toml"
     path.write_text(STUDY.replace(old, new))
-    fails(["run", path, "--out", tmp_path / "results"], word)
+    fails(["run", path, "--results", tmp_path / "results"], word)
     assert not (tmp_path / "results").exists()
 
 
@@ -261,4 +261,4 @@ def test_a_protocol_that_cant_be(fails, tmp_path, old, new, word):
     path, study = tmp_path / "wrong.toml", tmp_path / "study.toml"
     path.write_text(PROTOCOL.replace(old, new, 1))
     study.write_text(f'title = "mine"\nstudies = {json.dumps([str(path)])}\n')
-    fails(["run", study, "--out", tmp_path / "out"], "wrong.toml", word)
+    fails(["run", study, "--results", tmp_path / "out"], "wrong.toml", word)

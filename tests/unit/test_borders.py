@@ -101,7 +101,7 @@ def trained(points):
         (vm.maneuver, ["lane_chang"], "did you mean lane_change"),
         (vm.run_study, NO_PATHS, "study"),
         (lambda v: vm.run_study("paper", jobs=v), NO_JOBS, "jobs is"),
-        (lambda v: vm.run_study("paper", out=v), NO_PATHS, "out: "),
+        (lambda v: vm.run_study("paper", results=v), NO_PATHS, "results: "),
         (vm.compare, [["paper"]], "unknown comparison"),
         (lambda v: vm.compare(jobs=v), NO_JOBS, "jobs is"),
         (vm.figures, [3, [5]], "only is"),

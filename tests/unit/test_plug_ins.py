@@ -198,7 +198,7 @@ def test_a_study_with_a_broken_method_is_finished(faulty, tmp_path, change, stat
     faulty(change)
     path = tmp_path / "mine.toml"
     path.write_text(STUDY)
-    data = vm.run_study(path, out=tmp_path / "results").squeeze()
+    data = vm.run_study(path, results=tmp_path / "results").squeeze()
     assert data["status"].values.tolist() == [status, "ok"]
     if status == "rejected":
         assert "refusal" in data["message"].values[0]
@@ -249,7 +249,7 @@ def test_processes_go_on_after_a_method_that_ends_its_own(tmp_path, capsys):
     study = tmp_path / "mine.toml"
     study.write_text(STUDY.replace("faulty", "ending") + grid)
     with installed(tmp_path):
-        assert main(["run", str(study), "--jobs", "2", "--out", str(tmp_path / "results")]) == 1
+        assert main(["run", str(study), "--jobs", "2", "--results", str(tmp_path / "results")]) == 1
     assert "2 error, 2 ok" in capsys.readouterr().out
 
 

@@ -6,22 +6,10 @@ from collections.abc import Sequence
 from cyclopts import App, Parameter
 
 from vehiclemor import __version__
-from vehiclemor.cli.cite import cite
-from vehiclemor.cli.compare import compare
-from vehiclemor.cli.conversion import strict
-from vehiclemor.cli.convert import convert
-from vehiclemor.cli.ending import ended
-from vehiclemor.cli.exit_status import MEANING
-from vehiclemor.cli.export import export
-from vehiclemor.cli.figures import figures
-from vehiclemor.cli.list import list_components
+from vehiclemor.cli import names, runs, studies
+from vehiclemor.cli.ending import MEANING, ended
 from vehiclemor.cli.new_plugin import new_plugin
-from vehiclemor.cli.plot import plot
-from vehiclemor.cli.report import report
-from vehiclemor.cli.run import run
-from vehiclemor.cli.show import show
-from vehiclemor.cli.simulate import simulate
-from vehiclemor.cli.status import status
+from vehiclemor.cli.options import strict
 from vehiclemor.resources import handbook_folder
 
 app = App(
@@ -29,25 +17,25 @@ app = App(
     version=__version__,
     help="Benchmark suite for model order reduction of multibody vehicle models.\n\n"
     f"Handbook (notation, findings, how to add a model or a method): {handbook_folder()}",
-    default_parameter=Parameter(converter=strict),
+    default_parameter=Parameter(converter=strict, negative=""),
     help_epilogue=MEANING,
     # It must reach `ended`, which tells how to resume.
     suppress_keyboard_interrupt=False,
 )
 COMMANDS = {
-    "list": list_components,
-    "show": show,
-    "simulate": simulate,
-    "plot": plot,
-    "run": run,
-    "status": status,
-    "compare": compare,
-    "figures": figures,
-    "report": report,
-    "export": export,
-    "convert": convert,
+    "list": names.list_components,
+    "show": names.show,
+    "simulate": runs.simulate,
+    "plot": runs.plot,
+    "run": studies.run,
+    "status": studies.status,
+    "compare": studies.compare,
+    "figures": studies.figures,
+    "report": studies.report,
+    "export": runs.export,
+    "convert": studies.convert,
     "new-plugin": new_plugin,
-    "cite": cite,
+    "cite": names.cite,
 }
 for name, command in COMMANDS.items():
     app.command(command, name=name)

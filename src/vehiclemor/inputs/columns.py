@@ -1,7 +1,9 @@
-"""Named columns of tables, from which signals are made."""
+"""Named columns of tables, from which signals are made, and their SI units."""
 
 from __future__ import annotations
 
+import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +12,21 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import FileError, InputError, one_line
 
+# What may stand between columns in the place of the separator that is expected.
+SEPARATORS = ",;\t| "
 
-def csv_columns(path: Path) -> dict[str, np.ndarray]:
+
+def csv_columns(path: Path, separator: str) -> dict[str, np.ndarray]:
     """Columns (n,) of a CSV file by the names in its first line; `FileError` if it is none."""
     import pandas as pd
 
+    if not isinstance(separator, str) or len(separator) != 1:
+        raise InputError(f"separator is {quoted(separator)}, not a character")
+    read = partial(pd.read_csv, path, sep=separator, skipinitialspace=True)
     try:
         # A longer row, of which an index would be made, is refused here; names are not yet altered.
-        names = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str).iloc[0]
-        table = pd.read_csv(path, skipinitialspace=True)
+        names = read(header=None, nrows=2, dtype=str).iloc[0]
+        table = read()
     except FileNotFoundError:
         raise FileError(f"{path}: no such file") from None
     except OSError as error:
@@ -27,6 +35,9 @@ def csv_columns(path: Path) -> dict[str, np.ndarray]:
         raise FileError(f"{path}: no CSV file: {one_line(error)}") from None
     if names.dropna().duplicated().any():
         raise FileError(f"{path}: columns have the same name")
+    other = [character for character in SEPARATORS if character in str(names[0])]
+    if len(names) == 1 and other:
+        raise FileError(f"{path}: one column, {quoted(names[0])}: is separator={other[0]!r} meant?")
     return {str(name): table[name].to_numpy() for name in table.columns}
 
 
@@ -56,3 +67,30 @@ def array_columns(data: Any, time: str) -> tuple[dict[str, np.ndarray], dict[str
     units = {name: str(array.attrs.get("units", told)) for name, array in own.items()}
     units[time] = str(data[time].attrs.get("units", ""))
     return {name: array.to_numpy() for name, array in (own | {time: data[time]}).items()}, units
+
+
+# Unit -> powers of base units.
+DERIVED = {
+    **{name: {name: 1} for name in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Hz": {"s": -1},
+}
+
+
+def base_units(unit: str) -> dict[str, int] | None:
+    """Powers of base units in a unit such as `N s/m` or `m s-1`; none where a name is unknown."""
+    powers: dict[str, int] = {}
+    numerator, *denominators = unit.split("/")
+    for sign, part in ((1, numerator), *((-1, part) for part in denominators)):
+        for factor in part.split():
+            match = re.fullmatch(r"([A-Za-z]+)(?:\^?(-?\d+))?", factor)
+            if factor == "1":
+                continue
+            if match is None or match[1] not in DERIVED:
+                return None
+            for base, power in DERIVED[match[1]].items():
+                powers[base] = powers.get(base, 0) + sign * power * int(match[2] or 1)
+    return powers

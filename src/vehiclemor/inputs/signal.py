@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,11 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
-from vehiclemor.inputs.columns import array_columns, csv_columns
+from vehiclemor.inputs.columns import array_columns, base_units, csv_columns
 from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.registry import choice
-from vehiclemor.units import base_units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,15 +108,9 @@ class Signal(Maneuver):
             raise InputError("name is empty")
         (pieces,) = through(times, values[None], hold)
         duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
-        return _template()._with(
-            name=name,
-            summary=f"{len(times)} samples, {hold} hold",
-            inputs=names,
-            duration=duration,
-            samples=_output_samples(duration, output_step),
-            hold=hold,
-            pieces=pieces,
-        )
+        samples = _output_samples(duration, output_step)
+        summary, own = f"{len(times)} samples, {hold} hold", {"hold": hold, "pieces": pieces}
+        return cls(name, summary, _unused, names, duration, samples, _unused, **own)
 
     @property
     def polynomials(self) -> Pieces:
@@ -132,12 +124,6 @@ class Signal(Maneuver):
             amplitudes = amplitude * frequency**orders
             self.kept["polynomials"] = scaled(self.pieces, frequency, amplitudes)
         return self.kept["polynomials"]
-
-    def _with(self, **changes: Any) -> Signal:
-        """The signal with other attributes, in a third of the time that `replace` takes."""
-        found = object.__new__(type(self))
-        found.__dict__.update(self.__dict__ | {"kept": {}} | changes)
-        return found
 
     @property
     def break_points(self) -> tuple[float, ...]:
@@ -154,10 +140,12 @@ class Signal(Maneuver):
         amplitude = checked_factor("amplitude", amplitude)
         if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
             return self
-        return self._with(
+        return replace(
+            self,
             frequency_factor=frequency,
             amplitude_factor=amplitude,
             duration=float(self.pieces.edges[-1]) / frequency,
+            kept={},
         )
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
@@ -185,10 +173,10 @@ class Signal(Maneuver):
             if name not in names:
                 raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
         if not self.inputs:
-            return self._with(inputs=names)
+            return replace(self, inputs=names, kept={})
         coefficients = np.stack([self._column(name) for name in names], axis=1)
         pieces = self.pieces._replace(coefficients=coefficients)
-        return self._with(inputs=names, pieces=pieces)
+        return replace(self, inputs=names, pieces=pieces, kept={})
 
     def _column(self, name: str) -> np.ndarray:
         """Polynomials (pieces, 6) of an input, at factors of 1."""
@@ -240,6 +228,7 @@ class Signal(Maneuver):
         path: str | Path,
         hold: str = "linear",
         *,
+        separator: str = ",",
         time: str = "time",
         inputs: str | Sequence[str] | Mapping[str, str] = (),
         **further: Any,
@@ -248,6 +237,8 @@ class Signal(Maneuver):
 
         Parameters
         ----------
+        separator
+            Character between columns.
         time
             Column of the times in s.
         inputs
@@ -261,7 +252,7 @@ class Signal(Maneuver):
             If there is no such file, or it is none.
         """
         file = file_path("path", path)
-        columns = csv_columns(file), {}
+        columns = csv_columns(file, separator), {}
         return cls._of_columns(str(file), columns, time, inputs, hold, further)
 
     @classmethod
@@ -317,26 +308,60 @@ class Signal(Maneuver):
         return cls.from_samples(columns[time], values, hold, inputs=[*named], **further)
 
 
-@cache
-def _template() -> Signal:
-    """What all signals have alike."""
-    return Signal("signal", "", _no_function, (), 0.0, 2, _no_corners)
+def many_signals(
+    t: Any,
+    u: Any,
+    hold: str = "linear",
+    *,
+    inputs: str | Sequence[str] = (),
+    output_step: float = OUTPUT_STEP,
+) -> list[Signal]:
+    """Signals through samples at the same times, by one compiled call for all.
+
+    Parameters
+    ----------
+    t
+        Increasing times (n,) in s.
+    u
+        Inputs (runs, n) or (runs, n, inputs) at these times, SI units.
+    hold, inputs, output_step
+        See `Signal.from_samples`.
+
+    Raises
+    ------
+    InputError
+        If the samples are none of signals.
+    """
+    times, values = _arrays(t, u)
+    if values.ndim not in (2, 3) or not len(values) or values.shape[1:2] != times.shape:
+        raise InputError(
+            f"samples of signals: t has shape {times.shape} and u {values.shape}, "
+            f"not (n,) and (runs, n) or (runs, n, inputs)"
+        )
+    values = np.ascontiguousarray(values.reshape(*values.shape[:2], -1))
+    # All that they share is checked with the first.
+    first = Signal.from_samples(times, values[0], hold, inputs=inputs, output_step=output_step)
+    finite = np.isfinite(values).all(axis=(1, 2))
+    if not finite.all():
+        raise InputError(f"samples of signals: run {finite.argmin()} holds what is not finite")
+    every = through(times - times[0], values, hold)
+    return [replace(first, pieces=pieces, kept={}) for pieces in every]
 
 
-def _no_function(*_: Any) -> np.ndarray:
-    raise NotImplementedError("a signal is evaluated by its polynomials")
+def _unused(*_: Any) -> Any:
+    raise NotImplementedError("a signal is evaluated by its polynomials, which have its corners")
 
 
-def _no_corners(_: float) -> tuple[float, ...]:
-    raise NotImplementedError("the corners of a signal are in its polynomials")
+def _arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        return real_array(t), real_array(u)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"samples of a signal: {one_line(error)}") from None
 
 
 def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
     """Times (n,) in s from zero on and inputs (n, inputs) of a signal, checked."""
-    try:
-        times, values = real_array(t), real_array(u)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"samples of a signal: {one_line(error)}") from None
+    times, values = _arrays(t, u)
     if times.ndim != 1 or values.ndim not in (1, 2) or len(values) != len(times):
         raise InputError(
             f"samples of a signal: t has shape {times.shape} and u {values.shape}, "

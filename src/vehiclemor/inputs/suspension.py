@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver, smooth
+from vehiclemor.inputs.steering import MULTISINE, PHASES
 
 # Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.
 TRAVEL_AMPLITUDE = 0.1
@@ -21,10 +22,8 @@ RACK_FREQUENCY = TRAVEL_FREQUENCY * 0.5 * (1.0 + np.sqrt(5.0))
 # First and last frequencies (Hz) of the sweeps, which cross.
 TRAVEL_SWEEP = TRAVEL_FREQUENCY, CHIRP_LAST_FREQUENCY
 RACK_SWEEP = 0.5, RACK_FREQUENCY
-# Frequencies (Hz), and phases after M. R. Schroeder, IEEE Trans. Inf. Theory 16 (1970), 85-89.
-TRAVEL_SINES = np.array([0.15, 0.35, 0.6, 0.95, 1.4])
+# Frequencies (Hz) beside those of steering.
 RACK_SINES = np.array([0.1, 0.25, 0.45, 0.7, 1.1])
-PHASES = -np.pi * np.arange(5) * np.arange(1, 6) / 5
 
 
 def _travel(times: np.ndarray, phase: np.ndarray, amplitude: float) -> np.ndarray:
@@ -85,7 +84,7 @@ def _multisines(times: np.ndarray, frequency: float, amplitude: float) -> np.nda
     def waves(hertz: np.ndarray) -> np.ndarray:
         return np.sin(hertz * angle + PHASES).mean(axis=1)
 
-    return _scaled(waves(TRAVEL_SINES), waves(RACK_SINES), amplitude)
+    return _scaled(waves(MULTISINE), waves(RACK_SINES), amplitude)
 
 
 travel_and_rack = replace(
