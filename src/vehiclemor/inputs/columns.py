@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,42 @@ def array_columns(data: Any, time: str) -> tuple[dict[str, np.ndarray], dict[str
     units = {name: str(array.attrs.get("units", told)) for name, array in own.items()}
     units[time] = str(data[time].attrs.get("units", ""))
     return {name: array.to_numpy() for name, array in (own | {time: data[time]}).items()}, units
+
+
+def chosen_columns(
+    where: str,
+    columns: Mapping[str, np.ndarray],
+    units: Mapping[str, str],
+    time: str,
+    inputs: str | Sequence[str] | Mapping[str, str],
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Times (n,), inputs (n, inputs) and their names, of the columns that are named, else of all.
+
+    Raises
+    ------
+    InputError
+        If there is no such column, or it tells another unit than one of SI.
+    """
+    chosen = inputs or [name for name in columns if name != time]
+    named = chosen if isinstance(chosen, Mapping) else {name: name for name in listed(chosen)}
+    for name in listed([time, *named.values()]):
+        if name not in columns:
+            known = ", ".join(columns)
+            raise InputError(f"{where}: there is no column {quoted(name)} among {known}")
+        powers = base_units(units.get(name, ""))
+        if powers is None or (name == time and powers not in ({}, {"s": 1})):
+            wanted = "s" if name == time else "SI units such as m, rad or m/s"
+            raise InputError(f"{where}: {quoted(name)} is in {units[name]}, not in {wanted}")
+    values = np.column_stack([columns[name] for name in named.values()] or [np.empty(0)])
+    return columns[time], values, [*named]
+
+
+def listed(inputs: Any) -> tuple[str, ...]:
+    """Names, of which one may stand alone."""
+    names = (inputs,) if isinstance(inputs, str) else inputs
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
+    return tuple(names)
 
 
 # Unit -> powers of base units.

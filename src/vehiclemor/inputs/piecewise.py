@@ -104,8 +104,10 @@ def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:
         row = int(np.argmax(times[1:] <= times[:-1]))
         now, before = times[row + 1], times[row]
         return f"times must increase, t[{row + 1}] = {now:.6g} s follows {before:.6g} s"
-    given = times if status == DISORDERED else samples[NOT_FINITE - status]
+    run = NOT_FINITE - status
+    given = times if status == DISORDERED else samples[run]
     finite = np.isfinite(given).reshape(len(given), -1).all(axis=1)
     if finite.all():
         return "the polynomials through them are not finite"
-    return f"{'t' if status == DISORDERED else 'u'}[{finite.argmin()}] is not finite"
+    where = f" of run {run}" if len(samples) > 1 and status != DISORDERED else ""
+    return f"{'t' if status == DISORDERED else 'u'}[{finite.argmin()}]{where} is not finite"

@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
-from vehiclemor.inputs.columns import array_columns, base_units, csv_columns
+from vehiclemor.inputs.columns import array_columns, chosen_columns, csv_columns, listed
 from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through
 from vehiclemor.inputs.sample_loops import Pieces
@@ -101,16 +101,9 @@ class Signal(Maneuver):
         InputError
             If times don't increase, a value isn't finite, or shapes don't fit.
         """
-        choice("hold", hold, HOLDS)
-        times, values = _samples(t, u)
-        names = _names(inputs, values.shape[1])
-        if not line_of_text("name", name):
-            raise InputError("name is empty")
-        (pieces,) = through(times, values[None], hold)
-        duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
-        samples = _output_samples(duration, output_step)
-        summary, own = f"{len(times)} samples, {hold} hold", {"hold": hold, "pieces": pieces}
-        return cls(name, summary, _unused, names, duration, samples, _unused, **own)
+        times, values = _arrays(t, u)
+        how: dict[str, Any] = {"inputs": inputs, "output_step": output_step, "name": name}
+        return many_signals(times, values[None], hold, **how)[0]
 
     @property
     def polynomials(self) -> Pieces:
@@ -251,9 +244,9 @@ class Signal(Maneuver):
         FileError
             If there is no such file, or it is none.
         """
-        file = file_path("path", path)
-        columns = csv_columns(file, separator), {}
-        return cls._of_columns(str(file), columns, time, inputs, hold, further)
+        columns = csv_columns(file_path("path", path), separator)
+        times, values, names = chosen_columns(str(path), columns, {}, time, inputs)
+        return cls.from_samples(times, values, hold, inputs=names, **further)
 
     @classmethod
     def from_xarray(
@@ -279,33 +272,9 @@ class Signal(Maneuver):
         **further
             As of `from_samples`, which tells the rest.
         """
-        columns = array_columns(data, time)
-        return cls._of_columns("the data", columns, time, inputs, hold, further)
-
-    @classmethod
-    def _of_columns(
-        cls,
-        where: str,
-        table: tuple[Mapping[str, np.ndarray], Mapping[str, str]],
-        time: str,
-        inputs: str | Sequence[str] | Mapping[str, str],
-        hold: str,
-        further: Mapping[str, Any],
-    ) -> Signal:
-        """A signal of named columns, one of which holds the times, with units where they tell."""
-        columns, units = table
-        chosen = inputs or [name for name in columns if name != time]
-        named = chosen if isinstance(chosen, Mapping) else {name: name for name in _listed(chosen)}
-        for name in _listed([time, *named.values()]):
-            if name not in columns:
-                known = ", ".join(columns)
-                raise InputError(f"{where}: there is no column {quoted(name)} among {known}")
-            powers = base_units(units.get(name, ""))
-            if powers is None or (name == time and powers not in ({}, {"s": 1})):
-                wanted = "s" if name == time else "SI units such as m, rad or m/s"
-                raise InputError(f"{where}: {quoted(name)} is in {units[name]}, not in {wanted}")
-        values = np.column_stack([columns[name] for name in named.values()] or [np.empty(0)])
-        return cls.from_samples(columns[time], values, hold, inputs=[*named], **further)
+        columns, units = array_columns(data, time)
+        times, values, names = chosen_columns("the data", columns, units, time, inputs)
+        return cls.from_samples(times, values, hold, inputs=names, **further)
 
 
 def many_signals(
@@ -315,6 +284,7 @@ def many_signals(
     *,
     inputs: str | Sequence[str] = (),
     output_step: float = OUTPUT_STEP,
+    name: str = "signal",
 ) -> list[Signal]:
     """Signals through samples at the same times, by one compiled call for all.
 
@@ -324,7 +294,7 @@ def many_signals(
         Increasing times (n,) in s.
     u
         Inputs (runs, n) or (runs, n, inputs) at these times, SI units.
-    hold, inputs, output_step
+    hold, inputs, output_step, name
         See `Signal.from_samples`.
 
     Raises
@@ -332,20 +302,25 @@ def many_signals(
     InputError
         If the samples are none of signals.
     """
+    choice("hold", hold, HOLDS)
     times, values = _arrays(t, u)
-    if values.ndim not in (2, 3) or not len(values) or values.shape[1:2] != times.shape:
+    if times.ndim != 1 or values.ndim not in (2, 3) or values.shape[1] != len(times):
         raise InputError(
-            f"samples of signals: t has shape {times.shape} and u {values.shape}, "
-            f"not (n,) and (runs, n) or (runs, n, inputs)"
+            f"samples of a signal: t has shape {times.shape} and u {values.shape[1:]} in a run, "
+            f"not (n,) and (n,) or (n, inputs)"
         )
-    values = np.ascontiguousarray(values.reshape(*values.shape[:2], -1))
-    # All that they share is checked with the first.
-    first = Signal.from_samples(times, values[0], hold, inputs=inputs, output_step=output_step)
-    finite = np.isfinite(values).all(axis=(1, 2))
-    if not finite.all():
-        raise InputError(f"samples of signals: run {finite.argmin()} holds what is not finite")
-    every = through(times - times[0], values, hold)
-    return [replace(first, pieces=pieces, kept={}) for pieces in every]
+    if len(times) < 2 or not len(values):
+        raise InputError(f"a signal needs two samples at least, not {len(times)}")
+    within("number of samples", len(times), (2, MOST_SAMPLES))
+    times, values = times - times[0], values.reshape(*values.shape[:2], -1)
+    names = _names(inputs, values.shape[2])
+    if not line_of_text("name", name):
+        raise InputError("name is empty")
+    every = through(times, np.ascontiguousarray(values), hold)
+    duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
+    own = f"{len(times)} samples, {hold} hold", _unused, names, duration
+    samples = _output_samples(duration, output_step)
+    return [Signal(name, *own, samples, _unused, hold=hold, pieces=pieces) for pieces in every]
 
 
 def _unused(*_: Any) -> Any:
@@ -359,35 +334,12 @@ def _arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
         raise InputError(f"samples of a signal: {one_line(error)}") from None
 
 
-def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s from zero on and inputs (n, inputs) of a signal, checked."""
-    times, values = _arrays(t, u)
-    if times.ndim != 1 or values.ndim not in (1, 2) or len(values) != len(times):
-        raise InputError(
-            f"samples of a signal: t has shape {times.shape} and u {values.shape}, "
-            f"not (n,) and (n,) or (n, inputs)"
-        )
-    if len(times) < 2:
-        raise InputError(f"a signal needs two samples at least, not {len(times)}")
-    values = values.reshape(len(times), -1)
-    within("number of samples", len(times), (2, MOST_SAMPLES))
-    return times - times[0], np.ascontiguousarray(values)
-
-
 def _names(inputs: Any, columns: int) -> tuple[str, ...]:
     """Names of the columns, or none."""
-    names = _listed(inputs)
+    names = listed(inputs)
     if len(set(names)) < len(names) or len(names) not in (0, columns):
         raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
     return names
-
-
-def _listed(inputs: Any) -> tuple[str, ...]:
-    """Names, of which one may stand alone."""
-    names = (inputs,) if isinstance(inputs, str) else inputs
-    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
-    return tuple(names)
 
 
 def _output_samples(duration: float, step: Any) -> int:
