@@ -70,7 +70,7 @@ def test_values_come_in_declared_order_and_an_override_says_so(load):
         ('unit = "kg"', 'unit = "t"', "parameters.mass.unit: 't'"),
         ('source = "book"', 'source = "blog"', "parameters.pivot.source: 'blog'"),
         ("[4, 5.0, 6.0]", "[4.0, 5.0]", "parameters.pivot: a point has 3 components"),
-        ("[4, 5.0, 6.0]", "[4.0, 5.0, nan]", "parameters.pivot.value: .* is not finite"),
+        ("[4, 5.0, 6.0]", "[4.0, 5.0, nan]", "parameters.pivot: nan is not finite"),
         ("[4, 5.0, 6.0]", "[4.0, 500.0, 6.0]", "parameters.pivot: 500.0 m .* millimetres"),
         ("[4, 5.0, 6.0]", '["4", 5.0, 6.0]', "parameters.pivot.value"),
         ("value = 20.0", "value = 5.0", "parameters.speed: 5 m/s"),
