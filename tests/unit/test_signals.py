@@ -77,7 +77,6 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: vm.Signal.from_samples([0.0, 1.0], [0.0, np.inf]), r"u\[1\] is not finite"),
         (lambda: vm.Signal.from_samples([0.0], [0.0]), "two samples at least, not 1"),
         (lambda: vm.Signal.from_samples([0, 1], [0, 1, 2]), r"t has shape \(2,\) and u \(3,\)"),
-        (lambda: vm.Signal.from_samples([0.0, 1.0], ["a", "b"]), "is not a number"),
         (lambda: vm.Signal.from_samples(*HUGE, "cubic"), "polynomials .* are not finite"),
         (lambda: vm.many_signals([0.0, 0.1], [1.0, 2.0, 3.0]), r"t has shape \(2,\)"),
         (lambda: vm.many_signals([0, 1], [[0, 0], [0, np.inf]]), r"u\[1\] of run 1 is not finite"),
@@ -89,19 +88,15 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: of_csv(""), "no CSV file"),
         (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time' among t, delta"),
         (lambda: of_csv("time,delta\n0,1\n1,two\n"), "is not a number"),
-        (lambda: of_csv("time,delta\n0,1\n1,\n"), r"u\[1\] is not finite"),
         (lambda: of_csv("time,delta\n0,1,2\n1,2,3\n"), "no CSV file: .* in line 2"),
-        (lambda: of_csv("time,delta\n0,1,\n1,2,\n"), "no CSV file"),
         (lambda: of_csv("time,delta\n0,1\n1,2,3\n"), "no CSV file"),
         (lambda: of_csv("time,a,a\n0,1,2\n1,2,3\n", inputs=["a"]), "columns have the same name"),
         (lambda: of_csv("time;delta\n0;1\n1;2\n"), "separator=';'"),
         (lambda: of_csv(TABLE, separator=3), "separator is 3"),
         (lambda: of_csv(TABLE, inputs=["s"]), "no column 's' among time, delta"),
-        (lambda: of_csv(TABLE, inputs="d"), "no column 'd' among"),
         (lambda: of_csv(TABLE, inputs=3), "inputs is 3, not a list of names"),
         (lambda: of_csv(TABLE, inputs={"d": ["delta"]}), "not a list of names"),
         (of_array, "the data: ValueError"),
-        (lambda: of_array("time"), "the data: ValueError"),
         (lambda: vm.Signal.from_xarray(UNNAMED), "a coordinate 'time' is needed"),
         (lambda: vm.Signal.from_xarray([1.0, 2.0]), "neither a DataArray nor a Dataset"),
         (lambda: of_array("a", {"units": "ms"}), "'time' is in ms, not in s"),
@@ -216,6 +211,7 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
     wanted = vm.Signal.from_samples(t, u[:, 0], inputs="delta")
     table = xr.Dataset({"delta": ("time", u[:, 0]), "other": ("time", u[:, 1])}, coords={"time": t})
     table.to_dataframe().to_csv(tmp_path / "log.csv")
+    table.to_dataframe().to_csv(tmp_path / "log.txt", sep=";")
     array = xr.DataArray(u, {"time": t, "input": ["delta", "other"]}, ("time", "input"))
     renamed = {"delta": "steering angle"}
     found = [
@@ -225,6 +221,7 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         vm.Signal.from_xarray(table.rename(renamed), inputs=renamed),
         # One name may stand alone.
         vm.Signal.from_csv(tmp_path / "log.csv", inputs="delta"),
+        vm.Signal.from_csv(tmp_path / "log.txt", separator=";", inputs="delta"),
         vm.Signal.from_function(lambda t: 0.01 * np.sin(t), 2.0, "linear", step=0.02),
     ]
     for signal in found:
@@ -234,20 +231,17 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         np.testing.assert_allclose(car.simulate(signal).inputs, car.simulate(wanted).inputs)
 
 
-@pytest.mark.parametrize("kind", ["array", "set", "columns"])
-def test_units_are_those_of_si(kind):
-    for unit in ("rad", "m s-2", "", "deg"):
-        attributes = {"units": unit} if unit else {}
-        data = xr.DataArray([1.0, 2.0], {"time": [0.0, 1.0]}, "time", "a", attributes)
-        if kind == "set":
-            data = xr.Dataset({"a": data, "other": data.assign_attrs(units="km/h")})
-        elif kind == "columns":
-            data = data.expand_dims(input=["a"])
+@pytest.mark.parametrize("unit", ["rad", "m s-2", "", "deg"])
+def test_units_are_those_of_si(unit):
+    attributes = {"units": unit} if unit else {}
+    data = xr.DataArray([1.0, 2.0], {"time": [0.0, 1.0]}, "time", "a", attributes)
+    table = xr.Dataset({"a": data, "other": data.assign_attrs(units="km/h")})
+    for labelled in (data, table, data.expand_dims(input=["a"])):
         if unit != "deg":
-            assert vm.Signal.from_xarray(data, inputs="a").inputs == ("a",)
+            assert vm.Signal.from_xarray(labelled, inputs="a").inputs == ("a",)
             continue
-        with pytest.raises(InputError, match="'a' is in deg, not in SI units such as"):
-            vm.Signal.from_xarray(data, inputs="a")
+        with pytest.raises(InputError, match="'a' is in deg"):
+            vm.Signal.from_xarray(labelled, inputs="a")
 
 
 def test_a_mechanism_is_moved_by_a_signal():

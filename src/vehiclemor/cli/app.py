@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from cyclopts import App, Parameter
 
 from vehiclemor import __version__
-from vehiclemor.cli import names, runs, studies
 from vehiclemor.cli.ending import MEANING, ended
+from vehiclemor.cli.names import cite, list_components, show
 from vehiclemor.cli.new_plugin import new_plugin
 from vehiclemor.cli.options import strict
+from vehiclemor.cli.runs import export, plot, simulate
+from vehiclemor.cli.studies import compare, convert, figures, report, run, status
 from vehiclemor.resources import handbook_folder
 
 app = App(
@@ -22,21 +24,8 @@ app = App(
     # It must reach `ended`, which tells how to resume.
     suppress_keyboard_interrupt=False,
 )
-COMMANDS = {
-    "list": names.list_components,
-    "show": names.show,
-    "simulate": runs.simulate,
-    "plot": runs.plot,
-    "run": studies.run,
-    "status": studies.status,
-    "compare": studies.compare,
-    "figures": studies.figures,
-    "report": studies.report,
-    "export": runs.export,
-    "convert": studies.convert,
-    "new-plugin": new_plugin,
-    "cite": names.cite,
-}
+OTHERS = (show, simulate, plot, run, status, compare, figures, report, export, convert, cite)
+COMMANDS = {"list": list_components, "new-plugin": new_plugin} | {c.__name__: c for c in OTHERS}
 for name, command in COMMANDS.items():
     app.command(command, name=name)
 
