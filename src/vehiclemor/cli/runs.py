@@ -76,11 +76,11 @@ def simulate(
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
+    picture = None
     if plot is not None:
         if len(plot) > 1:
             raise InputError(f"--plot: one file, not {len(plot)}")
-        (picture,) = plot or [Path(f"{model}-{method}.png")]
-        picture_file("--plot", picture)
+        picture = picture_file("--plot", plot[0] if plot else Path(f"{model}-{method}.png"))
     if out is not None:
         result_file("--out", out)
     ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
@@ -96,10 +96,10 @@ def simulate(
     if out is not None:
         write_dataset(dataset, out)
         print(f"written: {out}")
-    if plot is not None:
+    if picture:
         vm.plot(dataset, out=picture)
         print(f"written: {picture}")
-    if out is None and plot is None:
+    if out is None and picture is None:
         print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
