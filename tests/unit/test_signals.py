@@ -42,6 +42,10 @@ def test_polynomials_are_scipys(hold, gaps, columns, seed, even):
     # Beside a jump both sides are right to rounding.
     places = places[np.abs(places[:, None] - times).min(axis=1) > 1e-9]
     np.testing.assert_allclose(signal.at(places), oracle(places), rtol=1e-9, atol=1e-9)
+    # At a jump the value is that after it, however its time was computed.
+    rounded = times[:-1] * (1.0 + np.finfo(float).eps * np.array([-1.0, 1.0])[:, None])
+    for around in rounded if even else [times[:-1]]:
+        np.testing.assert_allclose(signal.at(around), values[:-1], rtol=1e-9, atol=1e-9)
 
 
 def of_csv(text, **given):

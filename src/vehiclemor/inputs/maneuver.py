@@ -147,7 +147,7 @@ def smooth(frequency: float) -> tuple[float, ...]:
     return ()
 
 
-def maneuver(name: str, *, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
+def maneuver(name: str, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
     """A registered maneuver, see `maneuvers()`, with factors on its frequency and amplitude.
 
     Raises

@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import InputError
@@ -57,11 +58,7 @@ def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
         places = (times - begin) / (edges[segments + 1] - begin) * counts
         rows = np.clip(places.astype(np.int64), 0, counts - 1)
         parts, rows = places - rows, rows + first[segments]
-    own, parts = coefficients[rows], parts[:, None]
-    values = own[:, :, -1]
-    for power in range(own.shape[2] - 2, -1, -1):
-        values = own[:, :, power] + parts * values
-    return values
+    return polyval(parts[:, None], np.moveaxis(coefficients[rows], 2, 0), tensor=False)
 
 
 def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
