@@ -53,7 +53,12 @@ def test_values_come_in_declared_order_and_an_override_says_so(load):
     parameters, changed = load(), load(overrides={"pivot": (7, 8, np.float64(9)), "speed": 10})
     assert list(parameters.values()) == list(EXPECTED)
     assert (parameters["mass"].shape, parameters["pivot"].shape) == ((), (3,))
-    for found, wanted in ((changed, [2, 10, 0, 7, 8, 9]), (load(), [2, 20, 0, 4, 5, 6])):
+    one = load(overrides={"pivot.y": 8})
+    for found, wanted in (
+        (changed, [2, 10, 0, 7, 8, 9]),
+        (parameters, [2, 20, 0, 4, 5, 6]),
+        (one, [2, 20, 0, 4, 8, 6]),
+    ):
         np.testing.assert_array_equal(found.flat(), wanted)
     for found, told in ((parameters, ("published", "book")), (changed, ("assumed", "override"))):
         assert (found.entries["pivot"].status, found.entries["pivot"].source) == told

@@ -150,7 +150,8 @@ def figures(
 
     with shown_progress():
         written, failed = regenerate_figures(results, out, chosen, jobs, style=style, dpi=dpi)
-    print(*written, sep="\n")
+    for path in written:
+        print(path)
     for name, why in failed.items():
         print(f"figure {name} can't be drawn: {why}", file=sys.stderr)
     missing = {} if chosen else left_out(results)
