@@ -6,7 +6,7 @@ Timings are reported, never gated.  Counts and operation counts stand beside the
 import numpy as np
 import pytest
 
-from vehiclemor.maneuver import sine_travel
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component

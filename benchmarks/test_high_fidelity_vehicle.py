@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
+from vehiclemor.inputs.steering import rack_lane_change
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -18,7 +19,6 @@ from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.structures import FINISHED, Place
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
-from vehiclemor.steering_maneuvers import rack_lane_change
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

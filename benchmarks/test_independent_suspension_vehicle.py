@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -14,7 +15,6 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators.structures import FINISHED
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
-from vehiclemor.steering_maneuvers import lane_change
 from vehiclemor.symbolic.program import Program
 
 CALLS = 10_000

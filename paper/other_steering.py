@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from vehiclemor.errors import VehiclemorError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.study.evaluate import kept_fit, model_of
 from vehiclemor.study.plans.protocol import load_protocol, protocol_names

@@ -24,7 +24,7 @@ from vehiclemor.files import make_folder
 from vehiclemor.online.model_file import content
 from vehiclemor.online.rom import ReducedOrderModel, reduce
 from vehiclemor.online.saved import load, shipped_folder
-from vehiclemor.resources import checkout_data
+from vehiclemor.resources import data_folder
 from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.plans.protocol_run import run_protocol
@@ -114,7 +114,7 @@ def main() -> int:
     parser.add_argument("--results", type=Path, default=RESULTS, help="results folder")
     parser.add_argument("models", nargs="*", default=[*protocol_names()], metavar="MODEL")
     given = parser.parse_args()
-    if not given.check and checkout_data() is None:
+    if not given.check and data_folder() != Path(__file__).resolve().parents[1] / "data":
         raise VehiclemorError("the package does not run from a checkout: pip install -e . there")
     status = 0
     for name in given.models:

@@ -14,7 +14,7 @@ import pytest
 
 from tests.plugin.installation import installed
 from vehiclemor.cli import main
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
@@ -33,7 +33,7 @@ hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN
 COMPILATIONS = (
     """
 import vehiclemor as vm
-from vehiclemor.steering_maneuvers import straight_ahead
+from vehiclemor.inputs.steering import straight_ahead
 vm.model("independent_suspension_vehicle").simulate(straight_ahead, tolerance=1e-2)
 """,
     """

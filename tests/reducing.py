@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.steering import lane_change, rack_lane_change
 from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.reduction.training import TrainingRun
@@ -13,7 +14,6 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.steering_maneuvers import lane_change, rack_lane_change
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario, training_run
 

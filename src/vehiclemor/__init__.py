@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from vehiclemor.api import studies as studies
     from vehiclemor.errors import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
-    from vehiclemor.maneuver import maneuver as maneuver
+    from vehiclemor.inputs.maneuver import maneuver as maneuver
+    from vehiclemor.inputs.signal import Signal as Signal
+    from vehiclemor.inputs.signal import many_signals as many_signals
     from vehiclemor.online.batches import simulate_many as simulate_many
     from vehiclemor.online.rom import reduce as reduce
     from vehiclemor.online.saved import load as load
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
-    from vehiclemor.signal_arrays import many_signals as many_signals
-    from vehiclemor.signals import Signal as Signal
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
@@ -40,14 +40,14 @@ _DEFINED_IN = {
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
-    "Signal": "vehiclemor.signals",
+    "Signal": "vehiclemor.inputs.signal",
     "VehiclemorError": "vehiclemor.errors",
     "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
     "compare": "vehiclemor.report.comparison.kinds",
     "figures": "vehiclemor.report.regenerate",
-    "maneuver": "vehiclemor.maneuver",
-    "many_signals": "vehiclemor.signal_arrays",
+    "maneuver": "vehiclemor.inputs.maneuver",
+    "many_signals": "vehiclemor.inputs.signal",
     "write_report": "vehiclemor.report.page",
     "reduce": "vehiclemor.online.rom",
     **dict.fromkeys(("load", "rom"), "vehiclemor.online.saved"),
@@ -83,9 +83,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _DEFINED_IN:
         raise AttributeError(f"module 'vehiclemor' has no attribute {name!r}")
-    module = import_module(_DEFINED_IN[name])
-    # One is named as the module that defines it, which is a name here too, and can be called.
-    return globals().get(name) or getattr(module, name)
+    return getattr(import_module(_DEFINED_IN[name]), name)
 
 
 def __dir__() -> list[str]:

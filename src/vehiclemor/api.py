@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vehiclemor.maneuver import Maneuver
+    from vehiclemor.inputs.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
     from vehiclemor.study.plans.training import Given
@@ -208,7 +208,7 @@ def _scenario(
     factors: tuple[float, float],
 ) -> Scenario:
     """What is simulated, checked."""
-    from vehiclemor.maneuver import FACTORS, checked_factor
+    from vehiclemor.inputs.maneuver import FACTORS, checked_factor
     from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.study.scenario import Scenario, check
 
@@ -241,7 +241,7 @@ def _pairs(training_set: Any) -> list[tuple[float, float]]:
 def run_study(
     study: str | Path,
     jobs: int = 1,
-    out: str | Path = RESULTS,
+    results: str | Path = RESULTS,
     progress: Callable[[str, int, int], None] | None = None,
     scheduler: str = "",
     seed: int | None = None,
@@ -254,13 +254,12 @@ def run_study(
         Name of a study or collection (see `studies()`), or path of a TOML file.
     jobs
         Number of processes.
-    out
+    results
         Results folder.
     progress
         Called with (study, finished cells, all cells).
     scheduler
-        Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
-        with so many processes.
+        Address of a dask scheduler whose workers compute the cells.
     seed
         Draws fresh test runs of protocols, for an audit; by default the file's seed.
 
@@ -281,17 +280,19 @@ def run_study(
     if not isinstance(scheduler, str):
         raise InputError(f"scheduler is {quoted(scheduler)}, not an address")
     with listening(progress):
-        study, out = str(file_path("study", study)), file_path("out", out)
-        results = run_studies(study, out, jobs, scheduler, seed)
-    return next(iter(results.values())) if len(results) == 1 else flattened(results)
+        study, folder = str(file_path("study", study)), file_path("results", results)
+        found = run_studies(study, folder, jobs, scheduler, seed)
+    return next(iter(found.values())) if len(found) == 1 else flattened(found)
 
 
-def status(study: str | Path, out: str | Path = RESULTS) -> dict[str, StudyStatus]:
+def status(
+    study: str | Path, results: str | Path = RESULTS, seed: int | None = None
+) -> dict[str, StudyStatus]:
     """How far a study, or every one of a collection, is; nothing is computed.
 
     Parameters
     ----------
-    study, out
+    study, results, seed
         As of `run_study`.
 
     Returns
@@ -302,13 +303,13 @@ def status(study: str | Path, out: str | Path = RESULTS) -> dict[str, StudyStatu
     """
     from vehiclemor.study.status import status_of
 
-    return status_of(str(file_path("study", study)), file_path("out", out))
+    return status_of(str(file_path("study", study)), file_path("results", results), seed)
 
 
 def plot(
     result: xr.Dataset | str | Path,
     kind: str = "histories",
-    path: str | Path | None = None,
+    out: str | Path | None = None,
     *,
     results: str | Path = RESULTS,
     **at: object,
@@ -322,7 +323,7 @@ def plot(
         that was run.
     kind
         `histories` of outputs, `paths`, or `errors`.
-    path
+    out
         Picture to write (PNG, SVG or PDF).
     results
         Results folder in which studies are looked for.
@@ -344,4 +345,4 @@ def plot(
         result = stored_result(str(result), file_path("results", results))
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
-    return ResultAccessor(result).plot(kind, path, **at)
+    return ResultAccessor(result).plot(kind, out, **at)

@@ -58,12 +58,10 @@ def number(name: str, value: object) -> float:
 
 def within(name: str, value: float, bounds: tuple[float, float], unit: str = "") -> float:
     """The value; `InputError` if it lies outside its bounds."""
-    for wrong, side, bound in (
-        (value < bounds[0], "below", bounds[0]),
-        (value > bounds[1], "above", bounds[1]),
-    ):
-        if wrong:
-            raise InputError(f"{name}: {value:g}{unit} is {side} {bound:g}{unit}")
+    if value < bounds[0]:
+        raise InputError(f"{name}: {value:g}{unit} is below {bounds[0]:g}{unit}")
+    if value > bounds[1]:
+        raise InputError(f"{name}: {value:g}{unit} is above {bounds[1]:g}{unit}")
     return value
 
 

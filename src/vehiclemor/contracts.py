@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun

@@ -1,7 +1,6 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
-import dis
 import errno
 from collections.abc import Iterable
 from contextlib import suppress
@@ -100,19 +99,6 @@ def one_line(error: BaseException) -> str:
     return printable(f"{type(error).__name__}: {text}").rstrip(": ")
 
 
-def interrupted(error: BaseException) -> bool:
-    """Whether the user stops the program: by Ctrl-C, which no `raise` of a plug-in stands for."""
-    if type(error) is not KeyboardInterrupt:
-        ours = type(error).__module__.startswith("vehiclemor.")
-        return ours and isinstance(error, KeyboardInterrupt)
-    place = error.__traceback__
-    while place and place.tb_next:
-        place = place.tb_next
-    # An interrupt comes between two instructions, or in one that calls.
-    assert place
-    return dis.opname[place.tb_frame.f_code.co_code[place.tb_lasti]] != "RAISE_VARARGS"
-
-
 def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     """What to raise for an error of a plug-in's code: one line with file and line.
 
@@ -121,7 +107,7 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     code
         The function, class or object that was used, or the name of a module.
     """
-    if interrupted(error):
+    if isinstance(error, KeyboardInterrupt):
         raise error
     of = code if isinstance(code, str) else getattr(code, "__module__", type(code).__module__)
     package = of.partition(".")[0]

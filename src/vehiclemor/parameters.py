@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import FileError, InputError, did_you_mean
@@ -65,14 +65,6 @@ class Parameter(FileSchema):
     )
     symbol: str = Field(description="in the notation")
     description: str = Field(description="what it is")
-
-    @field_validator("value")
-    @classmethod
-    def _finite(cls, value: float | list[float]) -> float | list[float]:
-        components = value if isinstance(value, list) else [value]
-        if not all(math.isfinite(component) for component in components):
-            raise ValueError(f"{value} is not finite")
-        return value
 
 
 class ParameterFile(FileSchema):
@@ -149,12 +141,11 @@ def load_parameters(
     content = read_toml(path, ParameterFile)
     if content.model != model:
         raise FileError(f"{path}: parameters of model {content.model!r}, not of {model!r}")
-    missing = [name for name in expected if name not in content.parameters]
-    if missing:
-        raise FileError(f"{path}: parameters.{missing[0]} is missing")
-    unknown = [name for name in content.parameters if name not in expected]
-    if unknown:
-        raise FileError(f"{path}: parameters.{unknown[0]} is not a parameter of {model}")
+    for name in [*expected, *content.parameters]:
+        if name not in content.parameters:
+            raise FileError(f"{path}: parameters.{name} is missing")
+        if name not in expected:
+            raise FileError(f"{path}: parameters.{name} is not a parameter of {model}")
     entries = {name: content.parameters[name] for name in expected}
     for name, declared in expected.items():
         entry = entries[name]
@@ -163,7 +154,8 @@ def load_parameters(
             raise FileError(f"{where}.unit: {entry.unit!r} is not the SI unit {declared.unit!r}")
         if entry.source not in content.sources:
             raise FileError(f"{where}.source: {entry.source!r} is not listed under sources")
-        _check_value(entry.value, declared, where, FileError)
+        if complaint := _complaint(entry.value, declared):
+            raise FileError(f"{where}: {complaint}")
     given = {} if overrides is None else overrides
     return overridden(ParameterSet(model, entries), expected, given)
 
@@ -190,7 +182,8 @@ def overridden(
                 raise InputError(f"parameter {given}: a number is needed, not a list")
             point[axis] = number
             number = point
-        _check_value(number, expected[name], f"parameter {name}", InputError)
+        if complaint := _complaint(number, expected[name]):
+            raise InputError(f"parameter {name}: {complaint}")
         entries[name] = entries[name].model_copy(
             update={"value": number, "status": "assumed", "source": "override"}
         )
@@ -231,36 +224,23 @@ def _number_or_list(value: object, name: str) -> float | list[float]:
     return array.tolist()
 
 
-def _check_value(
-    value: float | list[float],
-    declared: Declared,
-    where: str,
-    error: type[FileError] | type[InputError],
-) -> None:
+def _complaint(value: float | list[float], declared: Declared) -> str:
+    """What is wrong with a value of a parameter; empty if nothing is."""
     components = value if isinstance(value, list) else [value]
     if declared.size == 1 and isinstance(value, list):
-        raise error(f"{where}: a number is needed, not a list of {len(value)}")
+        return f"a number is needed, not a list of {len(value)}"
     if len(components) != declared.size:
-        raise error(f"{where}: a point has 3 components (x, y, z), not {len(components)}")
-    for component in components:
-        if not math.isfinite(component):
-            raise error(f"{where}: {component} is not finite")
-        complaint = _outside(component, declared)
-        if complaint:
-            raise error(f"{where}: {complaint}")
-
-
-def _outside(value: float, declared: Declared) -> str:
-    """What is wrong with a component that breaks a bound; empty if it keeps all of them."""
-    if declared == point():
-        if abs(value) <= LARGEST_LENGTH:
-            return ""
-        return f"{value} m is outside +-{LARGEST_LENGTH:g} m (is it in millimetres?)"
+        return f"a point has 3 components (x, y, z), not {len(components)}"
     unit = "" if declared.unit == "1" else f" {declared.unit}"
-    if declared.above is not None and not value > declared.above:
-        return f"{value:g}{unit} is not above {declared.above:g}"
-    if declared.at_least is not None and value < declared.at_least:
-        return f"{value:g}{unit} is below the smallest allowed {declared.at_least:g}{unit}"
-    if declared.at_most is not None and value > declared.at_most:
-        return f"{value:g}{unit} is above the largest allowed {declared.at_most:g}{unit}"
+    for number in components:
+        if not math.isfinite(number):
+            return f"{number} is not finite"
+        if declared == point() and abs(number) > LARGEST_LENGTH:
+            return f"{number} m is outside +-{LARGEST_LENGTH:g} m (is it in millimetres?)"
+        if declared.above is not None and not number > declared.above:
+            return f"{number:g}{unit} is not above {declared.above:g}"
+        if declared.at_least is not None and number < declared.at_least:
+            return f"{number:g}{unit} is below the smallest allowed {declared.at_least:g}{unit}"
+        if declared.at_most is not None and number > declared.at_most:
+            return f"{number:g}{unit} is above the largest allowed {declared.at_most:g}{unit}"
     return ""

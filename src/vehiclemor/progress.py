@@ -34,13 +34,10 @@ if not _LOG.handlers:
 
 
 class _Task:
-    """What is told of as one: that it has begun, once it has taken long, and then its end.
+    """What is told of as one: that it has begun, once it has taken long, and then its end."""
 
-    `began` and `ended` are the words for it; where they are empty there is nothing to tell of yet.
-    """
-
-    def __init__(self, what: str, began: str = "", ended: str = "") -> None:
-        self.what, self.began, self.ended = what, began, ended
+    def __init__(self, began: str, ended: str) -> None:
+        self.began, self.ended = began, ended
         self.seconds, self.told = 0.0, False
 
     def tell(self) -> None:
@@ -72,40 +69,31 @@ _CURRENT: ContextVar[_Task | None] = ContextVar("first use", default=None)
 
 
 @contextmanager
-def first_use(what: str) -> Iterator[None]:
+def first_use(what: str) -> Iterator[_Task]:
     """All that is derived and compiled inside is told of as one; within another, part of that."""
-    if _CURRENT.get():
-        yield
+    if task := _CURRENT.get():
+        yield task
         return
-    task = _Task(what)
+    task = _Task(f"first use of {what}: compiling; kept for later runs", f"{what}: compiled")
     token = _CURRENT.set(task)
     try:
-        yield
+        yield task
     finally:
         _CURRENT.reset(token)
     task.tell_end()
 
 
 @contextmanager
-def making(what: str, *, derived: bool = False) -> Iterator[None]:
+def making(what: str) -> Iterator[None]:
     """Deriving or compiling something that is kept for later runs."""
-    with first_use(what):
-        task = _CURRENT.get()
-        assert task is not None
-        if not task.began:
-            verb, past = "compiling", "compiled"
-            if derived:
-                verb, past = "deriving and compiling", "derived and compiled"
-            task.began = f"first use of {task.what}: {verb}; kept for later runs"
-            task.ended = f"{task.what}: {past}"
-        with task.running():
-            yield
+    with first_use(what) as task, task.running():
+        yield
 
 
 @contextmanager
 def telling(what: str) -> Iterator[None]:
     """Anything else that may take long."""
-    task = _Task(what, what, f"{what}: done")
+    task = _Task(what, f"{what}: done")
     with task.running():
         yield
     task.tell_end()

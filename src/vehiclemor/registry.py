@@ -21,7 +21,7 @@ GROUPS = {
 CLASSES = {
     "model": "vehiclemor.multibody.definition:ModelDefinition",
     "method": "vehiclemor.reduction.interface:Method",
-    "maneuver": "vehiclemor.maneuver:Maneuver",
+    "maneuver": "vehiclemor.inputs.maneuver:Maneuver",
 }
 
 

@@ -24,12 +24,6 @@ def data_folder() -> Path:
     )
 
 
-def checkout_data() -> Path | None:
-    """The data folder of the checkout that the package runs from, if it does."""
-    folder = data_folder()
-    return folder if (folder.parent / ".git").exists() else None
-
-
 def handbook_folder() -> Path:
     """Folder with the handbook: notation, architecture, findings, adding a model or a method."""
     package = Path(__file__).resolve().parent

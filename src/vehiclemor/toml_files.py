@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
@@ -34,12 +34,8 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
     FileError
         If the file is missing, unreadable, no TOML, or does not fit the schema.
     """
-    return _fitting(_parsed(path), schema, path)
-
-
-def _parsed(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
         raise FileError(f"{path}: tables or lists are nested too deeply") from None
     except FileNotFoundError:
@@ -51,13 +47,10 @@ def _parsed(path: Path) -> dict[str, Any]:
     # A number of thousands of digits is no TOML error, but no number either; nor is "\0" a path.
     except ValueError as error:
         raise FileError(f"{path}: not a valid TOML file: {error}") from None
-
-
-def _fitting(content: dict[str, Any], schema: type[Schema], path: Path) -> Schema:
-    """Content as an instance of the schema; the first thing wrong becomes the error line."""
     try:
         return schema.model_validate(content)
     except ValidationError as error:
+        # The first thing that is wrong becomes the line.
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "top level"
         more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""

@@ -1,63 +1,103 @@
-"""Commands: what they print and write."""
+"""Commands: what they print and write is what was declared, and fits into 80 columns."""
 
 import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.cli import main
+from vehiclemor.cli.app import COMMANDS
+from vehiclemor.cli.options import key_values
+from vehiclemor.codegen import cache, derivation
+from vehiclemor.parameters import load_parameters
+from vehiclemor.registry import component, names
+from vehiclemor.report.description import SCHEMAS
+from vehiclemor.resources import data_names, handbook_folder
 from vehiclemor.study.netcdf_file import write_dataset
+from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.toml_files import FileSchema
 
 
-def test_names_and_citation(capsys):
+@pytest.fixture
+def printed(capsys, monkeypatch):
+    """Run the command line where no terminal says how wide it is; its output, which fits."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+    def run(*arguments):
+        assert main([str(argument) for argument in arguments]) == 0
+        text = capsys.readouterr().out
+        # A word that is longer than a line, such as a path, can't be broken.
+        assert not [s for s in text.splitlines() if len(s) > 80 and " " in s.strip()]
+        return text
+
+    return run
+
+
+def test_names_and_citation(printed, capsys):
     assert main(["list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
     assert set(listed) == {"models", "methods", "maneuvers", "studies"}
     assert listed["models"] == vm.models()
     assert main(["cite"]) == 0
     assert "10.1115/1.4029390" in capsys.readouterr().out
+    text, every = printed("list"), [name for entries in listed.values() for name in entries]
+    assert all(f"  {name}" in text for name in every)
+    for name in [*every, *SCHEMAS]:
+        printed("show", name)
 
 
-def test_simulate_writes_what_the_interface_returns(tmp_path, capsys):
-    out, point = tmp_path / "run.nc", [0.0, 0.8, -0.13]
-    pod = "--method pod --set rank=2 --frequency 1.1 --training nominal"
+def test_help(printed):
+    assert (handbook_folder() / "add-a-model-or-method.md").is_file()
+    assert str(handbook_folder())[:20] in printed("--help").replace("\n", "")
+    for command in COMMANDS:
+        printed(command, "--help")
+
+
+def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    out, point = "run.nc", [0.0, 0.8, -0.13]
+    pod = "--method pod --set rank=2 --frequency 1.1 --training nominal travel_and_rack"
     parameter = "--parameter wheel_centre=0,0.8,-0.13"
-    assert main(f"simulate double_wishbone {pod} {parameter} --out {out}".split()) == 0
-    assert f"written: {out}" in capsys.readouterr().out
+    text = printed(*f"simulate double_wishbone {pod} {parameter} --out {out}".split())
+    assert f"written: {out}" in text
     model = vm.model("double_wishbone", {"wheel_centre": point})
-    expected = vm.simulate(model, "pod", rank=2, frequency=1.1, training="nominal")
+    training = ["nominal", "travel_and_rack"]
+    expected = vm.simulate(model, "pod", rank=2, frequency=1.1, training=training)
     with xr.open_dataset(out) as written:
         np.testing.assert_array_equal(written["coordinates"], expected["coordinates"])
         assert list(written["coordinate"].values) == list(model.coordinates)
         assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
 
 
-def test_simulate_prints_errors_in_a_table(capsys):
-    assert main(["simulate", "double_wishbone", "--method", "pod", "--all-outputs"]) == 0
-    text, dataset = capsys.readouterr().out, vm.simulate("double_wishbone", "pod")
-    rows = [line.split() for line in text.splitlines() if line.split()[-1:] in (["m"], ["rad"])]
-    assert [row[0] for row in rows] == dataset["output"].values.tolist()
-    names = ("rms_error", "floor_rms_error", "max_error", "signal_range")
-    for output, *row, _ in rows:
-        expected = [dataset[name].sel(output=output).item() for name in names]
+@pytest.mark.parametrize("model", names("model"))
+def test_simulate_prints_errors_in_a_table(printed, model):
+    assert "nan" not in printed("simulate", model)
+    text, dataset = (
+        printed("simulate", model, "--method", "pod", "--all-outputs"),
+        vm.simulate(model, "pod"),
+    )
+    rows = {row[0]: row[1:5] for row in map(str.split, text.splitlines()) if len(row) >= 6}
+    for output in dataset["output"].values[:6]:
         # What is zero or missing is a dash.
-        assert row == [f"{value:.1e}" if value else "-" for value in expected]
+        measures = ("rms_error", "floor_rms_error", "max_error", "signal_range")
+        values = [dataset[name].sel(output=output).item() for name in measures]
+        assert rows[output] == [f"{v:.1e}" if v and v == v else "-" for v in values]
 
 
-def test_pictures_are_named_and_written(tmp_path, capsys, monkeypatch):
+def test_pictures_are_named_and_written(tmp_path, printed, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    arguments = ["simulate", "double_wishbone", "--method", "pod", "--out", "run.nc"]
-    assert main([*arguments, "--plot"]) == 0
-    assert main([*arguments, "--plot", "mine.svg"]) == 0
-    assert main(["run", "figures-6-7", "--out", "results"]) == 0
-    assert main(["plot", "run.nc", "--kind", "errors"]) == 0
-    assert main(["plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf"]) == 0
-    text = capsys.readouterr().out
-    names = ["double_wishbone-pod.png", "mine.svg", "study.pdf", "run-errors.png"]
-    assert {path.name for path in tmp_path.iterdir()} == {*names, "run.nc", "results"}
-    for name in names:
+    simulate = ["simulate", "double_wishbone", "--method", "pod", "--out", "run.nc"]
+    text = printed(*simulate, "--plot") + printed(*simulate, "--plot", "mine.svg")
+    printed("run", "figures-6-7", "--results", "results")
+    text += printed("plot", "run.nc", "--kind", "errors")
+    text += printed("plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf")
+    pictures = ["double_wishbone-pod.png", "mine.svg", "study.pdf", "run-errors.png"]
+    assert {path.name for path in tmp_path.iterdir()} == {*pictures, "run.nc", "results"}
+    for name in pictures:
         assert f"written: {name}" in text
         assert Path(name).stat().st_size > 1000
 
@@ -66,5 +106,106 @@ def test_a_result_draws_itself(tmp_path):
     dataset = vm.simulate("double_wishbone", "pod")
     dataset.vehiclemor.plot("histories", tmp_path / "a.png")
     write_dataset(dataset, tmp_path / "run.nc")
-    vm.plot(tmp_path / "run.nc", path=tmp_path / "b.png")
+    vm.plot(tmp_path / "run.nc", out=tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_text_of_the_command_line_gets_its_kind():
+    texts = ["3", "-2", "2.5", "1e-6", "fast", "3a", "1,2.5", "theta,alpha", ""]
+    values = [3, -2, 2.5, 1e-6, "fast", "3a", [1.0, 2.5], "theta,alpha", ""]
+    found = key_values("--set", [f"{k}={text}" for k, text in enumerate(texts)])
+    assert list(map(repr, found.values())) == list(map(repr, values))
+
+
+# What a name declares
+
+
+@pytest.mark.parametrize("name", names("model"))
+def test_a_model_shows_all_that_it_declares(name):
+    model, definition = vm.model(name), component("model", name)
+    shown = vm.describe(name)
+    for kind in ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints"):
+        declared = [(q.name, q.unit, q.long_name) for q in getattr(definition, kind)]
+        assert [tuple(row.values()) for row in shown[kind]] == declared
+    entries = load_parameters(name, definition.parameters, definition.parameter_file).entries
+    for row, (parameter, entry) in zip(shown["parameters"], entries.items(), strict=True):
+        assert (row["name"], row["value"], row["unit"]) == (parameter, entry.value, entry.unit)
+        assert (row["status"], row["source"]) == (entry.status, entry.source)
+    assert {row["source"] for row in shown["sources"]} >= {e.source for e in entries.values()}
+    assert shown["starts"] == list(model.starts)
+    accepting = [m for m in names("method") if component("method", m).accepts(model)[0]]
+    assert shown["methods"] == accepting
+    rows = vm.describe("double_wishbone", {"wheel_centre": [0.0, 0.8, -0.1]})["parameters"]
+    (row,) = [row for row in rows if row["name"] == "wheel_centre"]
+    assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")
+
+
+@pytest.mark.parametrize("name", names("method"))
+def test_a_method_shows_every_setting_of_every_kind(name):
+    models = {model: vm.model(model) for model in names("model")}
+    shown, method = vm.describe(name), component("method", name)
+    for kind, declared in method.settings.items():
+        (table,) = [rows for key, rows in shown.items() if {"settings,", kind} <= set(key.split())]
+        assert [row["name"] for row in table] == list(declared.model_fields)
+        for row, field in zip(table, declared.model_fields.values(), strict=True):
+            assert (row["meaning"], row["default"]) == (field.description, field.default)
+    presets = {(row["preset"], row["kind"]) for row in shown["presets"]}
+    assert presets == {(p, kind) for kind in method.settings for p in method.presets_of(kind)}
+    for row in shown["models"]:
+        accepted, reason = method.accepts(models[row["model"]])
+        assert (row["accepted"], row["reason"]) == ("yes" if accepted else "no", reason)
+
+
+@pytest.mark.parametrize("name", names("maneuver"))
+def test_a_maneuver_shows_its_inputs_and_the_models_it_drives(name):
+    shown, maneuver = vm.describe(name), component("maneuver", name)
+    assert [row["name"] for row in shown["inputs"]] == list(maneuver.inputs)
+    signals = maneuver.at(maneuver.times)
+    assert [row["largest"] for row in shown["inputs"]] == signals.max(axis=0).tolist()
+    for model in shown["models"]:
+        assert vm.model(model).inputs == maneuver.inputs
+
+
+def test_a_study_shows_its_grid():
+    for name in data_names("studies"):
+        shown, definitions = vm.describe(name), load_studies(name)
+        if name in definitions and definitions[name].grid:
+            assert shown["grid points"] == definitions[name].points
+            assert [row["dimension"] for row in shown["grid"]] == list(definitions[name].grid)
+    members = {row["study"]: row["runs"] for row in vm.describe("paper")["studies"]}
+    assert members["figure-13-frequency"] == 31 * 5
+    assert vm.describe("paper")["runs"] == sum(members.values())
+    protocol = load_protocol("predictive-independent_suspension_vehicle").definition
+    runs = vm.describe("predictive-independent_suspension_vehicle")["runs"]
+    assert f"{protocol.drawn.runs} drawn" in runs
+    assert f"{sum(g.scenarios for g in protocol.validation)} validation" in runs
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_schema_of_a_file_has_every_key(name):
+    shown = vm.describe(name)
+    assert [row["name"] for row in shown["keys"]] == list(SCHEMAS[name].model_fields)
+    tables = {part.__name__: part for part in FileSchema.__subclasses__()}
+    inner = SCHEMAS[name].model_json_schema().get("$defs", ())
+    for title, part in [("keys", SCHEMAS[name]), *((key, tables[key]) for key in inner)]:
+        for row, field in zip(shown[title], part.model_fields.values(), strict=True):
+            assert row["meaning"] == (field.description or "")
+            assert (row["default"] == "required") is field.is_required()
+
+
+def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, tmp_path):
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(derivation, "cache_folder", lambda: tmp_path)
+    starts = {name: vm.describe(name)["starts"] for name in names("model")}
+    assert starts["independent_suspension_vehicle"] == ["equilibrium", "dropped"]
+    assert starts["high_fidelity_vehicle"] == ["known once the model has been simulated"]
+    assert "pod" in vm.describe("high_fidelity_vehicle")["methods"]
+    assert {row["accepted"] for row in vm.describe("slow_manifold")["models"]} == {"no", "?"}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bounds_are_shown():
+    settings = vm.describe("full_order")["settings, kind ode and dae"]
+    types = {row["name"]: row["type"] for row in settings}
+    assert types["solver"].startswith("dopri5, rodas4, ros34pw2")
+    assert types["tolerance"] == "number 1e-13 to 0.1"

@@ -14,7 +14,8 @@ from tests.reducing import training_runs
 from vehiclemor.codegen.tangent import Tangent
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.exported import exported_system
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.online.saved import load
@@ -23,7 +24,6 @@ from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
-from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Trajectory

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE, DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space

@@ -9,11 +9,11 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.contracts import check_method
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.steering_maneuvers import lane_change
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
 # Two masses of 1 kg in a chain from the wall: stiffness in N/m, damping in proportion to it.

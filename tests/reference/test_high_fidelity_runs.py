@@ -16,7 +16,7 @@ from tests.oracles.projected_simulation import (
     simulate_projected,
     without_stabilisation,
 )
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel

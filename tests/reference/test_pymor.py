@@ -6,7 +6,7 @@ from pymor.algorithms.pod import pod
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 
 from tests.reducing import fitted, two_way_travel
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.projection.bases import pod_basis
 from vehiclemor.simulation.algebraic import AlgebraicModel
 

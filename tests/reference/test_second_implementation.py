@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.reducing import figure_errors, fitted
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.algebraic import AlgebraicModel
 
 # Test space, frequency and amplitude factor, RMS of spindle y (m) and second Euler angle (rad);

@@ -70,7 +70,7 @@ def said(place, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments):
-        status = main([*map(str, arguments), "--out", str(place / "results")])
+        status = main([*map(str, arguments), "--results", str(place / "results")])
         out = capsys.readouterr().out
         assert "--json" in arguments or all(len(line) <= 80 for line in out.splitlines())
         return status, out

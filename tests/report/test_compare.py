@@ -196,7 +196,7 @@ def said(results_folder, capsys, monkeypatch, rows):
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments):
-        status = main(["compare", *arguments, "--out", str(results_folder)])
+        status = main(["compare", *arguments, "--results", str(results_folder)])
         return status, capsys.readouterr().out
 
     return run

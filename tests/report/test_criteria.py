@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vehiclemor.maneuver import sine_travel
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.report.comparison.rows import from_start
 from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.criteria import double_wishbone as suspension

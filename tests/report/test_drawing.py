@@ -61,7 +61,7 @@ def results(tmp_path_factory):
         endings.register(patch)
         patch.setattr(theme, "FORMATS", ("png",))
         # Cells with the status error are told of.
-        assert main(["run", str(folder / "collection.toml"), "--out", str(folder)]) == 1
+        assert main(["run", str(folder / "collection.toml"), "--results", str(folder)]) == 1
         yield folder
 
 
@@ -156,7 +156,7 @@ def test_paths_of_runs_that_have_failed(results):
 def test_what_was_not_compared_is_drawn_alone(tmp_path):
     rom = vm.reduce("double_wishbone", "pod", rank=3)
     for result in (rom.dataset(rom.simulate()), vm.simulate("double_wishbone", errors=False)):
-        figure = vm.plot(result, path=tmp_path / "run.png")
+        figure = vm.plot(result, out=tmp_path / "run.png")
         assert len(figure.axes) == 2
         legend, notes = said(figure)
         assert notes == []
@@ -174,7 +174,7 @@ def test_a_study_is_drawn_by_the_name_of_its_results(results, tmp_path, monkeypa
     # Another study of that name is stored beside it.
     other = tmp_path / "all.toml"
     other.write_text(study("ok", grid=CURVE))
-    vm.run_study(other, out=results)
+    vm.run_study(other, results=results)
     shown = vm.plot(other, "errors", results=results).axes[0]
     assert shown.get_xlabel() == "frequency perturbation (%)"
     assert main(["plot", "al", "--results", str(results)]) == 2
@@ -187,12 +187,12 @@ def test_a_map_of_two_amplitudes_has_its_published_line(results):
     (results / "wide.toml").write_text(
         study("ok", grid=grid, keep="metrics").replace("0.01", "1e-4")
     )
-    checked(vm.plot(vm.run_study(results / "wide.toml", out=results), "errors"))
+    checked(vm.plot(vm.run_study(results / "wide.toml", results=results), "errors"))
 
 
 def test_counts_agree(results, capsys):
     path, name = str(results / "numbers.toml"), "numbers"
-    assert main(["run", path, "--out", str(results)]) == 1
+    assert main(["run", path, "--results", str(results)]) == 1
     printed = " ".join(capsys.readouterr().out.split())
     data = read_dataset(results / "studies" / f"{name}.nc", "source", "vehiclemor")
     found = Counter(data["status"].values.ravel().tolist())
@@ -201,7 +201,7 @@ def test_counts_agree(results, capsys):
     counts = ", ".join(f"{found[end]} {end}" for end in sorted(found))
     told = counts.replace(" ok", f" ok ({doubted} not to be trusted)")
     assert f"{name}: 8 grid points, 8 cells: {told};" in printed
-    assert main(["status", path, "--out", str(results)]) == 0
+    assert main(["status", path, "--results", str(results)]) == 0
     assert f" {counts};" in " ".join(capsys.readouterr().out.split())
     page = vm.write_report([path], results / "page.html", results)
     assert f": {told}" in page.read_text(encoding="utf-8")

@@ -57,11 +57,11 @@ def test_it_has_every_table(tables):
 
 
 def test_comparison_names_every_method(folder, capsys):
-    assert main(["compare", CAR, "--out", str(folder)]) == 0
+    assert main(["compare", CAR, "--results", str(folder)]) == 0
     printed = capsys.readouterr().out
     for words in METHODS:
         assert words in printed
-    assert main(["compare", CAR, "--json", "--out", str(folder)]) == 0
+    assert main(["compare", CAR, "--json", "--results", str(folder)]) == 0
     rows = json.loads(capsys.readouterr().out)
     unseen = {row["label"]: row for row in rows if row["kind"] == "method"}
     assert {"replay", "pod", "fixed basis", "strongest 2e-3"} <= set(unseen)

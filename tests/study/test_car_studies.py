@@ -22,7 +22,7 @@ start = ["dropped"]
 methods = [{ method = "full_order" }, { method = "pod", settings = { rank = 4 } }]
 grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" = [25.0] }
 """
-    found = vm.run_study(small_study(tmp_path, text, model=CAR), out=tmp_path)
+    found = vm.run_study(small_study(tmp_path, text, model=CAR), results=tmp_path)
     axis = found["parameters.sprung_mass"]
     assert (axis.attrs["units"], axis.values.tolist()) == ("kg", [900.0, 1100.0])
     for mass in (900.0, 1100.0):
@@ -42,7 +42,7 @@ count = 5
 seed = 3
 ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], amplitude_factor = [0.5, 1.0] }
 """
-    found = vm.run_study(small_study(tmp_path, text, "full_order"), out=tmp_path)
+    found = vm.run_study(small_study(tmp_path, text, "full_order"), results=tmp_path)
     assert found["status"].values.ravel().tolist() == ["ok"] * 5
     ranges = found["signal_range"].sel(output="toe").squeeze()
     for index in (0, 4):
@@ -114,14 +114,14 @@ TWICE = 'grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]'
 def test_wrong_cars_are_told_before_the_first_cell(tmp_path, model, text, words):
     path = small_study(tmp_path, f'keep = "metrics"\n{text}\n', "full_order", model=model)
     with pytest.raises(FileError, match=words) as error:
-        vm.run_study(path, out=tmp_path / "results")
+        vm.run_study(path, results=tmp_path / "results")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "results").exists()
 
 
 def test_a_run_says_why_cells_are_rejected(tmp_path, capsys):
     path = small_study(tmp_path, 'keep = "metrics"\n', "two_track", model=CAR)
-    assert main(["run", str(path), "--out", str(tmp_path)]) == 0
+    assert main(["run", str(path), "--results", str(tmp_path)]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert f"1 rejected: {CAR} has no y_dot" in printed
 

@@ -7,7 +7,7 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import sine_travel
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.registry import component
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import make_experiment

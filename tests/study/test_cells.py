@@ -8,7 +8,7 @@ import pytest
 from tests.study.small import small_study
 from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import sine_travel
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation

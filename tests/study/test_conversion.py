@@ -19,7 +19,7 @@ def study(tmp_path_factory):
     """Result of a study, and the folder that holds it."""
     folder = tmp_path_factory.mktemp("study")
     path = small_study(folder, GRID, "full_order", "pod", name="mine")
-    return vm.run_study(path, out=folder / "results"), folder
+    return vm.run_study(path, results=folder / "results"), folder
 
 
 @pytest.mark.parametrize("to", ["csv", "parquet"])

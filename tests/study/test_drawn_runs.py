@@ -86,7 +86,7 @@ def test_an_audit_draws_other_runs_and_stands_apart(protocol_text, tmp_path):
     assert not set(drawn_sets(own)["drawn"]) & set(drawn_sets(audit)["drawn"])
     assert (own.study, audit.study) == ("small", "small-seed-7")
     with pytest.raises(InputError, match="seed"):
-        vm.run_study("figure-12", seed=7, out=tmp_path)
+        vm.run_study("figure-12", seed=7, results=tmp_path)
 
 
 def test_a_draw_fills_its_box_and_stays_inside(protocol):

@@ -49,5 +49,5 @@ def test_histories_that_can_not_be_held_are_refused_before_anything_is_run(tmp_p
     grid = "frequency_factor = { first = 0.7, last = 1.3, count = 600 }"
     path = small_study(tmp_path, f"[grid]\n{grid}\n{AMPLITUDES}\n", "full_order", "pod")
     with pytest.raises(FileError, match='GB, more than 4: give keep = "metrics"'):
-        vm.run_study(path, out=tmp_path / "results")
+        vm.run_study(path, results=tmp_path / "results")
     assert not (tmp_path / "results").exists()

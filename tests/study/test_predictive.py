@@ -253,7 +253,7 @@ def test_several_protocols_from_python(tmp_path, protocol_text):
     one, other = protocol_text[:end], protocol_text[:end].replace("runs = 5", "runs = 4")
     study = study_of(tmp_path, one, other)
     told = []
-    dataset = vm.run_study(study, out=tmp_path, progress=lambda *part: told.append(part))
+    dataset = vm.run_study(study, results=tmp_path, progress=lambda *part: told.append(part))
     assert set(dataset["study"].values) == {"small0", "small1"}
     # Progress never goes back, that of the times neither.
     assert sum("rounds" in work for work in {work for work, _, _ in told}) == 2

@@ -46,7 +46,7 @@ def test_two_processes_give_the_same_dataset_and_store_it(study, uninterrupted, 
 
 def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_path):
     command = [sys.executable, "-m", "vehiclemor", "run", str(study), "--jobs", "2"]
-    process = subprocess.Popen([*command, "--out", str(tmp_path)], stdout=subprocess.PIPE)
+    process = subprocess.Popen([*command, "--results", str(tmp_path)], stdout=subprocess.PIPE)
     cells = tmp_path / "cells"
     deadline = time.monotonic() + 120
     while len(list(cells.glob("??/*"))) < 20:
@@ -69,7 +69,7 @@ def test_a_killed_study_resumes_to_the_same_dataset(study, uninterrupted, tmp_pa
 
 
 def test_two_drivers_at_once_give_the_same_dataset(study, uninterrupted, tmp_path):
-    command = [sys.executable, "-m", "vehiclemor", "run", str(study), "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "vehiclemor", "run", str(study), "--results", str(tmp_path)]
     drivers = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for _ in range(2)]
     assert [driver.wait(timeout=240) for driver in drivers] == [0, 0]
     assert not list(tmp_path.rglob(f"{TEMPORARY}*"))

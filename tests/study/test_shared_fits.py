@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.registry import component
-from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import fresh_fit, kept_fit
 from vehiclemor.study.experiment import make_experiment

@@ -26,7 +26,7 @@ def study(tmp_path):
 
 
 def told(capsys, study, out) -> str:
-    assert main(["status", str(study), "--out", str(out)]) == 0
+    assert main(["status", str(study), "--results", str(out)]) == 0
     return " ".join(capsys.readouterr().out.split())
 
 
@@ -102,5 +102,5 @@ def test_a_protocol_is_told_of_up_to_its_choice(tmp_path, protocol_text, capsys)
 
 
 def test_a_file_in_the_place_of_the_results_is_one_line(study, capsys):
-    assert main(["status", str(study), "--out", str(study)]) == 2
+    assert main(["status", str(study), "--results", str(study)]) == 2
     assert capsys.readouterr().err == f"vehiclemor: {study}: not a folder\n"

@@ -6,9 +6,9 @@ from itertools import accumulate, count
 import numpy as np
 import pytest
 
-from vehiclemor.maneuver import sine_travel
+from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods.full_order import FullOrderModel
-from vehiclemor.signals import Signal
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory

@@ -136,7 +136,7 @@ def test_runs_of_the_training_are_marked_in_a_study_and_its_tables(study, capsys
     assert (rows.loc["other", "trained"] == 0).all()
     (table,) = error_tables(dataset).values()
     assert list(table["status"]).count("ok (trained on this run)") == 1
-    assert main(["run", str(file), "--out", str(folder)]) == 0
+    assert main(["run", str(file), "--results", str(folder)]) == 0
     assert "; 1 trained on the tested run" in " ".join(capsys.readouterr().out.split())
 
 

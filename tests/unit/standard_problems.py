@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import Declared

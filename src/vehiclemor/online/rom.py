@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError, blamed
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.registry import component

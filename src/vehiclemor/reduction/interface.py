@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.errors import InputError, blamed
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr

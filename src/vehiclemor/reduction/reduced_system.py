@@ -10,7 +10,7 @@ import numpy as np
 
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.kernel_derivatives import By

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.vehicle_parameters import DROP
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model

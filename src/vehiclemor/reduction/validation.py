@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError, PlugInError, blamed, printable
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.training import Training, difference

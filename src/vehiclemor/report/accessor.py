@@ -18,11 +18,11 @@ class ResultAccessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
-    def plot(self, kind: str = "histories", path: str | Path | None = None, **at: object) -> Figure:
+    def plot(self, kind: str = "histories", out: str | Path | None = None, **at: object) -> Figure:
         """Draw the result; see `vehiclemor.plot`."""
         from vehiclemor.arguments import file_path
         from vehiclemor.report.figures.result_plot import plot_result
         from vehiclemor.report.result_selection import drawn
 
         dataset, _ = drawn(self._dataset, kind, at)
-        return plot_result(dataset, None if path is None else file_path("path", path), kind)
+        return plot_result(dataset, None if out is None else file_path("out", out), kind)

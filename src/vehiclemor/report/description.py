@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import FACTORS
+from vehiclemor.inputs.maneuver import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def figures(
     only: Sequence[str] = (),
-    out: str | Path = "results",
+    out: str | Path = "results/figures",
     results: str | Path = "results",
     jobs: int = 1,
     *,

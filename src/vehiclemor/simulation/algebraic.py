@@ -12,10 +12,10 @@ import numpy as np
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
-from vehiclemor.signals import Signal
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
     check_positive,

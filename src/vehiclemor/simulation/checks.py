@@ -8,7 +8,7 @@ import numpy as np
 
 from vehiclemor.arguments import number, quoted, real_array, within
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 
 LARGEST = sys.float_info.max

@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.arguments import number
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.checks import (
     left_validity,
     lifted_wheels,

@@ -14,9 +14,9 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
-from vehiclemor.sample_loops import Pieces
-from vehiclemor.signals import Signal
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.simulation.checks import loop_array
 
 ACCURACY = 1e-11

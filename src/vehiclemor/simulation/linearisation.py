@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.sample_loops import Pieces
+from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.loop import scratch_end

@@ -6,10 +6,10 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
-from vehiclemor.signals import Signal
 from vehiclemor.simulation.input_polynomials import extent_of
 
 

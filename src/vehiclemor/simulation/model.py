@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr

@@ -15,7 +15,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import ready
 from vehiclemor.errors import ConvergenceError
-from vehiclemor.sample_loops import Pieces
+from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives

@@ -11,7 +11,7 @@ from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, loop_array, output_times
 from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of

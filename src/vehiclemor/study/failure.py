@@ -15,7 +15,6 @@ from vehiclemor.errors import (
     PlugInError,
     UnreachableError,
     VehiclemorError,
-    interrupted,
     machine_reason,
     one_line,
 )
@@ -56,11 +55,9 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
         return Failure("error", whose + _line(error))
     except InputError as error:
         return Failure("rejected", _line(error))
-    except VehiclemorError:
+    except (KeyboardInterrupt, VehiclemorError):
         raise
     except BaseException as error:
-        if interrupted(error):
-            raise
         if reason := machine_reason(error):
             raise MachineError(reason) from error
         return Failure("error", whose + one_line(error))

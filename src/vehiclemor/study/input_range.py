@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.trust import (
     EDGE,
     NOTHING,

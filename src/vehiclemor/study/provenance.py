@@ -12,16 +12,9 @@ from vehiclemor.registry import component
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
 # Layers whose source determines results; tables, figures and the command line come after them.
-LAYERS = ("multibody", "symbolic", "codegen", "simulation", "reduction")
+LAYERS = ("multibody", "symbolic", "codegen", "inputs", "simulation", "reduction")
 FILES = (
     "parameters.py",
-    "maneuver.py",
-    "piecewise.py",
-    "sample_loops.py",
-    "signal_columns.py",
-    "signals.py",
-    "steering_maneuvers.py",
-    "suspension_maneuvers.py",
     "metrics.py",
     "study/scenario.py",
     "study/input_range.py",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.simulation.model import Model

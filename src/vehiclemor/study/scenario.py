@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
-from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
 from vehiclemor.simulation.model import Model

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vehiclemor.arguments import count
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.combined import result_path
@@ -17,6 +18,7 @@ from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import validation_experiments
+from vehiclemor.study.plans.study_file import MOST_SEED
 from vehiclemor.study.store import cell_end
 
 LATER = "then the chosen ones are tested"
@@ -61,7 +63,7 @@ class StudyStatus:
         return Counter({end: n for end, n in self.ends.items() if end[0] not in FINISHED})
 
 
-def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
+def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, StudyStatus]:
     """How far a study, or every one of a collection, is.
 
     Parameters
@@ -70,6 +72,8 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
         Name of a study or collection, or path of a TOML file.
     folder
         Results folder.
+    seed
+        Of the drawn test runs of protocols, for an audit; by default that of their files.
 
     Returns
     -------
@@ -84,14 +88,17 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: not a folder")
+    if seed is not None:
+        count("seed", seed, least=0, most=MOST_SEED)
     found: dict[str, StudyStatus] = {}
-    for name, (path, definition) in studies_and_files(study).items():
+    for study_name, (path, definition) in studies_and_files(study).items():
         later = LATER if definition.bounds else ""
         if definition.bounds:
-            experiments = validation_experiments(load_protocol(str(path)))
+            protocol = load_protocol(str(path), seed if definition.drawn else None)
+            name, experiments = protocol.study, validation_experiments(protocol)
             cells = {e.key: e.method for e in experiments}
         else:
-            cells = _methods(expand(name, definition))
+            name, cells = study_name, _methods(expand(study_name, definition))
         result = result_path(folder, name, content_hash(definition))
         found[name] = _status(cells, result, folder, later)
     return found

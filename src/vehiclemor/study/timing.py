@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.codegen.cache import compiler_identity
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model

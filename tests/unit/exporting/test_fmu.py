@@ -14,8 +14,8 @@ from vehiclemor.exporting import fmu
 from vehiclemor.exporting.c import START_ALONE, c_files
 from vehiclemor.exporting.export import system_of
 from vehiclemor.exporting.model_description import variables
+from vehiclemor.inputs.columns import base_units
 from vehiclemor.simulation.constants import hoisted_constants
-from vehiclemor.units import base_units
 
 fmpy = pytest.importorskip("fmpy")
 validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu

@@ -18,8 +18,8 @@ CAR = "independent_suspension_vehicle"
     [
         ({"to": "matlab"}, "unknown target 'matlab'"),
         ({"to": "c", "step": 0.0}, "step: 0 s is below 1e-07 s"),
-        ({"to": "c", "path": "no-such-folder/car"}, "does not exist"),
-        ({"to": "jax", "path": "car.py"}, "what is made for jax is an object, no file"),
+        ({"to": "c", "out": "no-such-folder/car"}, "does not exist"),
+        ({"to": "jax", "out": "car.py"}, "what is made for jax is an object, no file"),
     ],
 )
 def test_wrong_arguments(tmp_path, monkeypatch, arguments, words):

@@ -10,7 +10,7 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuver import Maneuver, smooth
+from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.integrators.catalogue import MOST_CALLS

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reducing import figure_errors, fitted, floor_errors, two_way_travel
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.projection.bases import Basis
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel

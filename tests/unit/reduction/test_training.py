@@ -5,7 +5,7 @@ import pytest
 
 from tests.reducing import fitted, training_runs
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel

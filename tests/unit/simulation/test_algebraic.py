@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel

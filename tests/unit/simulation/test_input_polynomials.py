@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver, smooth
-from vehiclemor.piecewise import at
+from vehiclemor.inputs.maneuver import Maneuver, smooth
+from vehiclemor.inputs.piecewise import at
+from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.registry import component
-from vehiclemor.sample_loops import Pieces
 from vehiclemor.simulation.input_polynomials import ACCURACY, recorded_inputs
 from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
 from vehiclemor.simulation.projection_windows import whole_space

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build

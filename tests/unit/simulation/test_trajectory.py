@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vehiclemor.inputs.steering import lane_change
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
@@ -12,7 +13,6 @@ from vehiclemor.simulation.trajectory import (
     Trajectory,
 )
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
-from vehiclemor.steering_maneuvers import lane_change
 
 
 def test_dataset_is_labelled_with_names_and_units(model: AlgebraicModel, full: Trajectory) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.errors import ConvergenceError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.state_space import StateSpace

@@ -23,7 +23,7 @@ from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, re
 from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.kernels import map_kernel, map_loop, monomials
 from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells

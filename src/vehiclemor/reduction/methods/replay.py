@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import Settings

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.simulation.stepping import Stepper
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of

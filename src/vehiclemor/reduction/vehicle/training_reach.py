@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.trust import inputs_beyond
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING, PARTS, STILL
 from vehiclemor.simulation.input_polynomials import extent_of

@@ -38,7 +38,7 @@ PAPER = "paper"
 
 
 def compare(
-    what: str = PAPER, out: str | Path = "results", jobs: int = 1, seed: int | None = None
+    what: str = PAPER, results: str | Path = "results", jobs: int = 1, seed: int | None = None
 ) -> pd.DataFrame:
     """A comparison as a table; studies and timings that are missing are run first.
 
@@ -49,7 +49,7 @@ def compare(
         not seen, beside full-order integrators.  The name of a model: every method that fits it,
         nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
         name or TOML file: errors of every method over the grid, or on the protocol's inputs.
-    out
+    results
         Results folder.
     jobs
         Number of processes.
@@ -70,7 +70,7 @@ def compare(
     InputError
         If there is no such comparison.
     """
-    folder, jobs = file_path("out", out), count("jobs", jobs)
+    folder, jobs = file_path("results", results), count("jobs", jobs)
     if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} draws no test runs of its own")
     if what == PAPER:

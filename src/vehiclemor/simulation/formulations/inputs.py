@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from vehiclemor.codegen.loop_types import Int, Matrix, Vector
-from vehiclemor.sample_loops import EQUIDISTANT, Pieces
+from vehiclemor.inputs.sample_loops import EQUIDISTANT, Pieces
 
 INLINED = ("input_at", "signal_at", "passed")
 # Time constants (s) of two high passes, one after the other, that leave what is above 2 and 8 Hz.

@@ -7,7 +7,7 @@ An integrator gives `work_space`, `begin`, `longest_step`, `step`, `accept`, `pr
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
-from vehiclemor.sample_loops import Pieces
+from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.formulations.full import error_norm, lift, project, rhs
 from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.dopri5 import (

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol import Protocol

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model

@@ -5,7 +5,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from vehiclemor.errors import InputError, VehiclemorError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER, StudyFile

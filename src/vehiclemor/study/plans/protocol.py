@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_names

@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model

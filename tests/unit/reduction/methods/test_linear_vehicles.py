@@ -8,16 +8,16 @@ import pytest
 import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.methods.linear_single_track import single_track
-from vehiclemor.reduction.methods.modal_truncation import truncated
-from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
-from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.steering_maneuvers import (
+from vehiclemor.inputs.steering import (
     lane_change,
     rack_lane_change,
     rack_straight_ahead,
     straight_ahead,
 )
+from vehiclemor.reduction.methods.linear_single_track import single_track
+from vehiclemor.reduction.methods.modal_truncation import truncated
+from vehiclemor.reduction.vehicle.linear_vehicle import lateral_modes
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 VEHICLES = {
     "independent_suspension_vehicle": (lane_change, straight_ahead),

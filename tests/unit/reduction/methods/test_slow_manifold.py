@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vehiclemor.inputs.steering import lane_change, rack_lane_change, straight_ahead
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
@@ -19,7 +20,6 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
-from vehiclemor.steering_maneuvers import lane_change, rack_lane_change, straight_ahead
 
 LANE_CHANGES = {
     "independent_suspension_vehicle": lane_change,

@@ -7,7 +7,7 @@ import pytest
 
 from tests.oracles.projection import reduced_path
 from tests.reducing import figure_errors, fitted
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.projection.bases import Basis, pod_basis
 from vehiclemor.simulation.algebraic import AlgebraicModel

@@ -7,6 +7,7 @@ import pytest
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
+from vehiclemor.inputs.steering import lane_change, step_steer
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.training import TrainingRun
@@ -14,7 +15,6 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.steering_maneuvers import lane_change, step_steer
 
 N = 14
 STATE, COORDINATES = "state", "coordinates"

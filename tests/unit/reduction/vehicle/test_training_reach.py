@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.reducing import CARS
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations

@@ -8,7 +8,7 @@ import pytest
 from tests.unit.python_system import python_system
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Prepared, address_of_array
-from vehiclemor.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.vehicle.feature_system import feature_system
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen

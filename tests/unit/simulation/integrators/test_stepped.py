@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.vehicle.feature_system import feature_system
 from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.registry import component
@@ -12,7 +13,6 @@ from vehiclemor.simulation import build
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver, System
-from vehiclemor.steering_maneuvers import lane_change
 
 SOLVERS = [name for name, own in catalogue.INTEGRATORS.items() if own.stepped]
 # With pairs that turn with the heading and without; states in the mirror image and as they are.

@@ -6,10 +6,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.errors import InputError
-from vehiclemor.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
+from vehiclemor.inputs.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 
 # Times that differ by so little, relative to what they are, are one.
 ROUNDING = 1e-12
@@ -57,11 +58,7 @@ def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
         places = (times - begin) / (edges[segments + 1] - begin) * counts
         rows = np.clip(places.astype(np.int64), 0, counts - 1)
         parts, rows = places - rows, rows + first[segments]
-    own, parts = coefficients[rows], parts[:, None]
-    values = own[:, :, -1]
-    for power in range(own.shape[2] - 2, -1, -1):
-        values = own[:, :, power] + parts * values
-    return values
+    return polyval(parts[:, None], np.moveaxis(coefficients[rows], 2, 0), tensor=False)
 
 
 def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
@@ -95,7 +92,7 @@ def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
 
 @cache
 def _loop() -> Loop:
-    return loops(("sample_loops",), ("through",))["through"]
+    return loops(("inputs.sample_loops",), ("through",))["through"]
 
 
 def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:
@@ -104,8 +101,10 @@ def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:
         row = int(np.argmax(times[1:] <= times[:-1]))
         now, before = times[row + 1], times[row]
         return f"times must increase, t[{row + 1}] = {now:.6g} s follows {before:.6g} s"
-    given = times if status == DISORDERED else samples[NOT_FINITE - status]
+    run = NOT_FINITE - status
+    given = times if status == DISORDERED else samples[run]
     finite = np.isfinite(given).reshape(len(given), -1).all(axis=1)
     if finite.all():
         return "the polynomials through them are not finite"
-    return f"{'t' if status == DISORDERED else 'u'}[{finite.argmin()}] is not finite"
+    where = f" of run {run}" if len(samples) > 1 and status != DISORDERED else ""
+    return f"{'t' if status == DISORDERED else 'u'}[{finite.argmin()}]{where} is not finite"

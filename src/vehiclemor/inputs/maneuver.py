@@ -1,13 +1,8 @@
-"""Maneuvers: input time histories that studies scale in frequency and amplitude; wheel travel.
+"""Maneuvers: input time histories that studies scale in frequency and amplitude."""
 
-The module can be called: `vehiclemor.maneuver("lane_change")` gives a maneuver by its name.
-"""
-
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import islice
-from types import ModuleType
 
 import numpy as np
 
@@ -146,52 +141,13 @@ def checked_factor(name: str, value: object) -> float:
     return within(f"{name} factor", factor, FACTORS[name])
 
 
-# Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.
-TRAVEL_AMPLITUDE = 0.1
-TRAVEL_FREQUENCY = 0.1
-CHIRP_LAST_FREQUENCY = 0.4
-
-
-def _travel(times: np.ndarray, phase: np.ndarray, amplitude: float) -> np.ndarray:
-    """Sine of a phase (n,) as wheel travel; the rack is fixed."""
-    return np.column_stack([amplitude * TRAVEL_AMPLITUDE * np.sin(phase), np.zeros_like(times)])
-
-
-def _sine_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-    return _travel(times, 2.0 * np.pi * frequency * TRAVEL_FREQUENCY * times, amplitude)
-
-
-def _chirp_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-    rate = (CHIRP_LAST_FREQUENCY - TRAVEL_FREQUENCY) / 10.0
-    phase = 2.0 * np.pi * frequency * (TRAVEL_FREQUENCY + 0.5 * rate * times) * times
-    return _travel(times, phase, amplitude)
-
-
 def smooth(frequency: float) -> tuple[float, ...]:
     """No corners."""
     del frequency
     return ()
 
 
-sine_travel = Maneuver(
-    "sine_travel",
-    "wheel travel 0.1 m x sin(2 pi 0.1 Hz t), rack fixed, 10 s (paper, section 3.2)",
-    _sine_travel,
-    ("z", "s0"),
-    duration=10.0,
-    samples=1001,
-    corners=smooth,
-    linear_in_amplitude=True,
-)
-chirp_travel = replace(
-    sine_travel,
-    name="chirp_travel",
-    summary="wheel travel 0.1 m, sine swept from 0.1 to 0.4 Hz, rack fixed, 10 s",
-    signal=_chirp_travel,
-)
-
-
-def maneuver(name: str, *, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
+def maneuver(name: str, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
     """A registered maneuver, see `maneuvers()`, with factors on its frequency and amplitude.
 
     Raises
@@ -200,12 +156,3 @@ def maneuver(name: str, *, frequency: float = 1.0, amplitude: float = 1.0) -> Ma
         If none has the name, or a factor is out of its bounds.
     """
     return component("maneuver", name).perturbed(frequency, amplitude)
-
-
-class _Callable(ModuleType):
-    """A module, from which plug-ins import, that is the function of its name in `vehiclemor`."""
-
-    __call__ = staticmethod(maneuver)
-
-
-sys.modules[__name__].__class__ = _Callable

@@ -1,31 +1,62 @@
-"""Wheel travel while the steering rack moves: inputs of a suspension that fill a rectangle.
+"""Wheel travel and rack of the suspension: the paper's, and inputs that fill a rectangle.
 
-At an amplitude factor of 1 the wheel stays within 0.1 m of its design height (Masoudi et al., 2015,
-section 3.2), the rack within 0.03 m: six times a lane change at 20 m/s, and half of what parking
-takes.  All are smooth.
+The paper's is a sine of 0.1 m at a fixed rack (Masoudi et al., 2015, section 3.2).  At an amplitude
+factor of 1 the others stay within 0.1 m of the design height and 0.03 m of rack: six times a lane
+change at 20 m/s, and half of what parking takes.  All are smooth.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.maneuver import (
-    CHIRP_LAST_FREQUENCY,
-    TRAVEL_AMPLITUDE,
-    TRAVEL_FREQUENCY,
-    sine_travel,
-)
+from vehiclemor.inputs.maneuver import Maneuver, smooth
+from vehiclemor.inputs.steering import MULTISINE, PHASES
 
+# Masoudi et al. (2015), section 3.2: z(t) = 0.1 sin(2 pi 0.1 t) m for 10 s.
+TRAVEL_AMPLITUDE = 0.1
+TRAVEL_FREQUENCY = 0.1
+CHIRP_LAST_FREQUENCY = 0.4
 RACK_AMPLITUDE = 0.03
 # The golden ratio is the number that fractions approach worst: the two sines never repeat.
 RACK_FREQUENCY = TRAVEL_FREQUENCY * 0.5 * (1.0 + np.sqrt(5.0))
 # First and last frequencies (Hz) of the sweeps, which cross.
 TRAVEL_SWEEP = TRAVEL_FREQUENCY, CHIRP_LAST_FREQUENCY
 RACK_SWEEP = 0.5, RACK_FREQUENCY
-# Frequencies (Hz), and phases after M. R. Schroeder, IEEE Trans. Inf. Theory 16 (1970), 85-89.
-TRAVEL_SINES = np.array([0.15, 0.35, 0.6, 0.95, 1.4])
+# Frequencies (Hz) beside those of steering.
 RACK_SINES = np.array([0.1, 0.25, 0.45, 0.7, 1.1])
-PHASES = -np.pi * np.arange(5) * np.arange(1, 6) / 5
+
+
+def _travel(times: np.ndarray, phase: np.ndarray, amplitude: float) -> np.ndarray:
+    """Sine of a phase (n,) as wheel travel; the rack is fixed."""
+    return np.column_stack([amplitude * TRAVEL_AMPLITUDE * np.sin(phase), np.zeros_like(times)])
+
+
+def _sine_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    return _travel(times, 2.0 * np.pi * frequency * TRAVEL_FREQUENCY * times, amplitude)
+
+
+def _chirp_travel(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    rate = (CHIRP_LAST_FREQUENCY - TRAVEL_FREQUENCY) / 10.0
+    phase = 2.0 * np.pi * frequency * (TRAVEL_FREQUENCY + 0.5 * rate * times) * times
+    return _travel(times, phase, amplitude)
+
+
+sine_travel = Maneuver(
+    "sine_travel",
+    "wheel travel 0.1 m x sin(2 pi 0.1 Hz t), rack fixed, 10 s (paper, section 3.2)",
+    _sine_travel,
+    ("z", "s0"),
+    duration=10.0,
+    samples=1001,
+    corners=smooth,
+    linear_in_amplitude=True,
+)
+chirp_travel = replace(
+    sine_travel,
+    name="chirp_travel",
+    summary="wheel travel 0.1 m, sine swept from 0.1 to 0.4 Hz, rack fixed, 10 s",
+    signal=_chirp_travel,
+)
 
 
 def _scaled(travel: np.ndarray, rack: np.ndarray, amplitude: float) -> np.ndarray:
@@ -53,7 +84,7 @@ def _multisines(times: np.ndarray, frequency: float, amplitude: float) -> np.nda
     def waves(hertz: np.ndarray) -> np.ndarray:
         return np.sin(hertz * angle + PHASES).mean(axis=1)
 
-    return _scaled(waves(TRAVEL_SINES), waves(RACK_SINES), amplitude)
+    return _scaled(waves(MULTISINE), waves(RACK_SINES), amplitude)
 
 
 travel_and_rack = replace(

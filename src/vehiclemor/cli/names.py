@@ -1,27 +1,53 @@
-"""`vehiclemor show`: everything that a name declares."""
+"""What is registered, and what a name declares."""
 
 import json
-from pathlib import Path
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any, Literal
 
 from vehiclemor import api
-from vehiclemor.cli.key_values import key_values
+from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_values
 from vehiclemor.report.printing import table, wrapped
 
+KINDS = ("models", "methods", "maneuvers", "studies")
+# A longer name has its text right behind it.
+LONGEST = 30
 # Rows of a table that are printed without --all, where it has some more.
 FEW, SOME = 4, 6
+
+
+def list_components(
+    what: Literal["models", "methods", "maneuvers", "studies"] | None = None,
+    *,
+    json_output: Json = False,
+) -> None:
+    """List what is registered.
+
+    Parameters
+    ----------
+    what
+        One kind; all by default.
+    """
+    found = {kind: getattr(api, kind)() for kind in KINDS if what in (None, kind)}
+    if json_output:
+        print(json.dumps(found if what is None else found[what], indent=2))
+        return
+    # A table of rich would take a tenth of the time of this command.
+    for kind, entries in found.items():
+        print(f"{kind}:")
+        column = min(max(map(len, entries)), LONGEST)
+        for name, summary in entries.items():
+            print(wrapped(f"{name.ljust(column)}  {summary}", 2, column + 4))
+        print()
+    print(wrapped("vehiclemor show NAME says more, show study-schema how to write a study", 0, 2))
 
 
 def show(
     name: str,
     *,
-    parameter: Annotated[tuple[str, ...], Parameter(negative="", show_default=False)] = (),
-    parameters: Path | None = None,
-    every: Annotated[bool, Parameter(name="--all", negative="")] = False,
-    json_output: Annotated[bool, Parameter(name="--json", negative="")] = False,
-) -> int:
+    parameter: Parameters = None,
+    parameter_file: ParameterFile = None,
+    every: All = False,
+    json_output: Json = False,
+) -> None:
     """Show what a name declares: parameters, settings, inputs, outputs, grid.
 
     Parameters
@@ -29,24 +55,17 @@ def show(
     name
         A model, method, maneuver or study, a study's TOML file, or study-schema,
         parameter-schema: the keys of such a file.
-    parameter
-        name=value: a parameter of a model, SI units; may be given several times.
-    parameters
-        Parameter file of a model; its own public data by default.
     every
         Print long tables of a model as a whole, not only their first rows.
-    json_output
-        Print JSON.
     """
-    described = api.describe(name, key_values("--parameter", parameter), parameters)
+    described = api.describe(name, key_values("--parameter", parameter), parameter_file)
     if json_output:
         print(json.dumps(described, indent=2))
-        return 0
+        return
     few = name in api.models() and not every
     cut = sum([_print(key, content, few) for key, content in described.items()])
     if cut:
         print(f"\n{cut} more rows: vehiclemor show {name} --all")
-    return 0
 
 
 def _print(key: str, content: Any, few: bool, indent: str = "") -> int:
@@ -76,3 +95,10 @@ def _by_source(key: str, rows: list[dict[str, Any]]) -> dict[str, list[dict[str,
         heading = f"{key}, {row['status']} ({row['source']})" if "status" in row else key
         found.setdefault(heading, []).append(rest if "status" in row else row)
     return found
+
+
+def cite() -> None:
+    """Print how to cite this suite, the paper, and the methods with a reference of their own."""
+    from vehiclemor.report.citation import citations
+
+    print(citations())

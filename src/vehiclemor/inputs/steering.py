@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vehiclemor.maneuver import Maneuver, smooth
+from vehiclemor.inputs.maneuver import Maneuver, smooth
 
 BEGIN = 1.0
 # Single lane change, a pulse that is smooth to its second derivative.  The amplitudes are

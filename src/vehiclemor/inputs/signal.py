@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,11 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.errors import InputError, blamed, one_line
-from vehiclemor.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
-from vehiclemor.piecewise import HOLDS, at, derivative, scaled, through
+from vehiclemor.inputs.columns import array_columns, chosen_columns, csv_columns, listed
+from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
+from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through
+from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.registry import choice
-from vehiclemor.sample_loops import Pieces
-from vehiclemor.signal_columns import array_columns, csv_columns
-from vehiclemor.units import base_units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,22 +101,9 @@ class Signal(Maneuver):
         InputError
             If times don't increase, a value isn't finite, or shapes don't fit.
         """
-        choice("hold", hold, HOLDS)
-        times, values = _samples(t, u)
-        names = _names(inputs, values.shape[1])
-        if not line_of_text("name", name):
-            raise InputError("name is empty")
-        (pieces,) = through(times, values[None], hold)
-        duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
-        return _template()._with(
-            name=name,
-            summary=f"{len(times)} samples, {hold} hold",
-            inputs=names,
-            duration=duration,
-            samples=_output_samples(duration, output_step),
-            hold=hold,
-            pieces=pieces,
-        )
+        times, values = _arrays(t, u)
+        how: dict[str, Any] = {"inputs": inputs, "output_step": output_step, "name": name}
+        return many_signals(times, values[None], hold, **how)[0]
 
     @property
     def polynomials(self) -> Pieces:
@@ -132,12 +117,6 @@ class Signal(Maneuver):
             amplitudes = amplitude * frequency**orders
             self.kept["polynomials"] = scaled(self.pieces, frequency, amplitudes)
         return self.kept["polynomials"]
-
-    def _with(self, **changes: Any) -> Signal:
-        """The signal with other attributes, in a third of the time that `replace` takes."""
-        found = object.__new__(type(self))
-        found.__dict__.update(self.__dict__ | {"kept": {}} | changes)
-        return found
 
     @property
     def break_points(self) -> tuple[float, ...]:
@@ -154,10 +133,12 @@ class Signal(Maneuver):
         amplitude = checked_factor("amplitude", amplitude)
         if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
             return self
-        return self._with(
+        return replace(
+            self,
             frequency_factor=frequency,
             amplitude_factor=amplitude,
             duration=float(self.pieces.edges[-1]) / frequency,
+            kept={},
         )
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
@@ -185,10 +166,10 @@ class Signal(Maneuver):
             if name not in names:
                 raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
         if not self.inputs:
-            return self._with(inputs=names)
+            return replace(self, inputs=names, kept={})
         coefficients = np.stack([self._column(name) for name in names], axis=1)
         pieces = self.pieces._replace(coefficients=coefficients)
-        return self._with(inputs=names, pieces=pieces)
+        return replace(self, inputs=names, pieces=pieces, kept={})
 
     def _column(self, name: str) -> np.ndarray:
         """Polynomials (pieces, 6) of an input, at factors of 1."""
@@ -240,6 +221,7 @@ class Signal(Maneuver):
         path: str | Path,
         hold: str = "linear",
         *,
+        separator: str = ",",
         time: str = "time",
         inputs: str | Sequence[str] | Mapping[str, str] = (),
         **further: Any,
@@ -248,6 +230,8 @@ class Signal(Maneuver):
 
         Parameters
         ----------
+        separator
+            Character between columns.
         time
             Column of the times in s.
         inputs
@@ -260,9 +244,9 @@ class Signal(Maneuver):
         FileError
             If there is no such file, or it is none.
         """
-        file = file_path("path", path)
-        columns = csv_columns(file), {}
-        return cls._of_columns(str(file), columns, time, inputs, hold, further)
+        columns = csv_columns(file_path("path", path), separator)
+        times, values, names = chosen_columns(str(path), columns, {}, time, inputs)
+        return cls.from_samples(times, values, hold, inputs=names, **further)
 
     @classmethod
     def from_xarray(
@@ -288,81 +272,74 @@ class Signal(Maneuver):
         **further
             As of `from_samples`, which tells the rest.
         """
-        columns = array_columns(data, time)
-        return cls._of_columns("the data", columns, time, inputs, hold, further)
-
-    @classmethod
-    def _of_columns(
-        cls,
-        where: str,
-        table: tuple[Mapping[str, np.ndarray], Mapping[str, str]],
-        time: str,
-        inputs: str | Sequence[str] | Mapping[str, str],
-        hold: str,
-        further: Mapping[str, Any],
-    ) -> Signal:
-        """A signal of named columns, one of which holds the times, with units where they tell."""
-        columns, units = table
-        chosen = inputs or [name for name in columns if name != time]
-        named = chosen if isinstance(chosen, Mapping) else {name: name for name in _listed(chosen)}
-        for name in _listed([time, *named.values()]):
-            if name not in columns:
-                known = ", ".join(columns)
-                raise InputError(f"{where}: there is no column {quoted(name)} among {known}")
-            powers = base_units(units.get(name, ""))
-            if powers is None or (name == time and powers not in ({}, {"s": 1})):
-                wanted = "s" if name == time else "SI units such as m, rad or m/s"
-                raise InputError(f"{where}: {quoted(name)} is in {units[name]}, not in {wanted}")
-        values = np.column_stack([columns[name] for name in named.values()] or [np.empty(0)])
-        return cls.from_samples(columns[time], values, hold, inputs=[*named], **further)
+        columns, units = array_columns(data, time)
+        times, values, names = chosen_columns("the data", columns, units, time, inputs)
+        return cls.from_samples(times, values, hold, inputs=names, **further)
 
 
-@cache
-def _template() -> Signal:
-    """What all signals have alike."""
-    return Signal("signal", "", _no_function, (), 0.0, 2, _no_corners)
+def many_signals(
+    t: Any,
+    u: Any,
+    hold: str = "linear",
+    *,
+    inputs: str | Sequence[str] = (),
+    output_step: float = OUTPUT_STEP,
+    name: str = "signal",
+) -> list[Signal]:
+    """Signals through samples at the same times, by one compiled call for all.
 
+    Parameters
+    ----------
+    t
+        Increasing times (n,) in s.
+    u
+        Inputs (runs, n) or (runs, n, inputs) at these times, SI units.
+    hold, inputs, output_step, name
+        See `Signal.from_samples`.
 
-def _no_function(*_: Any) -> np.ndarray:
-    raise NotImplementedError("a signal is evaluated by its polynomials")
-
-
-def _no_corners(_: float) -> tuple[float, ...]:
-    raise NotImplementedError("the corners of a signal are in its polynomials")
-
-
-def _samples(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s from zero on and inputs (n, inputs) of a signal, checked."""
-    try:
-        times, values = real_array(t), real_array(u)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"samples of a signal: {one_line(error)}") from None
-    if times.ndim != 1 or values.ndim not in (1, 2) or len(values) != len(times):
+    Raises
+    ------
+    InputError
+        If the samples are none of signals.
+    """
+    choice("hold", hold, HOLDS)
+    times, values = _arrays(t, u)
+    if times.ndim != 1 or values.ndim not in (2, 3) or values.shape[1] != len(times):
         raise InputError(
-            f"samples of a signal: t has shape {times.shape} and u {values.shape}, "
+            f"samples of a signal: t has shape {times.shape} and u {values.shape[1:]} in a run, "
             f"not (n,) and (n,) or (n, inputs)"
         )
-    if len(times) < 2:
+    if len(times) < 2 or not len(values):
         raise InputError(f"a signal needs two samples at least, not {len(times)}")
-    values = values.reshape(len(times), -1)
     within("number of samples", len(times), (2, MOST_SAMPLES))
-    return times - times[0], np.ascontiguousarray(values)
+    times, values = times - times[0], values.reshape(*values.shape[:2], -1)
+    names = _names(inputs, values.shape[2])
+    if not line_of_text("name", name):
+        raise InputError("name is empty")
+    every = through(times, np.ascontiguousarray(values), hold)
+    duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
+    own = f"{len(times)} samples, {hold} hold", _unused, names, duration
+    samples = _output_samples(duration, output_step)
+    return [Signal(name, *own, samples, _unused, hold=hold, pieces=pieces) for pieces in every]
+
+
+def _unused(*_: Any) -> Any:
+    raise NotImplementedError("a signal is evaluated by its polynomials, which have its corners")
+
+
+def _arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
+    try:
+        return real_array(t), real_array(u)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"samples of a signal: {one_line(error)}") from None
 
 
 def _names(inputs: Any, columns: int) -> tuple[str, ...]:
     """Names of the columns, or none."""
-    names = _listed(inputs)
+    names = listed(inputs)
     if len(set(names)) < len(names) or len(names) not in (0, columns):
         raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
     return names
-
-
-def _listed(inputs: Any) -> tuple[str, ...]:
-    """Names, of which one may stand alone."""
-    names = (inputs,) if isinstance(inputs, str) else inputs
-    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
-    return tuple(names)
 
 
 def _output_samples(duration: float, step: Any) -> int:

@@ -1,0 +1,109 @@
+"""Options that commands share, and how their texts become values, before anything is computed."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+from cyclopts import Parameter, Token, convert
+
+from vehiclemor.errors import InputError
+
+All = Annotated[bool, Parameter(name="--all")]
+Json = Annotated[bool, Parameter(name="--json", help="Print JSON.")]
+Results = Annotated[Path, Parameter(help="Results folder.")]
+Jobs = Annotated[int, Parameter(help="Number of processes, for what is missing.")]
+Seed = Annotated[
+    int | None,
+    Parameter(help="Draws fresh test runs of protocols, for an audit; their results stand apart."),
+]
+Settings = Annotated[
+    list[str] | None,
+    Parameter(name="--set", help="key=value: a setting of the method; may be given several times."),
+]
+Parameters = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--parameter",
+        help="name=value: a parameter of the model in SI units, a point as x,y,z or one component "
+        "as name.z=value; may be given several times. `vehiclemor show MODEL` has names, units and "
+        "bounds.",
+    ),
+]
+ParameterFile = Annotated[
+    Path | None, Parameter(help="Parameter file; the model's own public data by default.")
+]
+
+
+def strict(wanted: Any, tokens: Sequence[Token]) -> Any:
+    """Value of an option; 1.5 is no integer, and an empty text no path.
+
+    Raises
+    ------
+    InputError
+        If the text is another kind of value.
+    """
+    for token in tokens:
+        name, text = token.keyword or "argument", token.value
+        if int in (wanted, *get_args(wanted)) and not text.strip().removeprefix("-").isdecimal():
+            raise InputError(f"{name}: {text!r} is not a whole number")
+        if Path in (wanted, *get_args(wanted)) and (not text or "\0" in text):
+            raise InputError(f"{name}: {text!r} is not a path")
+    return convert(wanted, tokens)
+
+
+def key_values(option: str, given: Iterable[str] | None) -> dict[str, Any]:
+    """Key -> an integer, a number, numbers that commas separate as a list, or text.
+
+    Raises
+    ------
+    InputError
+        If something is not key=value, or a key is given twice.
+    """
+    found: dict[str, Any] = {}
+    for text in given or ():
+        key, separator, value = text.partition("=")
+        if not separator or not key:
+            raise InputError(f"{option} {text!r} is not key=value")
+        if key in found:
+            raise InputError(f"{option} {key} is given twice")
+        found[key] = _parsed(value)
+    return found
+
+
+def _parsed(text: str) -> object:
+    for kind in (int, float, lambda text: [*map(float, text.split(","))]):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def new_file(option: str, path: Path, endings: Sequence[str]) -> Path:
+    """A file that can be written, by its ending and its folder; `InputError` if it can't."""
+    try:
+        if path.is_dir():
+            raise InputError(f"{option} {path}: is a folder, not a file")
+        if not path.parent.is_dir():
+            raise InputError(f"{option} {path}: the folder {path.parent} does not exist")
+    except OSError as error:
+        raise InputError(f"{option} {path}: can't be written ({error.strerror})") from None
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{option} {path}: the file ends with {' or '.join(endings)}")
+    return path
+
+
+def result_file(option: str, path: Path) -> Path:
+    """As `new_file`, of a result: one that stands there is replaced, but nothing else."""
+    from vehiclemor.study.netcdf_file import read_dataset
+
+    if new_file(option, path, (".nc",)).exists():
+        read_dataset(path, "source", "vehiclemor")
+    return path
+
+
+def picture_file(option: str, path: Path) -> Path:
+    """As `new_file`, of a picture."""
+    from vehiclemor.report.figures.theme import FORMATS
+
+    return new_file(option, path, [f".{ending}" for ending in FORMATS])

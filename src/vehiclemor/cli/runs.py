@@ -1,0 +1,187 @@
+"""One run or one model: simulated, drawn, exported."""
+
+import inspect
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+import vehiclemor as vm
+from vehiclemor.api import RESULTS
+from vehiclemor.cli.ending import FAILED
+from vehiclemor.cli.options import (
+    ParameterFile,
+    Parameters,
+    Results,
+    Settings,
+    key_values,
+    picture_file,
+    result_file,
+)
+from vehiclemor.errors import InputError
+from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
+from vehiclemor.report.printing import wrapped
+
+# Method that stands for the model that ships.
+SHIPPED = "shipped"
+
+
+def simulate(
+    model: str,
+    *,
+    method: str = "full_order",
+    settings: Settings = None,
+    maneuver: str | None = None,
+    frequency: float = 1.0,
+    amplitude: float = 1.0,
+    start: str | None = None,
+    preset: str = "recommended",
+    training: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (
+        "matched",
+    ),
+    parameter: Parameters = None,
+    parameter_file: ParameterFile = None,
+    out: Path | None = None,
+    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    all_outputs: bool = False,
+) -> int:
+    """Simulate a model with a method; errors are against the full-order solution.
+
+    Parameters
+    ----------
+    model
+        Registered name.
+    method
+        Registered name.
+    maneuver
+        Registered name; the model's own by default.
+    frequency
+        Factor on the input's frequency.
+    amplitude
+        Factor on the input's amplitude.
+    start
+        Initial condition; the model's first by default.
+    preset
+        Preset of the method's settings.
+    training
+        matched (the very run that is simulated; the default), nominal (the model's own maneuver),
+        protocol (the training of the model's protocol), or names of maneuvers; one or several.
+    out
+        netCDF file for the result.
+    plot
+        Draw the result into this file, or into MODEL-METHOD.png here.
+    all_outputs
+        Print errors of every output, not only of those that tables show.
+    """
+    chosen = key_values("--set", settings)
+    for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
+        raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
+    picture = None
+    if plot is not None:
+        if len(plot) > 1:
+            raise InputError(f"--plot: one file, not {len(plot)}")
+        picture = picture_file("--plot", plot[0] if plot else Path(f"{model}-{method}.png"))
+    if out is not None:
+        result_file("--out", out)
+    ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
+    how: dict[str, Any] = {"maneuver": maneuver, "start": start, "preset": preset}
+    how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
+    dataset = vm.simulate(ready, method, **how, **chosen)
+    from vehiclemor.report.shown import tabled_outputs
+    from vehiclemor.report.simulation import simulation_text
+    from vehiclemor.study.netcdf_file import write_dataset
+
+    shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
+    print(simulation_text(dataset, shown, ready.counts))
+    if out is not None:
+        write_dataset(dataset, out)
+        print(f"written: {out}")
+    if picture:
+        vm.plot(dataset, out=picture)
+        print(f"written: {picture}")
+    if out is None and picture is None:
+        print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def plot(
+    result: str,
+    *,
+    kind: Literal["histories", "paths", "errors"] = "histories",
+    select: list[str] | None = None,
+    out: Path | None = None,
+    results: Results = RESULTS,
+) -> None:
+    """Draw a stored result: histories of the outputs, paths, or errors.
+
+    Parameters
+    ----------
+    result
+        A netCDF file that simulate has written, or a study that has been run.
+    kind
+        What is drawn.
+    select
+        dimension=value: a point of the study's grid; may be given several times.  Else factors are
+        1 and the others first, and errors are over the whole grid; all methods are drawn.
+    out
+        Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
+    """
+    picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
+    from vehiclemor.report.figures.result_plot import plot_result
+    from vehiclemor.report.result_selection import drawn, stored_result
+
+    dataset, point = drawn(stored_result(result, results), kind, key_values("--select", select))
+    plot_result(dataset, picture, kind)
+    if point:
+        print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
+    print(f"written: {picture}")
+
+
+def export(
+    model: str,
+    *,
+    to: FileTarget,
+    method: str | None = None,
+    settings: Settings = None,
+    parameter: Parameters = None,
+    out: Path | None = None,
+    overwrite: bool = False,
+    step: float = STEP,
+) -> None:
+    """Export a model, or a reduced one, for another tool.
+
+    Parameters
+    ----------
+    model
+        Registered name, or file of a reduced model.
+    to
+        c: a folder with C99 sources; fmu: a functional mock-up unit by FMI 2.0; casadi: a function
+        that CasADi loads.
+    method
+        Reduce the model by this method first, of which --set may give preset and training (nominal,
+        protocol) too; shipped: the reduced model that ships with the package.  The full model by
+        default.
+    out
+        Folder or file; under the model's name here by default.
+    overwrite
+        Replace an export that is there.
+    step
+        Step size in s of the integrator in C and FMU.
+    """
+    given, values = key_values("--set", settings), key_values("--parameter", parameter)
+    file = Path(model).suffix == ".nc"
+    kept = file or method == SHIPPED
+    if (file and method) or (kept and (given or values)):
+        raise InputError("a reduced model that is kept has its method, settings and parameters")
+    if given and method is None:
+        raise InputError("--set is for a method: --method NAME")
+    if kept:
+        chosen = vm.load(model) if file else vm.rom(model)
+        out = destination(name_of(chosen.model.name, chosen.method), to, out, overwrite)
+    else:
+        chosen = vm.model(model, values)
+        # Before anything is fitted.
+        out = destination(name_of(model, method), to, out, overwrite)
+        if method is not None:
+            chosen = vm.reduce(chosen, method, **given)
+    print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")

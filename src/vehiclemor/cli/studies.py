@@ -1,0 +1,199 @@
+"""Studies: run, followed, compared, drawn, reported, converted."""
+
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+import vehiclemor as vm
+from vehiclemor.api import RESULTS
+from vehiclemor.cli.ending import FAILED, MISSED
+from vehiclemor.cli.options import All, Jobs, Json, Results, Seed, new_file
+from vehiclemor.cli.progress import shown_progress
+from vehiclemor.errors import InputError
+from vehiclemor.report.printing import ends_text, wrapped
+from vehiclemor.report.study_formats import Format
+
+Study = Annotated[str, Parameter(help="Name of a study or collection, or a TOML file.")]
+# Reasons that are printed of each study.
+REASONS = 10
+
+
+def run(
+    study: Study,
+    *,
+    jobs: Jobs = 1,
+    scheduler: str = "",
+    results: Results = RESULTS,
+    seed: Seed = None,
+) -> int:
+    """Run a study; what an earlier run has finished is not computed again.
+
+    A cell that stands at several points of the grid is computed once.
+
+    Parameters
+    ----------
+    scheduler
+        Address of a dask scheduler whose workers compute the cells.
+    """
+    from vehiclemor.report.frames import counted_ends
+    from vehiclemor.study.run import run_studies
+
+    began, errors = time.perf_counter(), 0
+    with shown_progress() as cells:
+        found = run_studies(study, results, jobs, scheduler, seed)
+    for name, dataset in found.items():
+        places = f"{dataset['status'].size} grid points, {cells[name]} cells"
+        counts = counted_ends(dataset)
+        print(wrapped(f"{name}: {places}: {counts}; {dataset.encoding['source']}", 0, 2))
+        ends = zip(dataset["status"].values.flat, dataset["message"].values.flat, strict=True)
+        _print_reasons(Counter(end for end in ends if end[0] in ("rejected", "error")))
+        errors += int((dataset["status"] == "error").sum())
+    print(f"{time.perf_counter() - began:.1f} s")
+    return FAILED if errors else 0
+
+
+def status(study: Study, *, results: Results = RESULTS, seed: Seed = None) -> None:
+    """Show how far a study is, without computing anything."""
+    for name, found in vm.status(study, results, seed).items():
+        text = f"{name}: {found.done} of {found.cells} cells done"
+        if found.to_do:
+            known = found.seconds_left == found.seconds_left
+            left = f"about {found.seconds_left:.3g} s in one process" if known else "time unknown"
+            text += f", {found.to_do} to do ({left})"
+        text += f", {found.later}" if found.later and not found.result else ""
+        if found.ends:
+            text += f"; {ends_text(kind for kind, _ in found.ends.elements())}"
+        combined = found.result or "not combined yet"
+        older = " is older" if found.result and found.to_do else ""
+        print(wrapped(f"{text}; {combined}{older}", 0, 2))
+        _print_reasons(found.failed)
+
+
+def _print_reasons(failed: Counter[tuple[str, str]]) -> None:
+    """Print why runs have failed, the most frequent reasons first."""
+    found = failed.most_common()
+    for (kind, message), runs in found[:REASONS]:
+        again = ", tried again by the next run" if kind == "error" else ""
+        print(wrapped(f"{runs} {kind}{again}: {message}", 2, 4))
+    if len(found) > REASONS:
+        rest = sum(runs for _, runs in found[REASONS:])
+        print(f"  {rest} for {len(found) - REASONS} other reasons")
+
+
+def compare(
+    what: str = "paper",
+    *,
+    every: All = False,
+    json_output: Json = False,
+    check: bool = False,
+    results: Results = RESULTS,
+    jobs: Jobs = 1,
+    seed: Seed = None,
+) -> int:
+    """Set published numbers beside reproduced ones, or the methods of a study side by side.
+
+    Studies and timings that are missing are run first.
+
+    Parameters
+    ----------
+    what
+        The comparison: paper (published beside reproduced), predictive (reduced models on inputs
+        that they have not seen), the name of a model (every method that fits it), or a study,
+        collection or protocol by its name or TOML file.
+    every
+        Of the comparison with the paper: print every claim with its reason, and the costs.
+    check
+        Exit with status 1 if a bound of the paper or a target of a protocol is missed.
+    """
+    from vehiclemor.report.comparison.screens import comparison_text
+    from vehiclemor.report.printing import json_text
+
+    with shown_progress():
+        rows = vm.compare(what, results, jobs, seed)
+    print(json_text(rows) if json_output else comparison_text(what, rows, results, every))
+    return MISSED if check and "verdict" in rows and "missed" in set(rows["verdict"]) else 0
+
+
+def figures(
+    *,
+    only: str | None = None,
+    out: Path = RESULTS / "figures",
+    results: Results = RESULTS,
+    jobs: Jobs = 1,
+    style: str = "",
+    dpi: int | None = None,
+) -> int:
+    """Draw the paper's figures, or those of any study; studies that are missing are run first.
+
+    Parameters
+    ----------
+    only
+        Names of figures, separated by commas: those of the paper, such as 6, or histories-,
+        errors-, map- or pareto- and the name of a model; or a study, collection or protocol by name
+        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default, but
+        Pareto figures only where their study is stored.
+    out
+        Folder of the figures.
+    style
+        Name or file of a Matplotlib style on top of the package's.
+    dpi
+        Dots an inch of PNG files; 200 by default.
+    """
+    chosen = [name.strip() for name in (only or "").split(",") if name.strip()]
+    if only is not None and not chosen:
+        raise InputError(f"--only {only!r} names no figure")
+    from vehiclemor.report.regenerate import left_out, regenerate_figures
+
+    with shown_progress():
+        written, failed = regenerate_figures(results, out, chosen, jobs, style=style, dpi=dpi)
+    for path in written:
+        print(path)
+    for name, why in failed.items():
+        print(f"figure {name} can't be drawn: {why}", file=sys.stderr)
+    missing = {} if chosen else left_out(results)
+    if missing:
+        made = "vehiclemor run predictive makes their studies"
+        print(f"left out: {', '.join(missing)} ({made})")
+    return FAILED if failed else 0
+
+
+def report(
+    *studies: str,
+    out: Path = Path("report.html"),
+    results: Results = RESULTS,
+    jobs: Jobs = 1,
+) -> None:
+    """Write results as one HTML file: verdicts, tables, figures, settings and provenance.
+
+    It needs no network and loads no other file.
+
+    Parameters
+    ----------
+    studies
+        Studies, collections or TOML files, run first where results are missing, or models, of which
+        their studies by default are meant. Without any: everything that the results folder holds.
+    out
+        The file, which ends with .html.
+    """
+    new_file("--out", out, (".html", ".htm"))
+    with shown_progress():
+        print(f"written: {vm.write_report(studies, out, results, jobs)}")
+
+
+def convert(study: str, *, to: Format, out: Path | None = None, results: Results = RESULTS) -> None:
+    """Write the stored result of a study in another format.
+
+    Parameters
+    ----------
+    study
+        Name or file of a study that has been run, or a netCDF file of its result.
+    to
+        zarr: the whole dataset; parquet, csv: a table with a row for each point of the grid.
+    out
+        New file or folder; under the study's name here by default.
+    """
+    print(f"written: {vm.convert(study, to, out, results)}")

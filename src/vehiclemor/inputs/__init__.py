@@ -1,0 +1,1 @@
+"""Inputs of models over time: maneuvers, and signals through samples."""
