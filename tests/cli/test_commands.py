@@ -209,3 +209,10 @@ def test_bounds_are_shown():
     types = {row["name"]: row["type"] for row in settings}
     assert types["solver"].startswith("dopri5, rodas4, ros34pw2")
     assert types["tolerance"] == "number 1e-13 to 0.1"
+
+
+def test_an_audit_is_followed_apart(printed, tmp_path):
+    study = "predictive-double_wishbone"
+    text = printed("status", study, "--seed", "7", "--results", tmp_path)
+    assert text.startswith(f"{study}-seed-7: 0 of ")
+    assert [*vm.status(study, tmp_path)] == [study]
