@@ -7,8 +7,7 @@ import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.cli import main
 from vehiclemor.errors import FileError
-from vehiclemor.study.plans.grid import expand
-from vehiclemor.study.plans.sampling import sampled
+from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.study_file import Sampling, StudyFile
 
 CAR = "independent_suspension_vehicle"

@@ -10,8 +10,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.maneuver import sine_travel
 from vehiclemor.registry import component
 from vehiclemor.study.evaluate import evaluate
-from vehiclemor.study.experiment import make_experiment
-from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))

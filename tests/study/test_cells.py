@@ -14,11 +14,10 @@ from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study import provenance
 from vehiclemor.study.evaluate import evaluate
-from vehiclemor.study.experiment import make_experiment
-from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.grid import expand
-from vehiclemor.study.plans.grid_results import flattened
 from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.plans.results import flattened
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
@@ -36,7 +35,7 @@ def make_cell(model, maneuver, method, given, training="matched", **factors):
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
     evaluation.kept_reference.cache_clear()
-    evaluation._kept.cache_clear()
+    evaluation._KEPT.clear()
 
 
 @pytest.fixture(scope="module")

@@ -23,12 +23,12 @@ from hypothesis import strategies as st
 from tests.study.small import assert_same, small_study
 from tests.texts.markdown import blocks
 from vehiclemor.errors import InputError, MachineError
+from vehiclemor.progress import listening
 from vehiclemor.study import cluster as engine
 from vehiclemor.study import workers
 from vehiclemor.study.cell_file import ENDING
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.loading import load_studies
-from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.workers import KILLED, LARGEST, WAITING, Done, evaluate_and_store, in_batches
 

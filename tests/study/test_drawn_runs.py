@@ -15,10 +15,8 @@ import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.report.predictive.equal_error import at_error
 from vehiclemor.report.predictive.targets import upper_bound
-from vehiclemor.study.plans.choice import outcomes
-from vehiclemor.study.plans.drawn_runs import drawn, drawn_sets
-from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.sensitive import _lifted, reasons
+from vehiclemor.study.plans.choice import _lifted, outcomes, reasons
+from vehiclemor.study.plans.protocol import drawn, drawn_sets, load_protocol
 from vehiclemor.study.plans.study_file import Bound, Box, Draw
 
 SEEDS = (1, 1, 0)

@@ -29,11 +29,11 @@ def raised(request, monkeypatch):
     def broken(*_):
         raise error
 
-    evaluate._kept.cache_clear()
+    evaluate._KEPT.clear()
     monkeypatch.setattr(fixed_basis, "METHOD", replace(fixed_basis.METHOD, fit=broken))
     monkeypatch.setattr(timing, "PROTOCOL_ROUNDS", 1)
     yield status, message
-    evaluate._kept.cache_clear()
+    evaluate._KEPT.clear()
 
 
 def test_what_a_fit_raises_is_a_result_in_a_grid(raised, tmp_path):

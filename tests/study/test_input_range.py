@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import evaluate
-from vehiclemor.study.experiment import make_experiment
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.input_range import input_range
-from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.scenario import Scenario
 
 MODELS = {

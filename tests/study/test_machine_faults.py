@@ -14,10 +14,10 @@ import pytest
 
 from tests.study.small import small_study
 from vehiclemor.errors import FileError, MachineError
+from vehiclemor.progress import listening
 from vehiclemor.reduction.methods import fixed_basis
 from vehiclemor.study import cell_file, evaluate, workers
 from vehiclemor.study.failure import Failure
-from vehiclemor.study.progress import listening
 from vehiclemor.study.run import run_studies
 
 GRID = 'keep = "metrics"\ngrid = { rank = [2, 3] }\n'
@@ -27,9 +27,9 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.fixture(autouse=True)
 def _nothing_kept():
-    evaluate._kept.cache_clear()
+    evaluate._KEPT.clear()
     yield
-    evaluate._kept.cache_clear()
+    evaluate._KEPT.clear()
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import Validation, choose
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.protocol_results import judged_part
+from vehiclemor.study.plans.results import judged_part
 from vehiclemor.study.plans.study_file import SpeedTarget
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import training_run
@@ -109,7 +109,7 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     seen, trained = [], []
     evaluate.kept_reference.cache_clear()
     # What an earlier test has fitted would not be fitted again.
-    evaluate._kept.cache_clear()
+    evaluate._KEPT.clear()
 
     def recorded(function):
         def run(self, maneuver, *arguments, **named):

@@ -11,9 +11,8 @@ from vehiclemor.registry import component
 from vehiclemor.signals import Signal
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import fresh_fit, kept_fit
-from vehiclemor.study.experiment import make_experiment
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.failure import Failure
-from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.scenario import Scenario, input_hash
 
 FAILING = 3

@@ -5,7 +5,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import vehiclemor as vm
-from vehiclemor.study.linear_algebra import one_thread
+from vehiclemor.study.evaluate import one_thread
 
 
 def threads() -> set[int]:

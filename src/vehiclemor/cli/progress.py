@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import TaskID
 
-    from vehiclemor.study.progress import Progress
+    from vehiclemor.progress import Progress
 
 # Without a terminal there is a line every so many seconds.
 INTERVAL = 5.0
@@ -24,7 +24,7 @@ def shown_progress() -> Iterator[Progress]:
     """Show how far all that is run inside is, on standard error; gives what shows it."""
     from rich.console import Console
 
-    from vehiclemor.study.progress import listening
+    from vehiclemor.progress import listening
 
     console = Console(stderr=True)
     with _bar(console) if console.is_terminal else _lines() as update, listening(update):

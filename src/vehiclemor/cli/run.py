@@ -37,8 +37,8 @@ def run(
     seed
         Draws fresh test runs of protocols, for an audit; their results stand apart.
     """
+    from vehiclemor.progress import listening
     from vehiclemor.report.frames import counted_ends
-    from vehiclemor.study.progress import listening
     from vehiclemor.study.run import run_studies
 
     began = time.perf_counter()

@@ -12,12 +12,10 @@ import numpy as np
 
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.combined import result_path
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.protocol_run import validation_experiments
-from vehiclemor.study.store import cell_end
+from vehiclemor.study.store import read_cell, result_path
 
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
@@ -88,8 +86,10 @@ def status_of(study: str, folder: Path) -> dict[str, StudyStatus]:
     for name, (path, definition) in studies_and_files(study).items():
         later = LATER if definition.bounds else ""
         if definition.bounds:
-            experiments = validation_experiments(load_protocol(str(path)))
-            cells = {e.key: e.method for e in experiments}
+            protocol = load_protocol(str(path))
+            validation = protocol.sets["validation"]
+            groups = [e.experiments(protocol.model, validation) for e in protocol.entries]
+            cells = {e.key: e.method for group in groups for e in group}
         else:
             cells = _methods(expand(name, definition))
         result = result_path(folder, name, content_hash(definition))
@@ -114,19 +114,19 @@ def _status(
     missing: Counter[str] = Counter()
     for key, method in cells.items():
         try:
-            end, finished = cell_end(folder, key)
+            cell = read_cell(folder, key)
         except FileError:
             # Missing, or set aside by the next run.
             missing[method] += 1
             continue
-        for (name, message), runs in end.runs.items():
+        for (name, message), runs in cell.ends.items():
             alike = name, NUMBER.sub("#", message)
             status.ends[examples.setdefault(alike, (name, message))] += runs
-        if finished:
-            status.done += 1
-            seconds[method].append(end.seconds)
-        else:
+        if cell.broken:
             missing[method] += 1
+        else:
+            status.done += 1
+            seconds[method].append(cell.seconds)
     status.seconds_left = _seconds_left(missing, seconds)
     return status
 
