@@ -100,7 +100,7 @@ def test_a_dataset_laid_out_by_other_source_is_combined_again(study, uninterrupt
     run_studies(str(study), tmp_path)
     path = tmp_path / "studies" / "small.nc"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vehiclemor.study.plans.grid_results.layout_digest", lambda: "older")
+        patch.setattr("vehiclemor.study.plans.results.layout_digest", lambda: "older")
         path.unlink()
         older = run_studies(str(study), tmp_path)["small"]
     write_dataset(older.drop_vars("rms_error"), path)

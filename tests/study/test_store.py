@@ -3,8 +3,6 @@
 import json
 import logging
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import netCDF4
@@ -191,55 +189,25 @@ def test_a_folder_in_the_place_of_a_cell_is_set_aside(place, computed, caplog):
     assert len(computed) == len(caplog.messages) == 2
 
 
-def test_a_spoiled_combined_dataset_is_set_aside_and_made_again(done, place, computed, caplog):
-    path = place / "out" / "studies" / "small.nc"
-    path.write_bytes(spoiled := path.read_bytes()[:-1000])
-    xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
-    assert (path.parent / ASIDE / "small.nc").read_bytes() == spoiled
+def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed, caplog):
+    path, study = place / "out" / "studies" / "small.nc", place / "small.toml"
+    whole, rng = path.read_bytes(), np.random.default_rng(2)
+    damaged = [whole[:-1], whole[:-1000], whole + b"x"]
+    for at in range(0, len(whole), 5999):
+        bit, flipped = int(rng.integers(8 * len(whole))), bytearray(whole)
+        flipped[bit // 8] ^= 1 << bit % 8
+        damaged += [bytes(flipped), whole[:at] + b"damage" + whole[at + 6 :]]
+    for number, content in enumerate(damaged, start=1):
+        path.write_bytes(content)
+        with pytest.raises(SpoiledError) as error:
+            read_dataset(path, "source", "vehiclemor")
+        assert "\n" not in str(error.value)
+        xr.testing.assert_identical(run(study, place / "out"), reread(done))
+        xr.testing.assert_identical(reread(place), reread(done))
+        aside = sorted((path.parent / ASIDE).iterdir())
+        assert len(aside) == len(caplog.messages) == number
+        assert content in [file.read_bytes() for file in aside]
     assert computed == []
-    assert str(path) in caplog.messages[0]
-    xr.testing.assert_identical(reread(place), reread(done))
-
-
-DAMAGED = """
-import sys
-from pathlib import Path
-import numpy as np
-from vehiclemor.errors import InputError, SpoiledError
-from vehiclemor.report.result_selection import stored_result
-from vehiclemor.study.netcdf_file import read_dataset
-from vehiclemor.study.run import run_studies
-
-study, path = sys.argv[1], Path(sys.argv[2])
-whole, rng = path.read_bytes(), np.random.default_rng(2)
-damaged = [whole[:-1], whole[:-100], whole + b"x"]
-for at in range(0, len(whole), 5999):
-    damaged.append(whole[:at] + bytes(len(whole[at : at + 334])) + whole[at + 334 :])
-    bit = int(rng.integers(8 * len(whole)))
-    damaged.append(bytearray(whole))
-    damaged[-1][bit // 8] ^= 1 << bit % 8
-damaged = [content for content in damaged if content != whole]
-for content in damaged:
-    path.write_bytes(content)
-    try:
-        read_dataset(path, "source", "vehiclemor")
-    except SpoiledError as error:
-        assert "\\n" not in str(error)
-    else:
-        raise AssertionError("read")
-    assert (run_studies(study, path.parents[1])["small"]["status"] == "ok").all()
-    assert read_dataset(path, "source", "vehiclemor").attrs["study"] == "small"
-print(len(damaged), len(list(path.parent.glob("set-aside/*"))))
-"""
-
-
-def test_combined_datasets_with_any_damage_are_made_again(place):
-    path = place / "out" / "studies" / "small.nc"
-    # In a child: the library may never come back of them.
-    command = [sys.executable, "-c", DAMAGED, str(place / "small.toml"), str(path)]
-    ended = subprocess.run(command, capture_output=True, timeout=60, check=True, text=True)
-    tries, aside = map(int, ended.stdout.split())
-    assert tries == aside > 10
 
 
 def test_a_file_of_others_is_read_if_the_library_can(tmp_path, monkeypatch):
