@@ -258,8 +258,7 @@ def run_study(
     progress
         Called with (study, finished cells, all cells).
     scheduler
-        Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
-        with so many processes.
+        Address of a dask scheduler whose workers compute the cells.
     seed
         Draws fresh test runs of protocols, for an audit; by default the file's seed.
 

@@ -30,8 +30,7 @@ def run(
     jobs
         Number of processes.
     scheduler
-        Address of a dask scheduler whose workers compute the cells, or `local`: one is started here
-        with so many processes.
+        Address of a dask scheduler whose workers compute the cells.
     out
         Results folder.
     seed

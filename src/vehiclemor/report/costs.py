@@ -40,17 +40,14 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
 def timing_of(model: str, folder: Path) -> xr.Dataset:
     """Stored timing of the cases of a model, measured first if it is missing."""
     built, cases = build(model), timing_cases(component("model", model))
+    maneuver = built.definition.maneuver
+    runs = {start: Scenario.of(maneuver, (1.0, 1.0), start) for start in built.starts}
     experiments = {
-        start: {
-            name: _experiment(
-                built, case, Scenario.of(built.definition.maneuver, (1.0, 1.0), start)
-            )
-            for name, case in cases.items()
-        }
-        for start in built.starts
+        start: {case.id: _experiment(built, case, run) for case in cases}
+        for start, run in runs.items()
     }
     data = timed_starts(experiments, folder / "studies" / f"timing-{model}.nc")
-    return data.assign_coords(label=("case", [case.label for case in cases.values()]))
+    return data.assign_coords(label=("case", [case.label for case in cases]))
 
 
 def _experiment(model: Model, case: MethodEntry, run: Scenario) -> Experiment:

@@ -73,14 +73,13 @@ def default_rank(coordinates: int) -> int:
     return max(1, min(LARGEST_DEFAULT_RANK, coordinates - 1))
 
 
-def timing_cases(definition: ModelDefinition) -> dict[str, Case]:
-    """Identifier -> row of a model's cost table: full-order solvers, replay, reduced models."""
+def timing_cases(definition: ModelDefinition) -> list[Case]:
+    """Rows of a model's cost table: full-order solvers, replay, reduced models."""
     settings: Settings = {"rank": default_rank(len(definition.coordinates))}
     reduced = tables_file().reduced.get(definition.name) or [
         Case(method=method, preset=preset, settings=settings) for method, preset in REDUCED
     ]
-    named = [case.named() for case in (*of_kind(definition.kind).cases, *reduced)]
-    return {case.id: case for case in named}
+    return [case.named() for case in (*of_kind(definition.kind).cases, *reduced)]
 
 
 def tabled_outputs(definition: ModelDefinition) -> tuple[str, ...]:

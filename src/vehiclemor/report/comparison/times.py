@@ -49,7 +49,7 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
 
 def _cases(model: str, states: int) -> list[Case]:
     """Timing cases of control-period POD with so many states and nothing else set."""
-    cases = timing_cases(component("model", model)).values()
+    cases = timing_cases(component("model", model))
     return [c for c in cases if c.method == "pod" and dict(c.settings) == {"rank": states}]
 
 
