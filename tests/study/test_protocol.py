@@ -45,23 +45,15 @@ def test_the_study_names_every_protocol(protocols):
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_the_sets_of_a_vehicle(protocols, name):
-    sets, definition = protocols[name].sets, protocols[name].definition
-    prefix = "rack_" if name == "high_fidelity_vehicle" else ""
-    # 299 runs without a miss prove a rate below 1 % at 95 %.
-    assert definition.drawn.runs == 299
-    shapes = ("lane_change", "step_steer", "sine_sweep", "multisine")
-    assert {box.maneuver for box in definition.drawn.boxes} == {prefix + s for s in shapes}
+def test_training_reaches_as_far_as_what_is_drawn(protocols, name):
+    training, definition = protocols[name].sets["training"], protocols[name].definition
+    frequencies = [s.maneuver.frequency_factor for s in training]
+    largest = max(abs(s.maneuver.amplitude_factor) for s in training)
     for box in definition.drawn.boxes:
-        assert (box.frequency, box.amplitude, box.speed) == ([0.7, 1.8], [0.5, 1.5], [18.0, 22.0])
-        assert (box.both_signs, box.start) == (True, ["equilibrium", "dropped"])
-    # Training reaches at least as far as what is drawn inside, and nowhere near all outside.
-    trained = [s.maneuver.frequency_factor for s in sets["training"]]
-    assert min(trained) <= 0.7
-    assert max(trained) >= 1.8
-    assert max(abs(s.maneuver.amplitude_factor) for s in sets["training"]) >= 1.5
-    assert max(box.amplitude[1] for box in definition.drawn_outside.boxes) == 2.5
-    assert {s.maneuver.name for s in sets["test"]} == {f"{prefix}straight_ahead"}
+        assert min(frequencies) <= box.frequency[0]
+        assert max(frequencies) >= box.frequency[1]
+        assert largest >= box.amplitude[1]
+    assert largest < max(box.amplitude[1] for box in definition.drawn_outside.boxes)
 
 
 @pytest.mark.parametrize(

@@ -176,6 +176,13 @@ def reread(place: Path) -> xr.Dataset:
     )
 
 
+def test_a_cell_that_is_missing_is_computed_again(done, place, computed):
+    (first, _) = cells(place)
+    first.unlink()
+    xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
+    assert computed == [first.stem]
+
+
 def test_a_folder_in_the_place_of_a_cell_is_set_aside(place, computed, caplog):
     (first, _) = cells(place)
     for number in ("", "-2"):
