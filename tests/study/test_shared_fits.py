@@ -67,6 +67,21 @@ def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(veh
     assert failed == Failure("diverged", "no fit")
 
 
+def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
+    method, raised = component("method", "slow_manifold"), []
+
+    def fit(*given):
+        raised.append(given)
+        raise ZeroDivisionError if len(raised) < 3 else ConvergenceError("no fit")
+
+    broken = replace(method, fit=fit)
+    monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
+    wanted = experiment(vehicle, "slow_manifold", terms=1, sweeps=0)
+    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    assert found == ["error", "error", "diverged", "diverged"]
+    assert len(raised) == 3
+
+
 def sent(maneuver):
     """What another process gets of a scenario's maneuver."""
     return pickle.loads(pickle.dumps(Scenario(maneuver, "equilibrium"))).maneuver  # noqa: S301 - own

@@ -18,7 +18,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import complete_settings, default_settings
 from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.protocol import PREFIX, protocol_names
-from vehiclemor.study.plans.study_file import Bound, Group, MethodEntry, StudyFile
+from vehiclemor.study.plans.study_file import StudyFile
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.
@@ -110,13 +110,15 @@ def bounds(model: Model) -> dict[str, float]:
 
 def _study(name: str, kind: str, results: Path, further: dict[str, Any]) -> str:
     """Path of a study file of every method; methods with a rank get the model's default one."""
-    model, title = build(name), f"{name}: {kind} input, every method"
+    model = build(name)
     entries = [
-        MethodEntry(method=method, label=label, preset=preset, settings=smaller_rank(model, method))
-        for label, (method, preset) in methods(model).items()
+        {"method": m, "label": label, "preset": preset, "settings": smaller_rank(model, m)}
+        for label, (m, preset) in methods(model).items()
     ]
-    study = StudyFile(title=title, model=name, methods=entries, **further)
-    return str(write_study(study, results / "studies" / f"{name}-{kind}.toml"))
+    title = f"{name}: {kind} input, every method"
+    content = {"title": title, "model": name, "methods": entries, **further}
+    path = results / "studies" / f"{name}-{kind}.toml"
+    return str(write_study(StudyFile.model_validate(content), path))
 
 
 def smaller_rank(model: Model, method: str) -> dict[str, int]:
@@ -128,25 +130,26 @@ def smaller_rank(model: Model, method: str) -> dict[str, int]:
 
 def _protocol(model: Model) -> StudyFile:
     """Protocol of a model: full order at several tolerances, then every method."""
-    maneuver, starts = component("model", model.name).maneuver, list(model.starts)
-    entries = []
-    for label, (method, preset) in methods(model).items():
-        if label == "pod_literal":
-            continue
-        tolerances = TOLERANCES if label == "full_order" else ()
-        entry = MethodEntry(
-            method=method,
-            label=label.replace("full_order_", "").replace("_", " "),
-            preset=preset,
-            settings=smaller_rank(model, method),
-            candidates=[{"tolerance": value} for value in tolerances] or [{}],
-            role=ROLES.get(method, "contender"),
-        )
-        entries.append(entry)
-    return StudyFile(
-        title=f"{model.name}: inputs that a reduced model has not seen",
-        model=model.name,
-        bounds={output: Bound(measure="rms", bound=b) for output, b in bounds(model).items()},
-        methods=entries,
-        **{n: [Group(maneuver=maneuver, points=p, start=starts)] for n, p in POINTS.items()},
-    )
+    entries = [
+        {
+            "method": method,
+            "label": label.replace("full_order_", "").replace("_", " "),
+            "preset": preset,
+            "settings": smaller_rank(model, method),
+            "role": ROLES.get(method, "contender"),
+        }
+        for label, (method, preset) in methods(model).items()
+        if label != "pod_literal"
+    ]
+    for entry in entries:
+        if entry["label"] == "full order":
+            entry["candidates"] = [{"tolerance": value} for value in TOLERANCES]
+    inputs = {"maneuver": component("model", model.name).maneuver, "start": list(model.starts)}
+    sets = {purpose: [inputs | {"points": points}] for purpose, points in POINTS.items()}
+    content = {
+        "title": f"{model.name}: inputs that a reduced model has not seen",
+        "model": model.name,
+        "bounds": {o: {"measure": "rms", "bound": bound} for o, bound in bounds(model).items()},
+        "methods": entries,
+    }
+    return StudyFile.model_validate(content | sets)

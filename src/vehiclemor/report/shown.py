@@ -77,7 +77,8 @@ def timing_cases(definition: ModelDefinition) -> list[Case]:
     """Rows of a model's cost table: full-order solvers, replay, reduced models."""
     settings: Settings = {"rank": default_rank(len(definition.coordinates))}
     reduced = tables_file().reduced.get(definition.name) or [
-        Case(method=method, preset=preset, settings=settings) for method, preset in REDUCED
+        Case.model_validate({"method": method, "preset": preset, "settings": settings})
+        for method, preset in REDUCED
     ]
     return [case.named() for case in (*of_kind(definition.kind).cases, *reduced)]
 

@@ -281,7 +281,8 @@ def _tested(
     reference: Trajectory | None,
 ) -> Outcome:
     """A test scenario, simulated with the reduced model of its car."""
-    car, start, reduced = car_of(model, scenario), start_of(model, scenario), fit.reduced
+    car, start = car_of(model, scenario), start_of(model, scenario)
+    reduced: Any = fit.reduced
     many = experiment.keep == "errors"
     # The first run loads machine code and warms caches, another is timed where it is compared.
     if not (many or fit.warm or reference is None):

@@ -157,10 +157,12 @@ def _compared(
 
 def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
     times = maneuver.times
-    quantities = (model.coordinates, model.speeds, model.outputs)
-    histories = [np.full((len(times), len(names)), np.nan) for names in quantities]
-    end = failure.status, failure.message
-    return Trajectory(times, maneuver.at(times), *histories, {}, np.nan, *end)
+    coordinates, speeds, outputs = (
+        np.full((len(times), len(names)), np.nan)
+        for names in (model.coordinates, model.speeds, model.outputs)
+    )
+    inputs, end = maneuver.at(times), (failure.status, failure.message)
+    return Trajectory(times, inputs, coordinates, speeds, outputs, {}, np.nan, *end)
 
 
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:

@@ -67,7 +67,7 @@ class Run(NamedTuple):
     car: Overrides
     training: tuple[str, ...]
     learner: str
-    pairs: tuple[tuple[float, ...], ...]
+    pairs: tuple[tuple[float, float], ...]
 
     @property
     def test(self) -> Scenario:
@@ -186,7 +186,7 @@ class Grid:
             overrides(car),
             training,
             entry.method if "protocol" in training else "",
-            tuple(map(tuple, study.training_set)),
+            tuple((pair[0], pair[1]) for pair in study.training_set),
         )
 
     @cached_property

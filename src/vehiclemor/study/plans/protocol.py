@@ -191,13 +191,14 @@ def _checked(
 
 def _of_group(model: Model, group: Group) -> list[Scenario]:
     """Every point of a group from every start."""
-    own = own_speed(model)
-    lists = group.frequency or [1.0], group.amplitude or [1.0], group.speed or [own]
+    lists = group.frequency or [1.0], group.amplitude or [1.0]
     # A point may leave the speed to the model.
-    points = [(*point, own)[:3] for point in group.points or itertools.product(*lists)]
+    speeds = [[speed] for speed in group.speed] or [[]]
+    products = itertools.product(*lists, speeds)
+    points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
     return [
-        Scenario.of(group.maneuver, (frequency, amplitude), start, speed)
-        for frequency, amplitude, speed in points
+        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else own_speed(model))
+        for point in points
         for start in group.start or model.starts[:1]
     ]
 
