@@ -190,6 +190,23 @@ def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
         assert bool(metrics["remark"].item()) == (number == 1)
 
 
+def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):
+    run, given = (Scenario(sine_travel, "equilibrium"),), {"tolerance": 1e-300}
+    settings = complete_settings(model, "full_order", given)
+    many, one = (
+        evaluate(make_experiment(model, "full_order", settings, run, run, keep))
+        for keep in ("errors", "metrics")
+    )
+    for found in (many, one):
+        assert (found["status"] == "diverged").all()
+        assert np.isnan(found["rms_error"]).all()
+        assert not found["warned"].any()
+    assert (many["iterations"].item(), many["message"].item()) == (0, one["message"].item())
+    assert np.isnan(many["seconds"].item())
+    # A grid tells how far it came.
+    assert one["iterations"].item() > 0
+
+
 # Runs of other cars
 
 

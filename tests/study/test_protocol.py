@@ -146,6 +146,11 @@ def test_drawn_sets_are_apart_from_what_was_learned_and_from_lists(protocol):
     assert drawn_sets(replace(protocol, sets=protocol.sets | listed)) == sets
     learned = replace(protocol, sets=protocol.sets | {"training": sets["drawn"]})
     assert not set(drawn_sets(learned)["drawn"]) & set(sets["drawn"])
+    # Ten runs of one box fill both.
+    half = Draw(runs=5, boxes=[Box(maneuver="sine_travel", frequency=[1.5, 1.504])])
+    same = protocol.definition.model_copy(update={"drawn": half, "drawn_outside": half})
+    one, other = drawn_sets(replace(protocol, definition=same)).values()
+    assert len({*one, *other}) == 10
 
 
 def test_an_audit_draws_other_runs_and_stands_apart(protocol, tmp_path):

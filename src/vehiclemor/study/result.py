@@ -109,19 +109,18 @@ def result_dataset(
     many = experiment.keep == "errors"
     runs = [_compared(model, e, s, many) for e, s in zip(outcomes, experiment.test, strict=True)]
     tables = [_measured(model, run) for run in runs]
-    counts = [{name: run.trajectory.counts.get(name, 0) for name in model.counts} for run in runs]
-    found, counted = tables[0], counts[0]
+    found = tables[0]
     if many:
         found = {name: np.array([table[name] for table in tables]) for name in found}
-        counted = {name: np.array([count[name] for count in counts]) for name in counted}
     else:
         found |= _of_one_run(model, runs[0]) | {"in_training": in_training}
         if model.speeds:
             found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
     scenarios = ("scenario",) * many
+    counts = {name: found.pop(name) for name in model.counts}
     described = variables(found, *scenarios) | variables(fit_cost(reduced))
     for name, text in model.counts.items():
-        described[name] = (scenarios, counted[name], {"units": "1", "long_name": text})
+        described[name] = scenarios, counts[name], {"units": "1", "long_name": text}
     if experiment.keep == "trajectories":
         if (full := runs[0].reference) is not None:
             # A reference may be kept for further results.
@@ -173,6 +172,7 @@ def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
         "largest_output": max_abs(outputs[times <= FIRST_SECONDS]),
         "smallest_output": outputs[times >= min(LANDED, times[-1])].min(axis=0),
         **{name: getattr(run, name) for name in ("seconds", "status", "message", "remark")},
+        **{name: run.counts.get(name, 0) for name in model.counts},
         "trust_indicator": trust.indicator if trust else np.nan,
         "trusted_until": trust.until if trust else np.inf,
         "warned": run.status == "untrusted" or bool(run.finished and trust and trust.reason),
