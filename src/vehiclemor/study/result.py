@@ -132,7 +132,8 @@ def result_dataset(
         dataset = dataset.assign_coords(scenario=[scenario.label for scenario in experiment.test])
     title = f"{experiment.method} on {experiment.model}"
     own = {"cell": experiment.key, "configuration": experiment.configuration}
-    return dataset.assign_attrs(attributes(title, experiment.kernel, **own))
+    dataset.attrs |= attributes(title, experiment.kernel, **own)
+    return dataset
 
 
 def _compared(
