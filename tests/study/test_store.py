@@ -200,7 +200,7 @@ def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed,
     path, study = place / "out" / "studies" / "small.nc", place / "small.toml"
     whole, rng = path.read_bytes(), np.random.default_rng(2)
     damaged = [whole[:-1], whole[:-1000], whole + b"x"]
-    for at in range(0, len(whole), 5999):
+    for at in range(0, len(whole), 11999):
         bit, flipped = int(rng.integers(8 * len(whole))), bytearray(whole)
         flipped[bit // 8] ^= 1 << bit % 8
         damaged += [bytes(flipped), whole[:at] + b"damage" + whole[at + 6 :]]
