@@ -25,7 +25,7 @@ from vehiclemor.online.model_file import content
 from vehiclemor.online.rom import ReducedOrderModel, reduce
 from vehiclemor.online.saved import load, shipped_folder
 from vehiclemor.resources import data_folder
-from vehiclemor.study.method_settings import Settings
+from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.provenance import code_digest
@@ -92,7 +92,7 @@ def stale(name: str, choice: Choice) -> list[str]:
         "settings": (json.loads(written["settings"]), choice.settings),
         "training": (json.loads(written["training"]), json.loads(json.dumps(training))),
         "parameters": (json.loads(written["parameters"]), parameters_of(choice.protocol.model)),
-        "source": (attributes["code"], code_digest(name, choice.method)),
+        "source": (attributes["code"], code_digest(name, choice.method, choice.settings)),
     }
     return [what for what, (then, now) in here.items() if then != now]
 

@@ -178,8 +178,7 @@ def simulate(
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
-    from vehiclemor.study.experiment import make_experiment
-    from vehiclemor.study.method_settings import complete_settings
+    from vehiclemor.study.experiment import complete_settings, make_experiment
     from vehiclemor.study.plans.training import training_set as training_of
 
     ready = model if isinstance(model, Model) else kept_build(model)
@@ -271,8 +270,8 @@ def run_study(
         are in the folder `studies`.
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
-    from vehiclemor.study.plans.grid_results import flattened
-    from vehiclemor.study.progress import listening
+    from vehiclemor.progress import listening
+    from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
 
     if progress is not None and not callable(progress):

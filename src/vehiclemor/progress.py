@@ -6,7 +6,7 @@ They appear where the application has no handlers of its own, and are silenced a
 
 import logging
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from threading import Timer
@@ -97,3 +97,24 @@ def telling(what: str) -> Iterator[None]:
     with task.running():
         yield
     task.tell_end()
+
+
+# Called with (study or other work, finished parts, all parts).
+Progress = Callable[[str, int, int], None]
+_LISTENER: ContextVar[Progress | None] = ContextVar("progress", default=None)
+
+
+@contextmanager
+def listening(progress: Progress | None) -> Iterator[None]:
+    """Tell a function of the progress of all that is run inside, deep in comparisons too."""
+    token = _LISTENER.set(progress)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(token)
+
+
+def tell(work: str, done: int, total: int) -> None:
+    """Tell whoever listens."""
+    if progress := _LISTENER.get():
+        progress(work, done, total)

@@ -16,7 +16,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, names
-from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.experiment import complete_settings
 
 PAGE = Path(__file__).parents[2] / "paper" / "handbook" / "add-a-model-or-method.md"
 PROJECT = """

@@ -1,27 +1,28 @@
-"""Cells: identity follows from content, grids are complete, rows of a collection are all there."""
+"""Experiments: identity follows from content, and each run is what a model of its car gives."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
-from tests.study.small import small_study
+import vehiclemor as vm
 from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError
-from vehiclemor.inputs.suspension import sine_travel
-from vehiclemor.reduction.methods import pod
+from vehiclemor.inputs.maneuver import sine_travel
+from vehiclemor.inputs.signal import Signal
+from vehiclemor.reduction.methods import pod, slow_manifold
+from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study import provenance
 from vehiclemor.study.evaluate import evaluate
-from vehiclemor.study.experiment import make_experiment
-from vehiclemor.study.method_settings import complete_settings
-from vehiclemor.study.plans.grid import expand
-from vehiclemor.study.plans.grid_results import flattened
-from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
-from vehiclemor.study.run import run_studies
-from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.scenario import Scenario, start_of, training_run
+
+CAR = "independent_suspension_vehicle"
+HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
+MOVED = (("tie_rod_inner.z", -0.09),)
 
 
 def make_cell(model, maneuver, method, given, training="matched", **factors):
@@ -32,16 +33,26 @@ def make_cell(model, maneuver, method, given, training="matched", **factors):
     return make_experiment(model, method, settings, trained, (test,))
 
 
+def of_runs(model, method, training, tests, **settings):
+    complete = complete_settings(model, method, settings)
+    return make_experiment(model, method, complete, training, tests, "errors")
+
+
 @pytest.fixture(autouse=True)
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
     evaluation.kept_reference.cache_clear()
-    evaluation._kept.cache_clear()
+    evaluation._KEPT.clear()
 
 
 @pytest.fixture(scope="module")
 def cell():
     return make_cell(build("double_wishbone"), sine_travel, "pod", {"rank": 3})
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return vm.model(CAR)
 
 
 @pytest.mark.parametrize(
@@ -52,6 +63,7 @@ def cell():
         ("code", "another"),
         ("test", (Scenario(dataclasses.replace(sine_travel, samples=1002), "equilibrium"),)),
         ("test", (Scenario(sine_travel, "dropped"),)),
+        ("test", (Scenario(sine_travel, "equilibrium", None, MOVED),)),
         ("training", (Scenario(sine_travel.perturbed(1.1), "equilibrium"),)),
         ("settings", {"rank": 4}),
         ("parameters", {}),
@@ -81,26 +93,42 @@ def test_versions_count_where_a_method_declares_them(cell, monkeypatch):
     assert len({cell.key, *keys}) == 3
 
 
+def test_a_method_that_fits_others_has_their_source_in_its_key(vehicle, monkeypatch):
+    def code(method) -> str:
+        return make_cell(vehicle, component("maneuver", "lane_change"), method, {}).code
+
+    before = {name: code(name) for name in ("guarded", "pod")}
+    changed = dataclasses.replace(slow_manifold.METHOD, packages=("scipy",))
+    monkeypatch.setattr(slow_manifold, "METHOD", changed)
+    assert code("pod") == before["pod"]
+    assert code("guarded") != before["guarded"]
+
+
+def test_inputs_are_known_by_their_values_and_names():
+    def constant(value):
+        return dataclasses.replace(
+            sine_travel, signal=lambda times, *_: np.full((len(times), 2), value)
+        )
+
+    def log(name):
+        return Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
+
+    given = constant(0.0), constant(-0.0), constant(0.01), log("z"), log("s0")
+    zero, minus_zero, *others = [Scenario(each, "equilibrium").run_key for each in given]
+    assert zero == minus_zero
+    assert len({zero, *others}) == 4
+
+
 def test_another_geometry_gives_another_key_and_result(cell):
     moved = build("double_wishbone", overrides={"tie_rod_inner": [-0.2, 0.4921, -0.0962]})
     other = make_cell(moved, sine_travel, "full_order", {})
     assert other.key != cell.key
-    dataset = evaluate(other)
     # The low-bump-steer tie rod of the source: toe within 0.06 deg over +-0.1 m.
-    assert float(abs(dataset["outputs"].sel(output="toe")).max()) < 0.06 * 3.15 / 180.0
+    toe = evaluate(other)["outputs"].sel(output="toe")
+    assert float(abs(toe).max()) < 0.06 * 3.15 / 180.0
 
 
-def test_a_method_that_a_setting_does_not_concern_is_computed_once():
-    grid = expand("figures-6-7", load_studies("figures-6-7")["figures-6-7"])
-    labels = grid.dimensions["label"]
-    assert grid.keys.size == 2 * len(labels)
-    shared = {"full_order", "full_order_strongest", "replay"}
-    assert len(grid.unique) == len(shared) + 2 * (len(labels) - len(shared))
-
-
-def test_a_plug_in_model_that_breaks_in_the_reference_spoils_only_its_cell(
-    cell, model, monkeypatch
-):
+def test_a_bug_of_a_plug_in_model_in_the_reference_spoils_only_its_cell(cell, model, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("in a plug-in")
 
@@ -110,7 +138,7 @@ def test_a_plug_in_model_that_breaks_in_the_reference_spoils_only_its_cell(
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
 
 
-def test_set_policy_needs_and_uses_its_factors():
+def test_a_training_set_needs_and_uses_its_factors():
     model = build("double_wishbone")
     with pytest.raises(InputError, match="training_set"):
         make_cell(model, sine_travel, "pod", {}, training="set")
@@ -122,24 +150,93 @@ def test_set_policy_needs_and_uses_its_factors():
     assert errors[2] < 0.5 * errors[1]
 
 
-def test_rows_of_different_models_keep_their_units_and_counts(tmp_path):
-    car = small_study(tmp_path, "", "full_order", model="independent_suspension_vehicle")
-    rows = flattened(run_studies("figures-6-7", tmp_path) | run_studies(str(car), tmp_path))
-    assert rows.sizes["cell"] == 2 * 6 + 1
-    for output, unit in (("yaw", "rad"), ("spindle_y", "m")):
-        assert str(rows["output_unit"].sel(output=output).item()) == unit
-    of_car = rows["study"].values == "small"
-    for counted, there in (("rhs_calls", of_car), ("iterations", ~of_car)):
-        assert (np.isfinite(rows[counted].values) == there).all()
-    speeds = np.isfinite(rows["rms_speed_error"].transpose("cell", ...).values)
-    assert (speeds == of_car[:, None]).all()
-
-
 def test_settings_of_a_method_that_refuses_the_model_are_not_judged():
-    model = build("double_wishbone")
-    cell = make_cell(model, sine_travel, "two_track", {"rnk": 3})
+    cell = make_cell(build("double_wishbone"), sine_travel, "two_track", {"rnk": 3})
     assert cell.settings == {}
     dataset = evaluate(cell)
     assert dataset["status"].item() == "rejected"
     assert "double_wishbone" in dataset["message"].item()
     assert np.isnan(dataset["coordinates"]).all()
+
+
+def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
+    tests = [
+        Scenario.of("lane_change", (1.0, amplitude), "equilibrium", 20.0) for amplitude in (1, 1.5)
+    ]
+    many = evaluate(of_runs(vehicle, "linear_single_track", tuple(tests[:1]), tuple(tests)))
+    for number, test in enumerate(tests):
+        settings = complete_settings(vehicle, "linear_single_track")
+        given = vehicle, "linear_single_track", settings, tuple(tests[:1]), (test,)
+        whole, metrics = (
+            evaluate(make_experiment(*given, keep)) for keep in ("trajectories", "metrics")
+        )
+        one = many.isel(scenario=number)
+        error = (whole["outputs"] - whole["reference_outputs"]).values
+        np.testing.assert_array_equal(one["rms_error"], np.sqrt(np.mean(error**2, axis=0)))
+        np.testing.assert_array_equal(one["max_error"], np.abs(error).max(axis=0))
+        inside = (
+            whole["outputs"].sel(time=slice(0.0, 10.0)),
+            whole["outputs"].sel(time=slice(1, 99)),
+        )
+        np.testing.assert_array_equal(one["largest_output"], np.abs(inside[0]).max("time"))
+        np.testing.assert_array_equal(one["smallest_output"], inside[1].min("time"))
+        for name in (*one.data_vars, "output_unit"):
+            if name not in ("seconds", "offline_seconds", "status", "message", "remark"):
+                np.testing.assert_array_equal(one[name], metrics[name], str(name))
+        # A grid shows what a protocol would not trust.
+        assert bool(one["warned"]) == (number == 1)
+        assert one["status"].item() == ("untrusted" if number else "ok")
+        assert metrics["status"].item() == "ok"
+        assert bool(metrics["remark"].item()) == (number == 1)
+
+
+def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):
+    run, given = (Scenario(sine_travel, "equilibrium"),), {"tolerance": 1e-300}
+    settings = complete_settings(model, "full_order", given)
+    many, one = (
+        evaluate(make_experiment(model, "full_order", settings, run, run, keep))
+        for keep in ("errors", "metrics")
+    )
+    for found in (many, one):
+        assert (found["status"] == "diverged").all()
+        assert np.isnan(found["rms_error"]).all()
+        assert not found["warned"].any()
+    assert (many["iterations"].item(), many["message"].item()) == (0, one["message"].item())
+    assert np.isnan(many["seconds"].item())
+    # A grid tells how far it came.
+    assert one["iterations"].item() > 0
+
+
+# Runs of other cars
+
+
+def test_a_run_of_another_car_is_that_of_a_model_made_with_its_parameters(vehicle):
+    alone = vm.model(CAR, dict(HEAVY))
+    change = Scenario.of("lane_change", (1.0, 1.0), "dropped", None, HEAVY)
+    run = training_run(vehicle, change).recorded()
+    expected = alone.simulate(component("maneuver", "lane_change"), "dropped")
+    np.testing.assert_array_equal(run.states, expected.states)
+    # It stands lower on its springs, and starts faster.
+    assert not np.array_equal(alone.start("dropped"), vehicle.start("dropped"))
+    own = vm.model(CAR, dict(HEAVY) | {"initial_speed": 31.0})
+    faster = dataclasses.replace(change, speed=31.0)
+    np.testing.assert_array_equal(start_of(vehicle, faster), own.start("dropped"))
+
+
+def test_a_component_of_a_point_is_a_parameter(model):
+    x, y, _ = model.parameters["tie_rod_inner"]
+    whole = vm.model(model.name, {"tie_rod_inner": [x, y, -0.09]})
+    moved = vm.model(model.name, dict(MOVED))
+    np.testing.assert_array_equal(moved.constants, whole.constants)
+    for wrong in ({"tie_rod_inner.w": 0.0}, {"tie_rod_inner.z": [0.0, 0.0]}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            vm.model(model.name, wrong)
+
+
+def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):
+    runs = Scenario(sine_travel, "equilibrium"), Scenario(sine_travel, "equilibrium", None, MOVED)
+    found = evaluate(of_runs(model, "pod", runs[:1], runs[1:], rank=3))
+    assert found["status"].item() == "rejected"
+    assert "another" in found["message"].item()
+    with pytest.raises(ValueError, match="of one model"):
+        of_runs(model, "pod", runs[:1], runs, rank=3)

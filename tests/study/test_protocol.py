@@ -1,26 +1,28 @@
-"""Protocols: scenarios of the files, what they resolve to, and what the schema refuses."""
+"""Protocols: scenarios of the files, drawn test runs, and how the runs are judged."""
+
+import hashlib
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from vehiclemor.errors import FileError
-from vehiclemor.reduction.methods import replay
-from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.registry import component
+import vehiclemor as vm
+from vehiclemor.errors import FileError, InputError
 from vehiclemor.simulation import input_polynomials
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate
 from vehiclemor.study import scenario as scenario_module
+from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons
 from vehiclemor.study.plans.loading import load_studies
-from vehiclemor.study.plans.protocol import load_protocol, protocol_names
+from vehiclemor.study.plans.protocol import drawn, drawn_sets, load_protocol, protocol_names
+from vehiclemor.study.plans.study_file import Bound, Box, Draw
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
-
-
-def scenario(maneuver, start, speed):
-    """An unperturbed scenario."""
-    return Scenario(component("maneuver", maneuver), start, speed)
+SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
+BOX = Box(maneuver="sine_travel", frequency=[0.7, 1.8], amplitude=[0.5, 1.1], start=["equilibrium"])
 
 
 @pytest.fixture(scope="module")
@@ -28,65 +30,75 @@ def protocols():
     return {model: load_protocol(study) for model, study in protocol_names().items()}
 
 
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory, protocol_text):
+    path = tmp_path_factory.mktemp("draws") / "small.toml"
+    path.write_text(protocol_text)
+    return load_protocol(str(path))
+
+
+# What the files of the package say
+
+
 def test_the_study_names_every_protocol(protocols):
     assert sorted(load_studies("predictive")) == sorted(protocol_names().values())
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_the_sets_of_a_vehicle(protocols, name):
+def test_training_reaches_as_far_as_what_is_drawn(protocols, name):
+    training, definition = protocols[name].sets["training"], protocols[name].definition
+    frequencies = [s.maneuver.frequency_factor for s in training]
+    largest = max(abs(s.maneuver.amplitude_factor) for s in training)
+    for box in definition.drawn.boxes:
+        assert min(frequencies) <= box.frequency[0]
+        assert max(frequencies) >= box.frequency[1]
+        assert largest >= box.amplitude[1]
+    assert largest < max(box.amplitude[1] for box in definition.drawn_outside.boxes)
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "digest"),
+    [
+        ("double_wishbone", "chirp_travel, f 1.01, a 1.108, equilibrium", "28232a475758a403"),
+        (VEHICLES[0], f"multisine, {SAME_POINT}", "f7189e5c56c5dcb0"),
+        (VEHICLES[1], f"rack_multisine, {SAME_POINT}", "1d377d9c35dd8f7a"),
+    ],
+)
+def test_the_test_set_of_every_commit_and_machine(protocols, name, first, digest):
+    """A change here is another test set: it needs another version in the protocol."""
     protocol = protocols[name]
-    sets, definition = protocol.sets, protocol.definition
-    prefix = "rack_" if name == "high_fidelity_vehicle" else ""
-    inside, outside = definition.drawn, definition.drawn_outside
-    # 299 runs without a miss prove a rate below 1 % at 95 %.
-    assert inside.runs == 299
-    shapes = ("lane_change", "step_steer", "sine_sweep", "multisine")
-    assert {box.maneuver for box in inside.boxes} == {f"{prefix}{shape}" for shape in shapes}
-    for box in inside.boxes:
-        assert (box.frequency, box.amplitude, box.speed) == ([0.7, 1.8], [0.5, 1.5], [18.0, 22.0])
-        assert box.both_signs
-        assert box.start == ["equilibrium", "dropped"]
-    # Training reaches at least as far as what is drawn inside, and nowhere near all outside.
-    trained = [s.maneuver.frequency_factor for s in sets["training"]]
-    assert min(trained) <= 0.7
-    assert max(trained) >= 1.8
-    assert max(abs(s.maneuver.amplitude_factor) for s in sets["training"]) >= 1.5
-    assert max(box.amplitude[1] for box in outside.boxes) == 2.5
-    assert {s.maneuver.name for s in sets["test"]} == {f"{prefix}straight_ahead"}
+    assert protocol.test_set == f"predictive-{name}-1, seed 20261122"
+    sets = drawn_sets(protocol)
+    assert len(sets["drawn"]) == 299
+    assert sets["drawn"][0].label == first
+    labels = [run.label for runs in sets.values() for run in runs]
+    assert hashlib.sha256("\n".join(labels).encode()).hexdigest()[:16] == digest
 
 
-def test_no_run_stands_in_two_sets(protocols):
-    for protocol in protocols.values():
-        runs = [s.run_key for scenarios in protocol.sets.values() for s in scenarios]
-        assert len(set(runs)) == len(runs)
+def test_rows_and_what_they_learn_from(protocols):
+    entries = {e.label: e for e in protocols[VEHICLES[0]].entries}
+    names, tolerances = zip(*map(str.split, entries["ros34pw2"].row_labels), strict=True)
+    assert set(names) == {"ros34pw2"}
+    used = [settings["tolerance"] for settings in entries["ros34pw2"].candidates]
+    assert [float(tolerance) for tolerance in tolerances] == used
+    assert not any(".0e" in tolerance or "e-0" in tolerance for tolerance in tolerances)
+    assert entries["replay"].row_labels == ["replay"]
+    other = protocols[VEHICLES[1]]
+    (fixed,) = (e for e in other.entries if e.label == "fixed basis")
+    assert {s.maneuver.name for s in fixed.training} == {"rack_lane_change"}
+    assert len(fixed.training) < len(other.sets["training"])
 
 
 def test_another_speed_is_a_state_and_the_own_speed_a_name():
     model = build(VEHICLES[0])
-    own = scenario("lane_change", "dropped", 20.0)
+    own, faster = (
+        Scenario.of("lane_change", (1.0, 1.0), "dropped", speed) for speed in (20.0, 26.0)
+    )
     assert start_of(model, own) == "dropped"
-    faster = start_of(model, scenario("lane_change", "dropped", 26.0))
-    assert isinstance(faster, np.ndarray)
-    run = training_run(model, scenario("lane_change", "equilibrium", 26.0))
+    assert isinstance(start_of(model, faster), np.ndarray)
+    run = training_run(model, replace(faster, start="equilibrium"))
     speeds = run.at(np.array([0.0, 0.1])).outputs[:, model.outputs.index("longitudinal_speed")]
     np.testing.assert_allclose(speeds, 26.0, rtol=1e-3)
-
-
-def test_full_order_rows_are_named_after_their_tolerances(protocols):
-    contestants = {c.label: c for c in protocols[VEHICLES[0]].entries}
-    names, tolerances = zip(*map(str.split, contestants["ros34pw2"].row_labels), strict=True)
-    assert set(names) == {"ros34pw2"}
-    used = [settings["tolerance"] for settings in contestants["ros34pw2"].candidates]
-    assert [float(tolerance) for tolerance in tolerances] == used
-    assert not any(".0e" in tolerance or "e-0" in tolerance for tolerance in tolerances)
-    assert contestants["replay"].row_labels == ["replay"]
-
-
-def test_a_contestant_may_learn_from_some_maneuvers_only(protocols):
-    for contestant in protocols[VEHICLES[1]].entries:
-        if contestant.label == "fixed basis":
-            assert {s.maneuver.name for s in contestant.training} == {"rack_lane_change"}
-            assert len(contestant.training) < len(protocols[VEHICLES[1]].sets["training"])
 
 
 def test_what_all_rows_need_of_a_run_is_kept_until_the_next_row(protocols):
@@ -104,25 +116,143 @@ def test_what_all_rows_need_of_a_run_is_kept_until_the_next_row(protocols):
         assert all(runs <= function.cache_parameters()["maxsize"] for function in kept)
 
 
-def test_one_run_under_two_names_is_found(tmp_path, protocol_text):
-    # Without amplitude a chirp is a sine.
-    text = protocol_text.replace("points = [[0.9, 1.0]]", "points = [[0.9, 1.0], [1.0, 0.0]]")
-    text += '\n[[outside]]\nmaneuver = "chirp_travel"\npoints = [[1.0, 0.0]]\n'
-    path = tmp_path / "mine.toml"
-    path.write_text(text)
-    with pytest.raises(FileError, match=r"outside: the scenario .* is in test too"):
+# Drawn runs
+
+
+def test_drawn_runs_follow_from_seed_version_and_purpose(protocol):
+    draw = Draw(runs=40, boxes=[BOX])
+    one, again, *others = (
+        drawn(protocol.model, draw, seeds)
+        for seeds in ((1, 1, 0), (1, 1, 0), (2, 1, 0), (1, 2, 0), (1, 1, 1))
+    )
+    assert one == again
+    assert not any(set(one) & set(other) for other in others)
+    # What is known is not drawn.
+    assert not set(one) & set(drawn(protocol.model, draw, (1, 1, 0), one))
+    point = Box(maneuver="sine_travel", both_signs=False)
+    with pytest.raises(InputError, match="2"):
+        drawn(protocol.model, Draw(runs=2, boxes=[point]), (1, 1, 0))
+
+
+def test_drawn_sets_are_apart_from_what_was_learned_and_from_lists(protocol):
+    sets = drawn_sets(protocol)
+    assert {name: len(runs) for name, runs in sets.items()} == {"drawn": 5, "drawn_outside": 2}
+    learned = [protocol.sets[name] for name in ("training", "validation")]
+    keys = [run.run_key for runs in (*learned, *sets.values()) for run in runs]
+    assert len(set(keys)) == len(keys)
+    # Neither fewer methods nor a list for other ends changes a draw; learning from a run does.
+    listed = {"outside": sets["drawn"]}
+    assert drawn_sets(replace(protocol, entries=protocol.entries[:1])) == sets
+    assert drawn_sets(replace(protocol, sets=protocol.sets | listed)) == sets
+    learned = replace(protocol, sets=protocol.sets | {"training": sets["drawn"]})
+    assert not set(drawn_sets(learned)["drawn"]) & set(sets["drawn"])
+    # Ten runs of one box fill both.
+    half = Draw(runs=5, boxes=[Box(maneuver="sine_travel", frequency=[1.5, 1.504])])
+    same = protocol.definition.model_copy(update={"drawn": half, "drawn_outside": half})
+    one, other = drawn_sets(replace(protocol, definition=same)).values()
+    assert len({*one, *other}) == 10
+
+
+def test_an_audit_draws_other_runs_and_stands_apart(protocol, tmp_path):
+    audit = load_protocol(str(protocol.path), seed=7)
+    assert not set(drawn_sets(protocol)["drawn"]) & set(drawn_sets(audit)["drawn"])
+    assert (protocol.study, audit.study) == ("small", "small-seed-7")
+    with pytest.raises(InputError, match="seed"):
+        vm.run_study("figure-12", seed=7, results=tmp_path)
+
+
+def test_a_draw_fills_its_box_and_stays_inside(protocol):
+    runs = drawn(protocol.model, Draw(runs=400, boxes=[BOX]), (1, 1, 0))
+    assert len({run.run_key for run in runs}) == 400
+    frequency = np.array([run.maneuver.frequency_factor for run in runs])
+    amplitude = np.array([run.maneuver.amplitude_factor for run in runs])
+    assert 0.7 <= frequency.min() <= frequency.max() <= 1.8
+    assert 0.5 <= np.abs(amplitude).min() <= np.abs(amplitude).max() <= 1.1
+    # Uniform: means and shares lie within five standard deviations.
+    assert abs(frequency.mean() - 1.25) < 5.0 * 1.1 / math.sqrt(12 * 400)
+    assert abs((amplitude > 0.0).mean() - 0.5) < 5.0 * 0.5 / 20.0
+
+
+# How runs are judged
+
+
+def results(errors, statuses, until):
+    shape = ("scenario", "output")
+    ones = np.ones((len(errors), 1))
+    return xr.Dataset(
+        {
+            "rms_error": (shape, np.array(errors)[:, None]),
+            "largest_output": (shape, ones),
+            "smallest_output": (shape, ones.copy()),
+            "status": ("scenario", np.array(statuses, dtype=object)),
+            "message": ("scenario", np.array(["why"] * len(errors), dtype=object)),
+            "trusted_until": ("scenario", np.array(until)),
+        },
+        {"output": ["toe"]},
+    )
+
+
+def test_only_a_miss_without_a_word_is_silent():
+    bounds = {"toe": Bound(measure="rms", bound=1.0)}
+    statuses = ["ok", "ok", "untrusted", "diverged", "ok"]
+    part = results([0.5, 2.0, 2.0, np.nan, 0.5], statuses, [np.inf, np.inf, 3.0, np.inf, 3.0])
+    found = outcomes(part, bounds)
+    assert found.missed.tolist() == [False, True, True, True, False]
+    assert found.silent.tolist() == [False, True, False, False, False]
+    assert found.flagged.tolist() == [False, False, True, True, True]
+
+
+def test_runs_of_a_sensitive_full_order_are_found(protocol):
+    bounds = {"toe": Bound(measure="rms", bound=1.0)}
+    given = protocol.definition.model_copy(update={"bounds": bounds, "sensitive": {"toe": 2.0}})
+    model = replace(protocol.model, definition=replace(protocol.model.definition, loads=("toe",)))
+    of_loads = replace(protocol, definition=given, model=model)
+    second = results([0.1, 3.0, 0.1, np.nan, 0.1], ["ok"] * 3 + ["diverged", "ok"], [np.inf] * 5)
+    second["smallest_output"][2] = 0.0
+    second["largest_output"][4] = 2.5
+    found = reasons(of_loads, second)
+    assert found[0] == ""
+    for reason, words in zip(found[1:], ("3 times", "toe", "why", "2.5"), strict=True):
+        assert words in reason
+
+
+def test_the_best_candidate_that_is_stable_everywhere_is_chosen():
+    assert choose([Validation(0.9, np.inf, 1.0), Validation(1.0, 3.0, 9.0)]) == 1
+    assert choose([Validation(1.0, 2.0, 9.0), Validation(1.0, 3.0, 1.0)]) == 0
+    assert choose([Validation(1.0, 2.0, 9.0), Validation(1.0, 2.09, 1.0)]) == 1
+    assert choose([Validation(0.5, np.inf, 1.0), Validation(0.9, np.inf, 9.0)]) == 1
+    # What leaves room to the bounds is chosen by its cost.
+    assert choose([Validation(1.0, 0.1, 9.0), Validation(1.0, 0.49, 1.0)]) == 1
+
+
+# What a file may not say
+
+DRAWN = "frequency = [0.7, 2.0], amplitude = [0.5, 1.1]"
+TWICE = '[[outside]]\nmaneuver = "chirp_travel"\npoints = [[1.0, 0.0]]\n\n[drawn]'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (DRAWN, "frequency = [2.0, 0.7]", "drawn"),
+        ("amplitude = [1.3, 1.4]", 'start = ["dropped"]', "drawn_outside, box 1: .*dropped"),
+        ("runs = 5", "runs = 0", "drawn"),
+        ('maneuver = "chirp_travel"', 'maneuver = "chrp_travel"', "test, group 2: .*chirp_travel"),
+        ("points = [[0.9, 1.0]]", "points = [[0.9, 1.0, 20.0]]", "test, group 1"),
+        # Without amplitude a chirp is a sine: one run under two names.
+        ("[drawn]", f"{TWICE}", r"outside: the scenario \(chirp_travel.* test"),
+        ("{ rank = 4 }", "{ rank = 3 }", "fixed basis"),
+        ("{ tolerance = 1e-6 }", '{ tolerance = 1e-12, solver = "newton_lanes" }', "newton 1e-12"),
+        ("newton 1e-12", "newtn", "newton 1e-12"),
+        ('reported = ["toe"]', 'reported = ["to"]', "toe"),
+    ],
+)
+def test_what_is_wrong_with_a_protocol_is_one_line(tmp_path, protocol_text, old, new, words):
+    path = tmp_path / "wrong.toml"
+    if "outside: " in words:
+        protocol_text = protocol_text.replace("[[0.9, 1.0]]", "[[0.9, 1.0], [1.0, 0.0]]")
+    assert old in protocol_text
+    path.write_text(protocol_text.replace(old, new, 1))
+    with pytest.raises(FileError, match=words) as error:
         load_protocol(str(path))
-
-
-def test_replay_of_runs_of_other_lengths():
-    model = build(VEHICLES[0])
-    step, change = component("maneuver", "step_steer"), component("maneuver", "lane_change")
-    runs = [TrainingRun(model, step, "equilibrium"), TrainingRun(model, change, "equilibrium")]
-    recorded = replay.fit(model, runs, {})
-    again = recorded.simulate(change.perturbed(1.0, 1.1), "equilibrium")
-    np.testing.assert_array_equal(again.coordinates, recorded.recorded[1].coordinates)
-    sweep = component("maneuver", "sine_sweep").perturbed(1.0, 0.0)
-    held = replay.fit(model, runs[:1], {}).simulate(sweep, "equilibrium")
-    assert held.coordinates.shape == (sweep.samples, len(model.coordinates))
-    np.testing.assert_allclose(held.coordinates[:251], recorded.recorded[0].coordinates)
-    np.testing.assert_array_equal(held.coordinates[-1], held.coordinates[250])
+    assert "\n" not in str(error.value)

@@ -11,9 +11,8 @@ from vehiclemor.inputs.signal import Signal
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import fresh_fit, kept_fit
-from vehiclemor.study.experiment import make_experiment
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.failure import Failure
-from vehiclemor.study.method_settings import complete_settings
 from vehiclemor.study.scenario import Scenario, input_hash
 
 FAILING = 3
@@ -66,6 +65,21 @@ def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(veh
     np.testing.assert_array_equal(anew.fast.coefficients, alone.coefficients)
     failed = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
     assert failed == Failure("diverged", "no fit")
+
+
+def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
+    method, raised = component("method", "slow_manifold"), []
+
+    def fit(*given):
+        raised.append(given)
+        raise ZeroDivisionError if len(raised) < 3 else ConvergenceError("no fit")
+
+    broken = replace(method, fit=fit)
+    monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
+    wanted = experiment(vehicle, "slow_manifold", terms=1, sweeps=0)
+    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    assert found == ["error", "error", "diverged", "diverged"]
+    assert len(raised) == 3
 
 
 def sent(maneuver):

@@ -1,58 +1,60 @@
-"""The timing pass: cases are known by their ids, and nothing is measured twice."""
+"""The timing pass: cases are known by their names, and nothing is measured twice."""
 
 from dataclasses import replace
 from itertools import accumulate, count
 
 import numpy as np
-import pytest
 
-from vehiclemor.inputs.signal import Signal
-from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.timing import (
-    TimingCase,
-    called,
-    case_experiments,
-    timed_cases,
-    timed_model,
-    timed_tests,
-)
+from vehiclemor.study.timing import called, timed_cases, timed_starts, timed_tests
 
-CASES = (
-    TimingCase("pod_r3", "pod r=3", "pod", settings={"rank": 3}),
-    TimingCase("strongest", "the best", "full_order", "strongest"),
-    TimingCase("replay", "replay", "replay"),
-    TimingCase("baseline", "Newton", "full_order"),
-)
+SETTINGS = {
+    "pod_r3": ("pod", {"rank": 3}, "recommended"),
+    "strongest": ("full_order", {}, "strongest"),
+    "replay": ("replay", {}, "recommended"),
+    "baseline": ("full_order", {}, "recommended"),
+    "stuck": ("full_order", {"tolerance": 1e-300}, "recommended"),
+    "pod_r4": ("pod", {"rank": 4}, "recommended"),
+}
 
 
-@pytest.fixture(scope="module")
-def suspension():
-    return build("double_wishbone")
+def cases(*names):
+    """Experiments of some cases on the wheel travel, trained on the same."""
+    model, run = build("double_wishbone"), (Scenario.of("sine_travel", (1.0, 1.0), "equilibrium"),)
+    found = {}
+    for name in names:
+        method, given, preset = SETTINGS[name]
+        settings = complete_settings(model, method, given, preset)
+        found[name] = make_experiment(model, method, settings, run, run, "metrics")
+    return found
 
 
-def test_speed_ups_are_against_ids_wherever_they_stand(suspension):
-    data = timed_cases(suspension, CASES, sine_travel, "equilibrium", 3)
+def test_speed_ups_are_against_names_wherever_they_stand():
+    data = timed_cases(cases("pod_r3", "strongest", "replay", "baseline"), 3)
     assert list(data["case"].values) == ["pod_r3", "strongest", "replay", "baseline"]
-    assert float(data["speed_up"].sel(case="baseline")) == 1.0
-    assert float(data["speed_up_strongest"].sel(case="strongest")) == 1.0
-    assert float(data["speed_up"].sel(case="strongest")) > 1.0
-    assert np.isnan(float(data["loop_speed_up"].sel(case="replay")))
+    of = {name: data.sel(case=name) for name in data["case"].values}
+    assert float(of["baseline"]["speed_up"]) == 1.0
+    assert float(of["strongest"]["speed_up_strongest"]) == 1.0
+    assert float(of["strongest"]["speed_up"]) > 1.0
+    assert np.isnan(float(of["replay"]["loop_speed_up"]))
     assert (data["loop_seconds"] < data["seconds"]).all()
     assert (data["seconds_lower"] <= data["seconds"]).all()
     assert (data["seconds"] <= data["seconds_upper"]).all()
-    assert float(data["offline_seconds"].sel(case="pod_r3")) > 0.0
-    assert float(data["offline_seconds"].sel(case="baseline")) == 0.0
-    assert int(data["iterations"].sel(case="replay")) == 0
+    assert float(of["pod_r3"]["offline_seconds"]) > 0.0
+    assert float(of["baseline"]["offline_seconds"]) == 0.0
+    assert int(of["replay"]["iterations"]) == 0
     assert (data["status"] == "ok").all()
+    assert float(of["baseline"]["tolerance"]) > 0.0
+    np.testing.assert_allclose(data["seconds_per_sample"] * 1001, data["seconds"])
 
 
-def test_what_a_model_tells_of_its_own_time_decides_nothing(suspension, monkeypatch):
+def test_what_a_model_tells_of_its_own_time_decides_nothing(monkeypatch):
     honest = FullOrderModel.simulate
 
     def flattering(self, maneuver, start):
@@ -61,14 +63,14 @@ def test_what_a_model_tells_of_its_own_time_decides_nothing(suspension, monkeypa
     monkeypatch.setattr(FullOrderModel, "simulate", flattering)
     # A clock that tells how often it has been read: twice more inside of a call.
     monkeypatch.setattr(run_timer, "clock", count(0.0, 1e-3).__next__)
-    data = timed_cases(suspension, CASES[1::2], sine_travel, "equilibrium", 2)
+    data = timed_cases(cases("strongest", "baseline"), 2)
     assert float(data["loop_seconds"].sel(case="baseline")) == 0.0
     assert np.isnan(data["loop_speed_up"]).all()
     np.testing.assert_allclose(data["seconds"], 3e-3)
     np.testing.assert_allclose(data["speed_up"], 1.0)
 
 
-def test_no_row_is_timed_cold_whatever_ran_before_it(suspension, monkeypatch):
+def test_no_row_is_timed_cold_whatever_ran_before_it(monkeypatch):
     now, last, seen = [0.0], [], set()
     honest = FullOrderModel.simulate
 
@@ -81,8 +83,7 @@ def test_no_row_is_timed_cold_whatever_ran_before_it(suspension, monkeypatch):
 
     monkeypatch.setattr(FullOrderModel, "simulate", simulate)
     monkeypatch.setattr(run_timer, "clock", lambda: now[0])
-    experiments = case_experiments(suspension, CASES[1::2], sine_travel, "equilibrium")
-    data = timed_tests(experiments, np.ones((2, 1), dtype=bool), 4)
+    data = timed_tests(cases("strongest", "baseline"), np.ones((2, 1), dtype=bool), 4)
     np.testing.assert_allclose(data["seconds"], 1e-4)
 
 
@@ -96,38 +97,21 @@ def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(mon
     assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 
-def test_a_case_that_fails_has_no_seconds_and_no_baseline_gives_no_speed_up(suspension):
-    stuck = TimingCase("stuck", "stuck", "full_order", settings={"tolerance": 1e-300})
-    data = timed_cases(suspension, (CASES[0], stuck), sine_travel, "equilibrium", 2)
+def test_a_case_that_fails_has_no_seconds_and_no_baseline_gives_no_speed_up():
+    data = timed_cases(cases("pod_r3", "stuck"), 2)
     assert "speed_up" not in data
     assert data["status"].values.tolist() == ["ok", "diverged"]
     assert np.isfinite(data["seconds"]).values.tolist() == [True, False]
 
 
-def test_what_was_measured_is_measured_again_only_if_it_has_changed(
-    suspension, tmp_path, monkeypatch
-):
+def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path, monkeypatch):
     monkeypatch.setattr(timing, "CASE_ROUNDS", 2)
-    first = timed_model(suspension, CASES, tmp_path, "mine")
-    assert dict(first.sizes) == {"start": 1, "case": 4, "output": len(suspension.outputs)}
     path = tmp_path / "studies" / "mine.nc"
+    first = timed_starts({"equilibrium": cases("pod_r3", "baseline")}, path)
+    assert (first.sizes["start"], first.sizes["case"]) == (1, 2)
     written = path.stat().st_mtime_ns
-    again = timed_model(suspension, CASES, tmp_path, "mine")
+    again = timed_starts({"equilibrium": cases("pod_r3", "baseline")}, path)
     assert path.stat().st_mtime_ns == written
     np.testing.assert_array_equal(again["seconds"], first["seconds"])
-    other = (replace(CASES[0], settings={"rank": 4}), *CASES[1:])
-    timed_model(suspension, other, tmp_path, "mine")
+    timed_starts({"equilibrium": cases("pod_r4", "baseline")}, path)
     assert path.stat().st_mtime_ns > written
-
-
-def test_inputs_are_known_by_their_values_and_names():
-    def constant(value):
-        return replace(sine_travel, signal=lambda times, *_: np.full((len(times), 2), value))
-
-    def log(name):
-        return Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
-
-    given = constant(0.0), constant(-0.0), constant(0.01), log("z"), log("s0")
-    zero, minus_zero, *others = [Scenario(each, "equilibrium").run_key for each in given]
-    assert zero == minus_zero
-    assert len({zero, *others}) == 4

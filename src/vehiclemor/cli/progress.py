@@ -15,7 +15,7 @@ def shown_progress() -> Iterator[dict[str, int]]:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    from vehiclemor.study.progress import listening
+    from vehiclemor.progress import listening
 
     console = Console(stderr=True)
     bar = Progress(console=console, disable=not console.is_terminal)

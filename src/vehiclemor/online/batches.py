@@ -23,8 +23,8 @@ from vehiclemor.online.batch_result import Found, dataset, selected
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.study.evaluate import one_thread
 from vehiclemor.study.failure import Failure, attempt
-from vehiclemor.study.linear_algebra import one_thread
 from vehiclemor.study.provenance import attributes
 
 if TYPE_CHECKING:

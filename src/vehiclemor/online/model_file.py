@@ -26,8 +26,8 @@ from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.sizes import require
+from vehiclemor.study.experiment import Settings, for_method
 from vehiclemor.study.input_range import InputRange
-from vehiclemor.study.method_settings import Settings, for_method
 from vehiclemor.study.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.study.provenance import attributes, code_digest
 from vehiclemor.study.scenario import parameters_of
@@ -101,7 +101,7 @@ def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
         model=model.name,
         method=saved.method,
         vehiclemor=version("vehiclemor"),
-        code=code_digest(model.name, saved.method),
+        code=code_digest(model.name, saved.method, saved.settings),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     write_dataset(xr.Dataset(variables, attrs=described), path)

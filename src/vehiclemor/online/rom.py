@@ -21,8 +21,8 @@ from vehiclemor.simulation.checks import check_positive, checked_array, checked_
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.study.experiment import Settings
 from vehiclemor.study.input_range import InputRange, input_range
-from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.plans.training import Given, training_set
 from vehiclemor.study.scenario import Scenario
 
@@ -132,7 +132,7 @@ class ReducedOrderModel(ShortRepr):
         """
         from vehiclemor.reduction.validation import for_model
         from vehiclemor.simulation.build import reparametrised
-        from vehiclemor.study.method_settings import for_method
+        from vehiclemor.study.experiment import for_method
 
         model, method = reparametrised(self.model, parameters), component("method", self.method)
         settings = for_method(self.model, self.method, self.settings)
@@ -369,7 +369,7 @@ def reduce(
     from vehiclemor.progress import first_use
     from vehiclemor.reduction.validation import checked_settings, fitted, validated
     from vehiclemor.simulation.build import build
-    from vehiclemor.study.linear_algebra import one_thread
+    from vehiclemor.study.evaluate import one_thread
     from vehiclemor.study.scenario import training_run
 
     ready = model if isinstance(model, Model) else build(model)

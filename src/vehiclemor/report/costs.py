@@ -10,7 +10,11 @@ from vehiclemor.registry import component
 from vehiclemor.report.printing import Column, column, table, wrapped
 from vehiclemor.report.shown import main_outputs, of_kind, timing_cases
 from vehiclemor.simulation.build import build
-from vehiclemor.study.timing import timed_model
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
+from vehiclemor.study.plans.study_file import MethodEntry
+from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.timing import timed_starts
 
 
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
@@ -35,8 +39,21 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:
     """Stored timing of the cases of a model, measured first if it is missing."""
-    cases = timing_cases(component("model", model))
-    return timed_model(build(model), cases, folder, f"timing-{model}")
+    built, cases = build(model), timing_cases(component("model", model))
+    maneuver = built.definition.maneuver
+    runs = {start: Scenario.of(maneuver, (1.0, 1.0), start) for start in built.starts}
+    experiments = {
+        start: {case.id: _experiment(built, case, run) for case in cases}
+        for start, run in runs.items()
+    }
+    data = timed_starts(experiments, folder / "studies" / f"timing-{model}.nc")
+    return data.assign_coords(label=("case", [case.label for case in cases]))
+
+
+def _experiment(model: Model, case: MethodEntry, run: Scenario) -> Experiment:
+    """A case, trained on the run that is timed."""
+    settings = complete_settings(model, case.method, case.settings, case.preset)
+    return make_experiment(model, case.method, settings, (run,), (run,), "metrics")
 
 
 def _row(data: xr.Dataset, counts: list[str]) -> dict[str, object]:

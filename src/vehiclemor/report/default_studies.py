@@ -4,22 +4,21 @@ What the package has is taken; else a study file is written beside the results, 
 resumes and can be read and changed like any other.
 """
 
-import json
-from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.errors import InputError
-from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.shown import default_rank, tabled_outputs
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.method_settings import complete_settings, default_settings
-from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.experiment import complete_settings, default_settings
+from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.protocol import PREFIX, protocol_names
+from vehiclemor.study.plans.study_file import StudyFile
 
 # Share of a signal's range within which two curves lie on top of each other: the bound of an output
 # for which there is no published error.
@@ -35,6 +34,8 @@ FIRST = {
     "pod_literal": ("pod", "literal"),
     "fixed_basis": ("fixed_basis", "recommended"),
 }
+# Of a protocol; every other method is a contender.
+ROLES = {"full_order": "full order", "replay": "baseline"}
 # Points [frequency factor, amplitude factor] of the sets of a protocol.
 POINTS = {
     "training": [[1.0, 1.0], [0.7, 0.6]],
@@ -52,14 +53,16 @@ def of_paper(name: str) -> str:
 
 def nominal(name: str, results: Path) -> str:
     """Study of the nominal run, that the methods are trained on."""
-    return _study(name, "nominal", results, 'training = "matched"', "")
+    return _study(name, "nominal", results, {"start": list(build(name).starts)})
 
 
 def perturbed(name: str, results: Path) -> str:
     """Study over perturbations of both factors, trained on the nominal input."""
-    head = 'training = "nominal"\nkeep = "metrics"'
-    grid = f"frequency_factor = {list(FACTORS)}\namplitude_factor = {list(FACTORS)}\n"
-    return _study(name, "perturbed", results, head, grid)
+    factors = list(FACTORS)
+    grid = {"frequency_factor": factors, "amplitude_factor": factors}
+    return _study(
+        name, "perturbed", results, {"training": "nominal", "keep": "metrics", "grid": grid}
+    )
 
 
 def unseen(name: str, results: Path) -> str:
@@ -67,7 +70,7 @@ def unseen(name: str, results: Path) -> str:
     if name in protocol_names():
         return protocol_names()[name]
     path = results / "studies" / f"{PREFIX}{name}.toml"
-    return str(write_text(path, _protocol(build(name))))
+    return str(write_study(_protocol(build(name)), path))
 
 
 def methods(model: Model) -> dict[str, tuple[str, str]]:
@@ -105,17 +108,17 @@ def bounds(model: Model) -> dict[str, float]:
     return {output: INDISTINGUISHABLE * float(ranges[output]) for output in shown}
 
 
-def _study(name: str, kind: str, results: Path, head: str, grid: str) -> str:
+def _study(name: str, kind: str, results: Path, further: dict[str, Any]) -> str:
     """Path of a study file of every method; methods with a rank get the model's default one."""
     model = build(name)
-    lines = [f'title = "{name}: {kind} input, every method"', f'model = "{name}"', head]
-    # The map of perturbations has one start.
-    starts = model.starts if not grid else model.starts[:1]
-    lines += [f"start = {json.dumps(list(starts))}", "", "[grid]", grid]
-    for label, (method, preset) in methods(model).items():
-        lines += ["[[methods]]", f'method = "{method}"', f'label = "{label}"']
-        lines += [f'preset = "{preset}"', f"settings = {_inline(smaller_rank(model, method))}", ""]
-    return str(write_text(results / "studies" / f"{name}-{kind}.toml", "\n".join(lines)))
+    entries = [
+        {"method": m, "label": label, "preset": preset, "settings": smaller_rank(model, m)}
+        for label, (m, preset) in methods(model).items()
+    ]
+    title = f"{name}: {kind} input, every method"
+    content = {"title": title, "model": name, "methods": entries, **further}
+    path = results / "studies" / f"{name}-{kind}.toml"
+    return str(write_study(StudyFile.model_validate(content), path))
 
 
 def smaller_rank(model: Model, method: str) -> dict[str, int]:
@@ -125,28 +128,28 @@ def smaller_rank(model: Model, method: str) -> dict[str, int]:
     return {"rank": rank} if isinstance(own, int) and own > rank else {}
 
 
-def _inline(table: Mapping[str, object]) -> str:
-    return "{ " + ", ".join(f"{key} = {json.dumps(value)}" for key, value in table.items()) + " }"
-
-
-def _protocol(model: Model) -> str:
+def _protocol(model: Model) -> StudyFile:
     """Protocol of a model: full order at several tolerances, then every method."""
-    maneuver = component("model", model.name).maneuver
-    lines = [f'title = "{model.name}: inputs that a reduced model has not seen"']
-    lines += [f'model = "{model.name}"', "", "[bounds]"]
-    lines += [f'{o} = {{ measure = "rms", bound = {b!r} }}' for o, b in bounds(model).items()]
-    for purpose, points in POINTS.items():
-        lines += ["", f"[[{purpose}]]", f'maneuver = "{maneuver}"', f"points = {points}"]
-        lines += [f"start = {json.dumps(list(model.starts))}"]
-    tolerances: list[dict[str, object]] = [{"tolerance": value} for value in TOLERANCES]
-    for label, (method, preset) in methods(model).items():
-        if label == "pod_literal":
-            continue
-        candidates = tolerances if label == "full_order" else [{}]
-        role = {"full_order": "full order", "replay": "baseline"}.get(method, "contender")
-        own = {"preset": preset, **smaller_rank(model, method)}
-        chosen = [own | entry for entry in candidates]
-        words = label.replace("full_order_", "").replace("_", " ")
-        lines += ["", "[[methods]]", f'label = "{words}"', f'method = "{method}"']
-        lines += [f'role = "{role}"', f"candidates = [{', '.join(map(_inline, chosen))}]"]
-    return "\n".join(lines) + "\n"
+    entries = [
+        {
+            "method": method,
+            "label": label.replace("full_order_", "").replace("_", " "),
+            "preset": preset,
+            "settings": smaller_rank(model, method),
+            "role": ROLES.get(method, "contender"),
+        }
+        for label, (method, preset) in methods(model).items()
+        if label != "pod_literal"
+    ]
+    for entry in entries:
+        if entry["label"] == "full order":
+            entry["candidates"] = [{"tolerance": value} for value in TOLERANCES]
+    inputs = {"maneuver": component("model", model.name).maneuver, "start": list(model.starts)}
+    sets = {purpose: [inputs | {"points": points}] for purpose, points in POINTS.items()}
+    content = {
+        "title": f"{model.name}: inputs that a reduced model has not seen",
+        "model": model.name,
+        "bounds": {o: {"measure": "rms", "bound": bound} for o, bound in bounds(model).items()},
+        "methods": entries,
+    }
+    return StudyFile.model_validate(content | sets)

@@ -28,8 +28,6 @@ from vehiclemor.study.run import run_studies
 if TYPE_CHECKING:
     import xarray as xr
 
-# Of a remark, see study/evaluate.py.
-UNTRUSTED = "not to be trusted"
 COUNTS = ("effective_rank", *(DYNAMIC_COUNTS | ALGEBRAIC_COUNTS), "growth_rate", "in_training")
 # Kind of the rows of a grid in a comparison.
 ERRORS = "errors"
@@ -246,17 +244,16 @@ def _grid_words(dataset: xr.Dataset) -> str:
 def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
     """Which runs of a study aren't trusted: by the method (status), or as a protocol would judge.
 
-    A study leaves the second to its remarks, so that errors of such runs are still shown.
+    A grid leaves the second to this mark, so that errors of such runs are still shown.
     """
-    return (dataset["status"] == "untrusted") | dataset["remark"].str.contains(UNTRUSTED)
+    return dataset["warned"].astype(bool)
 
 
 def counted_ends(dataset: xr.Dataset) -> str:
     """How the runs of a study have ended; a cell that stands at several places counts once."""
-    # A protocol's runs have no remarks and no cells of their own.
-    warned = warned_runs(dataset) if "remark" in dataset else False
+    # A protocol's runs have no cells of their own.
     told = dataset.assign(
-        warned=(dataset["status"] == "ok") & warned, trained=trained_runs(dataset)
+        warned=(dataset["status"] == "ok") & warned_runs(dataset), trained=trained_runs(dataset)
     )
     runs: Any = frame(told, ["status", "cell_key", "warned", "trained"])
     runs = runs.drop_duplicates("cell_key") if "cell_key" in runs else runs

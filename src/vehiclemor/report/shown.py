@@ -10,30 +10,25 @@ from pydantic import Field
 
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.resources import data_folder
-from vehiclemor.study.timing import TimingCase
+from vehiclemor.study.plans.study_file import MethodEntry, Settings
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 
-Value = bool | int | float | str
 MOST_PRINTED = 3
 LARGEST_DEFAULT_RANK = 3
 # Method and preset of the reduced models that are timed where none are listed.
 REDUCED = (("pod", "recommended"), ("pod", "literal"), ("fixed_basis", "recommended"))
 
 
-class Case(FileSchema):
+class Case(MethodEntry):
     """A row of a cost table; identifier and label of a reduced model follow from its settings."""
 
     id: str = ""
-    label: str = ""
-    method: Line
-    preset: str = "recommended"
-    settings: dict[str, Value] = Field(default_factory=dict)
 
-    def timing_case(self) -> TimingCase:
-        """The case as it is timed."""
+    def named(self) -> "Case":
+        """With identifier and label."""
         label = self.label or self._label()
         name = self.id or label.replace(",", "").replace("=", "").replace(" ", "_")
-        return TimingCase(name, label, self.method, self.preset, self.settings)
+        return self.model_copy(update={"id": name, "label": label})
 
     def _label(self) -> str:
         """What differs from the recommended settings."""
@@ -78,13 +73,14 @@ def default_rank(coordinates: int) -> int:
     return max(1, min(LARGEST_DEFAULT_RANK, coordinates - 1))
 
 
-def timing_cases(definition: ModelDefinition) -> list[TimingCase]:
+def timing_cases(definition: ModelDefinition) -> list[Case]:
     """Rows of a model's cost table: full-order solvers, replay, reduced models."""
-    settings: dict[str, Value] = {"rank": default_rank(len(definition.coordinates))}
+    settings: Settings = {"rank": default_rank(len(definition.coordinates))}
     reduced = tables_file().reduced.get(definition.name) or [
-        Case(method=method, preset=preset, settings=settings) for method, preset in REDUCED
+        Case.model_validate({"method": method, "preset": preset, "settings": settings})
+        for method, preset in REDUCED
     ]
-    return [case.timing_case() for case in (*of_kind(definition.kind).cases, *reduced)]
+    return [case.named() for case in (*of_kind(definition.kind).cases, *reduced)]
 
 
 def tabled_outputs(definition: ModelDefinition) -> tuple[str, ...]:

@@ -1,7 +1,6 @@
 """The file of one cell: its arrays as safetensors, all else as JSON in the header of the file.
 
-The header holds a hash of the file, so a part, or a flipped bit, is never read as a result.  It
-comes first: how a cell has ended is told without reading its arrays.
+The header holds a hash of the file, so a part, or a flipped bit, is never read as a result.
 """
 
 from __future__ import annotations
@@ -9,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,51 +18,39 @@ from vehiclemor.short_repr import shortened
 if TYPE_CHECKING:
     import xarray as xr
 
-ENDING, SCHEMA = ".safetensors", "vehiclemor cell 2"
+ENDING, SCHEMA = ".safetensors", "vehiclemor cell 3"
 # Where the hash stands; while it is computed there are zeros.
 HASH, ZEROS = '"sha256":"{}"', "0" * 64
-# Length of the header is told in so many bytes; and a first read that mostly has all of it.
-PREFIX, FIRST = 8, 1 << 14
+# Length of the header is told in so many bytes.
+PREFIX = 8
 # What comes of a text that is none of ours.
 WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
-# Coordinates; and variable -> dimensions, shape and kind of number or text.
-Layout = tuple[set[str], dict[str, tuple[list[str], tuple[int, ...], str]]]
 
 
-class End(NamedTuple):
-    """How a cell has ended.
+class Cell(NamedTuple):
+    """What the file of a cell holds: variables as xarray takes them, text as objects.
 
     Attributes
     ----------
-    runs
-        (status, message) -> number of its runs.
     seconds
         That it took, its fit and the reference included; NaN if nobody has measured.
     """
 
-    runs: dict[tuple[str, str], int]
+    variables: dict[str, tuple[list[str], np.ndarray, dict[str, Any]]]
+    coordinates: list[str]
+    attributes: dict[str, Any]
     seconds: float
+
+    @property
+    def ends(self) -> Counter[tuple[str, str]]:
+        """(status, message) -> number of its runs."""
+        texts = (self.variables[name][1].ravel().tolist() for name in ("status", "message"))
+        return Counter(zip(*texts, strict=True))
 
     @property
     def broken(self) -> bool:
         """Whether a bug has ended it: the next run tries it again."""
-        return any(status == "error" for status, _ in self.runs)
-
-
-class Cell(NamedTuple):
-    """What the file of a cell holds: variables as xarray takes them, text as objects."""
-
-    variables: dict[str, tuple[list[str], np.ndarray, dict[str, Any]]]
-    coordinates: list[str]
-    attributes: dict[str, Any]
-    end: End
-
-    @property
-    def layout(self) -> Layout:
-        """What it holds, whatever the values."""
-        found = self.variables.items()
-        shapes = {name: (list(d), array.shape, array.dtype.kind) for name, (d, array, _) in found}
-        return set(self.coordinates), shapes
+        return "error" in self.variables["status"][1].ravel().tolist()
 
     def dataset(self) -> xr.Dataset:
         """As it was stored."""
@@ -99,13 +85,12 @@ def encoded(dataset: xr.Dataset, key: str, seconds: float = np.nan) -> bytes:
         "variables": described,
         "coordinates": [str(name) for name in dataset.coords],
         "attributes": dataset.attrs,
+        "seconds": float(seconds),
     }
     header = {
         "schema": SCHEMA,
         "key": key,
         "sha256": ZEROS,
-        "seconds": repr(float(seconds)),
-        "runs": json.dumps([[*end, count] for end, count in _runs(dataset).items()]),
         "dataset": json.dumps(content, default=_plain),
     }
     whole = save(arrays, header)
@@ -123,53 +108,28 @@ def decoded(content: bytes, key: str) -> Cell:
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    header = _header(content, key)
-    try:
-        digest = header["sha256"]
-        if hashlib.sha256(_filled(content, digest, ZEROS)).hexdigest() != digest:
-            raise SpoiledError("what it holds is not what was written")
-        found, arrays, variables = json.loads(header["dataset"]), load(content), {}
-        for name, entry in found["variables"].items():
-            if "text" in entry:
-                "".join(entry["text"])
-                arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
-            variables[name] = entry["dimensions"], arrays[name], dict(entry["attributes"])
-        return Cell(variables, found["coordinates"], dict(found["attributes"]), _end(header))
-    except (*WRONG, SafetensorError):
-        raise SpoiledError("what it holds is no result") from None
-
-
-def end_of(path: Path, key: str) -> End:
-    """How a cell has ended, from the header of its file alone; `SpoiledError` as of `decoded`."""
-    with path.open("rb", buffering=0) as file:
-        content = file.read(FIRST)
-        if PREFIX + int.from_bytes(content[:PREFIX], "little") > len(content):
-            content += file.read()
-    return _end(_header(content, key))
-
-
-def _end(header: dict[str, str]) -> End:
-    try:
-        runs = {(str(s), str(m)): int(n) for s, m, n in json.loads(header["runs"])}
-        return End(runs, float(header["seconds"]))
-    except WRONG:
-        raise SpoiledError("damaged") from None
-
-
-def _header(content: bytes, key: str) -> dict[str, str]:
     size = int.from_bytes(content[:PREFIX], "little")
     if len(content) < PREFIX + size:
         raise SpoiledError("truncated, or no result of this package")
     try:
         header = json.loads(content[PREFIX : PREFIX + size])["__metadata__"]
         schema, found = shortened(header["schema"]), shortened(header["key"])
-    except WRONG:
+        if schema != SCHEMA:
+            raise SpoiledError(f"{schema!r}, where this version writes {SCHEMA!r}")
+        if found != key:
+            raise SpoiledError(f"not the result that belongs here, but of {found}")
+        digest = header["sha256"]
+        if hashlib.sha256(_filled(content, digest, ZEROS)).hexdigest() != digest:
+            raise SpoiledError("what it holds is not what was written")
+        found, arrays, variables = json.loads(header["dataset"]), load(content), {}
+        for name, entry in found["variables"].items():
+            if "text" in entry:
+                arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
+            variables[name] = entry["dimensions"], arrays[name], dict(entry["attributes"])
+        attributes, seconds = dict(found["attributes"]), float(found["seconds"])
+        return Cell(variables, found["coordinates"], attributes, seconds)
+    except (*WRONG, SafetensorError):
         raise SpoiledError("damaged, or no result of this package") from None
-    if schema != SCHEMA:
-        raise SpoiledError(f"{schema!r}, where this version writes {SCHEMA!r}")
-    if found != key:
-        raise SpoiledError(f"not the result that belongs here, but of {found}")
-    return header
 
 
 def _filled(content: bytes, old: str, new: str) -> bytes:
@@ -182,11 +142,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} can't be stored")
-
-
-def _runs(dataset: xr.Dataset) -> Counter[tuple[str, str]]:
-    """(status, message) -> number of runs."""
-    if not {"status", "message"} <= set(dataset.variables):
-        return Counter()
-    ends = (dataset.variables[n].values.ravel().tolist() for n in ("status", "message"))
-    return Counter(zip(*ends, strict=True))

@@ -1,4 +1,4 @@
-"""Studies on a cluster: workers of dask.distributed, at a scheduler's address or on this machine.
+"""Studies on a cluster: workers of dask.distributed, at a scheduler's address.
 
 Workers write their results into the driver's folder where they see it, else the driver does.  They
 compile what their cache lacks.
@@ -10,15 +10,14 @@ import logging
 import os
 import threading
 import time
-import warnings
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.codegen.cache import cache_folder, once
+from vehiclemor.codegen.cache import once
 from vehiclemor.errors import InputError, MachineError, one_line
 from vehiclemor.files import temporary_path
 from vehiclemor.study.evaluate import model_of
@@ -30,70 +29,35 @@ from vehiclemor.study.workers import LARGEST, Done, Engine, Groups, evaluate_and
 if TYPE_CHECKING:
     from distributed import Client
 
-LOCAL = "local"
 # Seconds: to reach a scheduler, and between two looks at who works.
 REACH, LOOK = 10.0, 1.0
-# Ctrl-C reaches all processes of a terminal, and the driver ends the workers.
-NO_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 _LOG = logging.getLogger("vehiclemor")
 
 
 @contextmanager
-def reached(scheduler: str, jobs: int) -> Iterator[Engine]:
-    """The workers of a scheduler, or with `local` so many new ones that end with this process.
+def reached(scheduler: str) -> Iterator[Engine]:
+    """The workers of a scheduler.
 
     Raises
     ------
     InputError
-        If the scheduler can't be reached, or runs other versions.
+        If the scheduler can't be reached.
     """
     try:
-        import distributed
+        from distributed import Client
+        from distributed.utils import silence_logging_cmgr
     except ImportError:
         raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
-    from distributed.utils import silence_logging_cmgr
-
-    with ExitStack() as stack:
-        # What matters is said in one line; it would add a traceback for each lost connection.
-        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))
-        address: Any = scheduler
-        if scheduler == LOCAL:
-            from vehiclemor.study import cluster_local
-
-            word = {cluster_local.VARIABLE: cluster_local.WORD}
-            address = stack.enter_context(
-                distributed.LocalCluster(
-                    n_workers=jobs,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address="127.0.0.1:0",
-                    silence_logs=logging.CRITICAL,
-                    protocol=cluster_local.PROTOCOL,
-                    preload=[NO_INTERRUPT, cluster_local.__name__],
-                    env={"VEHICLEMOR_CACHE": str(cache_folder()), "NUMBA_NUM_THREADS": "1"} | word,
-                )
-            )
-        yield partial(evaluated_by_cluster, client=stack.enter_context(_client(address)))
-
-
-@contextmanager
-def _client(address: Any) -> Iterator[Client]:
-    from distributed import Client
-
-    if isinstance(address, str):
-        _knock(address)
-    with warnings.catch_warnings():
-        # What differs is an error below.
-        warnings.simplefilter("ignore")
-        # Its types are those of awaited calls too.
-        client: Any = Client(address, timeout=REACH, set_as_default=False)
-    with client:
-        _same_versions(client)
-        number = _places(client)
-        work = f"{number} places for cells" if number else "no worker yet, cells wait for the first"
-        at, dashboard = client.scheduler.address, client.dashboard_link
-        _LOG.info("scheduler %s: %s; dashboard %s", at, work, dashboard)
-        yield client
+    _knock(scheduler)
+    # What matters is said in one line; dask would add a traceback for each lost connection.
+    with silence_logging_cmgr(logging.CRITICAL):
+        # It warns where versions differ.  Its types are those of awaited calls too.
+        client: Any = Client(scheduler, timeout=REACH, set_as_default=False)
+        with client:
+            number = _places(client)
+            work = f"{number} places for cells" if number else "no worker yet, cells wait"
+            _LOG.info("scheduler %s: %s; dashboard %s", scheduler, work, client.dashboard_link)
+            yield partial(evaluated_by_cluster, client=client)
 
 
 def _knock(address: str) -> None:
@@ -122,23 +86,6 @@ def _knock(address: str) -> None:
 
 def _places(client: Any) -> int:
     return sum(client.nthreads().values())
-
-
-def _same_versions(client: Any) -> None:
-    """Raise `InputError` if the scheduler or a worker runs other versions than this process."""
-    found = client.get_versions()
-    own = _versions(found["client"])
-    for who, entry in {"the scheduler": found["scheduler"], **found["workers"]}.items():
-        if (versions := _versions(entry)) != own:
-            raise InputError(
-                f"scheduler: {who} runs {versions}, this process {own}; install the same versions"
-            )
-
-
-def _versions(entry: dict[str, Any] | None) -> str:
-    packages = (entry or {}).get("packages") or {}
-    python = ".".join(str(packages.get("python")).split(".")[:2])
-    return f"distributed {packages.get('distributed')} on Python {python}"
 
 
 def evaluated_by_cluster(
@@ -219,8 +166,9 @@ def _seen(mark: Path) -> bool:
 
 def _same_source(experiments: Sequence[Experiment]) -> None:
     """Raise `InputError` if results would be those of other source."""
-    for e in {(e.model, e.method): e for e in experiments}.values():
-        if code_digest(e.model, e.method) != e.code or model_of(e).kernel_hash != e.kernel:
+    for e in {e.code + e.kernel: e for e in experiments}.values():
+        code = code_digest(e.model, e.method, e.settings)
+        if code != e.code or model_of(e).kernel_hash != e.kernel:
             from distributed import get_worker
 
             raise InputError(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,19 +20,11 @@ from vehiclemor.reduction.validation import checked_run, checked_settings, fitte
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.study.cell_file import Layout, decoded, encoded
-from vehiclemor.study.experiment import Experiment
+from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.study.experiment import Experiment, default_settings, for_method
 from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.input_range import input_range
-from vehiclemor.study.linear_algebra import one_thread
-from vehiclemor.study.method_settings import default_settings, for_method
-from vehiclemor.study.result import (
-    Outcome,
-    errors_dataset,
-    fit_cost,
-    metrics_dataset,
-)
+from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
@@ -44,10 +37,13 @@ from vehiclemor.study.scenario import (
 
 if TYPE_CHECKING:
     import xarray as xr
+    from threadpoolctl import ThreadpoolController
 
 
 # How a fitted model is integrated: experiments that differ in these alone are fitted once.
 ONLINE = ("solver", "tolerance")
+# More than the fits of a study of protocols, some of which take a minute.
+MOST_FITS = 128
 
 
 class Fit(NamedTuple):
@@ -102,30 +98,45 @@ def evaluate(
         As the experiment keeps it, see `study/result.py`.  Where nothing could be computed the
         values are missing, and `status` and `message` tell why.
     """
-    kept = model is None
+    solve = kept_reference if model is None else recent_reference
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
-        model = model or model_of(experiment)
-        found = attempt(partial(_evaluated, experiment, model, kept, errors))
-        return _failed(experiment, model, found) if isinstance(found, Failure) else found
+        own = model or model_of(experiment)
+        found = attempt(partial(_evaluated, experiment, own, solve if errors else None))
+        if isinstance(found, Failure):
+            # A bug has ended it.
+            found = result_dataset(own, experiment, [found] * len(experiment.test), found)
+    return found
 
 
-def _evaluated(experiment: Experiment, model: Model, kept: bool, errors: bool) -> xr.Dataset:
-    refused = refusal(model, experiment)
-    solve = kept_reference if kept else recent_reference
-    fitted = Fitted(refused) if refused else _shared(_wanted(model, experiment))
-    outcomes: list[Outcome | Failure] = []
-    for scenario in experiment.test:
-        outcome: Any = refused
-        if errors and not refused:
-            outcome = attempt(partial(solve, model, scenario), "the full-order reference: ")
-        if not isinstance(outcome, Failure):
-            outcome = _tested(model, fitted, scenario, outcome, experiment)
-        outcomes.append(outcome)
-    if experiment.keep == "errors":
-        return errors_dataset(model, experiment, outcomes, fit_cost(fitted.reduced))
-    car = car_of(model, experiment.test[0])
-    seen = not isinstance(outcomes[0], Failure) and _seen(model, experiment)
-    return metrics_dataset(car, experiment, outcomes[0], fitted.reduced, seen)
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Pin the linear algebra of NumPy and SciPy to one thread of this process.
+
+    How many threads add up a sum decides how it is rounded: results are then the same to the bit,
+    whatever the number of cores, jobs or limits set outside.
+    """
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    # SciPy brings a library of its own, which is limited only once it is loaded.
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> xr.Dataset:
+    car, test = car_of(model, experiment.test[0]), experiment.test
+    if refused := refusal(model, experiment):
+        return result_dataset(car, experiment, [refused] * len(test), refused)
+    fit = _shared(_wanted(model, experiment))
+    outcomes = [_outcome(experiment, model, fit, scenario, solve) for scenario in test]
+    seen = experiment.keep != "errors" and not isinstance(outcomes[0], Failure)
+    seen = seen and _seen(model, experiment)
+    return result_dataset(car, experiment, outcomes, fit.reduced, seen)
 
 
 def _seen(model: Model, experiment: Experiment) -> bool:
@@ -133,27 +144,6 @@ def _seen(model: Model, experiment: Experiment) -> bool:
     method: Method = component("method", experiment.method)
     learns = method.learns_from != "inputs"
     return learns and in_training(model, experiment.training, experiment.test[0])
-
-
-def _failed(experiment: Experiment, model: Model, failure: Failure) -> xr.Dataset:
-    """Result of an experiment that a bug has ended."""
-    outcomes = [failure] * len(experiment.test)
-    if experiment.keep == "errors":
-        return errors_dataset(model, experiment, outcomes, fit_cost(failure))
-    return metrics_dataset(model, experiment, failure, failure)
-
-
-def layout_of(experiment: Experiment) -> Layout:
-    """What the result of an experiment holds, whatever becomes of it."""
-    test = experiment.test
-    like = experiment.kernel, experiment.keep, len(test), test[0].maneuver.samples
-    if like not in _LAYOUTS:
-        failed = _failed(experiment, model_of(experiment), Failure("error", ""))
-        _LAYOUTS[like] = decoded(encoded(failed, ""), "").layout
-    return _LAYOUTS[like]
-
-
-_LAYOUTS: dict[tuple[str, str, int, int], Layout] = {}
 
 
 def model_of(experiment: Experiment) -> Model:
@@ -212,21 +202,21 @@ def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
     return _shared(_wanted(model, experiment)).reduced
 
 
+_KEPT: dict[Fit, Fitted] = {}
+
+
 def _shared(fit: Fit) -> Fitted:
-    """A fit that may be shared; a bug is not kept, since it may be mended before the next try."""
-    try:
-        return _kept(fit)
-    except _BrokenFitError as bug:
-        return Fitted(bug.args[0])
+    """A fit that may be shared; what was not used for the longest time is forgotten."""
+    found = _KEPT.pop(fit, None) or Fitted(_made(fit))
+    # A bug may be mended before the next try.
+    if not (isinstance(found.reduced, Failure) and found.reduced.status == "error"):
+        _KEPT[fit] = found
+        if len(_KEPT) > MOST_FITS:
+            del _KEPT[next(iter(_KEPT))]
+    return found
 
 
-class _BrokenFitError(Exception):
-    """Carries the failure of a fit."""
-
-
-# More than the fits of a study of protocols, some of which take a minute.
-@lru_cache(maxsize=128)
-def _kept(fit: Fit) -> Fitted:
+def _made(fit: Fit) -> ReducedModel | Failure:
     """A fit; one that differs from another in its integration alone shares what that has fitted."""
     settings = json.loads(fit.settings)
     defaults = default_settings(fit.model, fit.method)
@@ -235,9 +225,9 @@ def _kept(fit: Fit) -> Fitted:
     if common != fit.settings:
         found: Any = _shared(fit._replace(settings=common)).reduced
         if isinstance(found, Failure):
-            return _unbroken(found)
+            return found
         if all(hasattr(found, name) for name in online):
-            return Fitted(replace(found, **online))
+            return replace(found, **online)
 
     def other(name: str, given: Any) -> ReducedModel:
         content, function = _text(given.model_dump()), component("method", name).fit
@@ -247,13 +237,7 @@ def _kept(fit: Fit) -> Fitted:
             return fitted(component("method", name), *_given(fit), given)
         return shared
 
-    return _unbroken(_fit(fit, other))
-
-
-def _unbroken(reduced: ReducedModel | Failure) -> Fitted:
-    if isinstance(reduced, Failure) and reduced.status == "error":
-        raise _BrokenFitError(reduced)
-    return Fitted(reduced)
+    return _fit(fit, other)
 
 
 def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
@@ -276,47 +260,58 @@ def _text(content: Mapping[str, object]) -> str:
     return json.dumps(content, sort_keys=True)
 
 
+def _outcome(
+    experiment: Experiment, model: Model, fit: Fitted, scenario: Scenario, solve: Callable | None
+) -> Outcome | Failure:
+    """A test scenario, solved in full order if asked for, and with the reduced model."""
+    reference: Any = None
+    if solve:
+        reference = attempt(partial(solve, model, scenario), "the full-order reference: ")
+    for part in (reference, fit.reduced):
+        if isinstance(part, Failure):
+            return part
+    return attempt(partial(_tested, experiment, model, fit, scenario, reference))
+
+
 def _tested(
+    experiment: Experiment,
     model: Model,
-    fitted: Fitted,
+    fit: Fitted,
     scenario: Scenario,
     reference: Trajectory | None,
-    experiment: Experiment,
-) -> Outcome | Failure:
-    """One test scenario, simulated with the reduced model of its car."""
-    if isinstance(fitted.reduced, Failure):
-        return fitted.reduced
-    reduced: ReducedModel = fitted.reduced
-
-    def run() -> Outcome:
-        car, start = car_of(model, scenario), start_of(model, scenario)
-        if experiment.keep == "errors":
-            trajectory = _sound(car, reduced, scenario, start)
-            trajectory = warned(model, experiment, scenario, trajectory)
-            return Outcome(trajectory, reference)
-        # The first run loads machine code and warms caches, another is timed where it is compared.
-        if not fitted.warm and reference is not None:
-            checked_run(car, scenario.maneuver, start, reduced)
-            fitted.warm = True
-        trajectory = _sound(car, reduced, scenario, start)
-        trajectory = _remarked(model, experiment, scenario, trajectory)
-        if reference is None:
-            return Outcome(trajectory, None)
-        with blamed(f"method {experiment.method!r}: best_approximation", reduced):
-            nearest = reduced.best_approximation(reference.states)
-        if nearest is None:
-            return Outcome(trajectory, reference)
-        if np.shape(nearest) != reference.states.shape:
-            raise PlugInError(
-                f"best_approximation gives shape {np.shape(nearest)}, not its argument's"
-            )
-        floor = rms(car.outputs_at(nearest, reference.inputs) - reference.outputs)
-        return Outcome(trajectory, reference, floor)
-
-    return attempt(run)
+) -> Outcome:
+    """A test scenario, simulated with the reduced model of its car."""
+    car, start = car_of(model, scenario), start_of(model, scenario)
+    reduced: Any = fit.reduced
+    many = experiment.keep == "errors"
+    # The first run loads machine code and warms caches, another is timed where it is compared.
+    if not (many or fit.warm or reference is None):
+        checked_run(car, scenario.maneuver, start, reduced)
+        fit.warm = True
+    run = checked_run(car, scenario.maneuver, start, reduced)
+    if run.finished and not np.isfinite(run.outputs).all():
+        run = replace(run, status="diverged", message="an output is not finite")
+    judged = _judged(model, experiment, scenario, run)
+    if many:
+        return Outcome(judged, reference)
+    if judged.status != run.status:
+        # A study shows what a protocol would not trust; the status is the method's own.
+        told = f"not to be trusted {judged.message}"
+        remark = "; ".join(part for part in (run.remark, told) if part)
+        judged = replace(judged, status=run.status, message=run.message, remark=remark)
+    if reference is None:
+        return Outcome(judged, None)
+    with blamed(f"method {experiment.method!r}: best_approximation", reduced):
+        nearest = reduced.best_approximation(reference.states)
+    if nearest is None:
+        return Outcome(judged, reference)
+    if np.shape(nearest) != reference.states.shape:
+        raise PlugInError(f"best_approximation gives shape {np.shape(nearest)}, not its argument's")
+    floor = rms(car.outputs_at(nearest, reference.inputs) - reference.outputs)
+    return Outcome(judged, reference, floor)
 
 
-def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
+def _judged(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
     """A run; it is not trusted beyond the training's inputs if its model is silent."""
     # What has learned from nothing is the full order of a protocol's second runs.
     if not experiment.training:
@@ -326,20 +321,3 @@ def warned(model: Model, experiment: Experiment, test: Scenario, run: Trajectory
         return run
     known = input_range(model, experiment.training, method.follows_time)
     return run.judged(known.trust(model, test))
-
-
-def _remarked(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
-    """A run with a remark where a protocol would not trust it; its status is the method's own."""
-    judged = warned(model, experiment, test, run)
-    if judged.status == run.status:
-        return run
-    told = f"not to be trusted {judged.message}"
-    return replace(run, remark="; ".join(part for part in (run.remark, told) if part))
-
-
-def _sound(model: Model, reduced: ReducedModel, scenario: Scenario, start: Start) -> Trajectory:
-    """A run; what ends without complaint, but in values that are no numbers, diverged."""
-    trajectory = checked_run(model, scenario.maneuver, start, reduced)
-    if not trajectory.finished or np.isfinite(trajectory.outputs).all():
-        return trajectory
-    return replace(trajectory, status="diverged", message="an output is not finite")

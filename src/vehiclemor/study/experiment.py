@@ -2,16 +2,21 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.settings import Value
+from vehiclemor.reduction.validation import validated
+from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.method_settings import Settings
 from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.scenario import Scenario, Values, parameters_of, scenario_text
 
+Settings = dict[str, Value]
 Keep = Literal["trajectories", "metrics", "errors"]
 
 
@@ -30,7 +35,7 @@ class Experiment(ShortRepr):
         All settings of the method; empty if it does not accept the model.
     keep
         `trajectories`: histories and all metrics of the one test scenario; `metrics`: the metrics
-        alone; `errors`: errors of the outputs in every test scenario.
+        alone; `errors`: those that any run has, of every test scenario.
     """
 
     model: str
@@ -79,7 +84,7 @@ def make_experiment(
     return Experiment(
         model.name,
         model.kernel_hash,
-        code_digest(model.name, method),
+        code_digest(model.name, method, settings),
         parameters_of(model),
         method,
         settings,
@@ -87,3 +92,37 @@ def make_experiment(
         test,
         keep,
     )
+
+
+def complete_settings(
+    model: Model,
+    method_name: str,
+    given: Mapping[str, object] | None = None,
+    preset: str = "recommended",
+) -> Settings:
+    """All settings of a method for a model, validated.
+
+    That a method refuses a model is a result: what was set for a model of another kind can't be
+    judged here, and nothing is set.
+
+    Raises
+    ------
+    InputError
+        If the preset, a name or a value is wrong.
+    """
+    method: Method = component("method", method_name)
+    if not method.accepts(model)[0]:
+        return {}
+    coordinates = len(model.coordinates)
+    return validated(method, model.kind, given or {}, preset, coordinates).model_dump()
+
+
+def for_method(model: Model, method_name: str, settings: Settings) -> Any:
+    """Complete settings as `check` and `fit` of the method take them."""
+    return validated(component("method", method_name), model.kind, settings)
+
+
+def default_settings(model: Model, method_name: str) -> Settings:
+    """Declared names and defaults; none for a kind of model that the method doesn't know."""
+    schema = component("method", method_name).settings.get(model.kind)
+    return {name: field.default for name, field in schema.model_fields.items()} if schema else {}

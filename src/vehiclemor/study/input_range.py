@@ -56,12 +56,17 @@ class InputRange:
         """Raise `ValueError` if the magnitudes are no table of floats."""
         shaped("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
 
+    @property
+    def _sizes(self) -> np.ndarray:
+        # In a file that was written by hand they may be zero.
+        return np.maximum(self.largest, NOTHING)
+
     def trust(self, model: Model, scenario: Scenario) -> Trust:
         """How far a scenario goes in the range."""
         maneuver = scenario.maneuver.for_inputs(model.inputs)
         if model.kind == "ae":
             return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
-        used = extent_of(maneuver).largest / self.largest
+        used = extent_of(maneuver).largest / self._sizes
         since = np.full(len(model.inputs), np.inf)
         if (used > 1.0).any():
             since = inputs_beyond(maneuver, self.largest)
@@ -85,7 +90,7 @@ class InputRange:
         inputs, off = maneuver.at(times), []
         for history in self.histories:
             then = [np.interp(times, known, column) for column in history.T]
-            off.append(np.abs((inputs - np.transpose(then)) / self.largest[0]).max(axis=1) / CLOSE)
+            off.append(np.abs((inputs - np.transpose(then)) / self._sizes[0]).max(axis=1) / CLOSE)
         nearest = min(off, key=np.max)
         beyond = np.flatnonzero(nearest > 1.0)
         return float(nearest.max()), float(times[beyond[0]]) if len(beyond) else np.inf
@@ -95,7 +100,7 @@ class InputRange:
     ) -> Trust:
         """How far inputs (samples, inputs) go in the range, each for itself."""
         times = np.zeros(len(inputs)) if times is None else times
-        return trust_of(times, inputs / self.largest[0], [f"input {name}" for name in names])
+        return trust_of(times, inputs / self._sizes[0], [f"input {name}" for name in names])
 
 
 @lru_cache(maxsize=64)

@@ -2,13 +2,14 @@
 
 import os
 import platform
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.reduction.interface import Method
-from vehiclemor.registry import component
+from vehiclemor.registry import component, names
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
 # Layers whose source determines results; tables, figures and the command line come after them.
@@ -18,7 +19,7 @@ FILES = (
     "metrics.py",
     "study/scenario.py",
     "study/input_range.py",
-    "study/method_settings.py",
+    "study/experiment.py",
     "study/failure.py",
     "study/evaluate.py",
     "study/result.py",
@@ -71,20 +72,24 @@ def _own_source() -> str:
     return source_digest(LAYERS, FILES)
 
 
-def code_digest(model: str, method: str) -> str:
+def code_digest(model: str, method: str, settings: Mapping[str, object]) -> str:
     """Hash of the source that computes a result.
 
     These are the layers of this package and, for a plug-in, all of its top-level package; and the
-    versions of the packages that the method declares.  Results computed by other source are never
-    taken for finished ones.
+    versions of the packages that the method declares.  Of a method that fits others, they are of
+    those that its settings name too.  Results computed by other source are never taken for finished
+    ones.
     """
-    used: Method = component("method", method)
-    plug_ins = plug_in_digest((component("model", model), used))
-    return " ".join([_own_source(), plug_ins, *map(_version, used.packages)])
+    used: list[Method] = [component("method", method)]
+    if used[0].fits_others:
+        named = sorted({*names("method")} & {v for v in settings.values() if isinstance(v, str)})
+        used += [component("method", name) for name in named]
+    plug_ins = plug_in_digest((component("model", model), *used))
+    packages = [_version(package) for method in used for package in method.packages]
+    return " ".join([_own_source(), plug_ins, *packages])
 
 
 @cache
 def layout_digest() -> str:
     """Hash of the source that combines cells: a dataset laid out by other source is made again."""
-    files = [f"study/{name}.py" for name in ("plans/grid_results", "plans/protocol_results")]
-    return source_digest((), (*files, "study/variables.py"))
+    return source_digest((), ("study/plans/results.py", "study/result.py"))

@@ -1,23 +1,30 @@
-"""Labelled results of experiments: metrics of one run, or errors in every test scenario."""
+"""Labelled results of experiments: each run is measured by one function, with units and meanings.
+
+What variables are stands in `data/results/variables.toml`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.reduction.interface import ReducedModel
+from vehiclemor.registry import component
+from vehiclemor.resources import data_folder
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset, with_units
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.provenance import attributes
-from vehiclemor.study.variables import variables
+from vehiclemor.study.scenario import Scenario
+from vehiclemor.toml_files import FileSchema, read_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +33,36 @@ if TYPE_CHECKING:
 FIRST_SECONDS = 10.0
 # Time (s) after which the smallest value of every output is stored: a dropped car has landed.
 LANDED = 1.0
+
+
+class VariablesFile(FileSchema):
+    """Schema of `data/results/variables.toml`."""
+
+    variables: dict[str, list[str]]
+    dimensions: dict[str, str]
+
+
+@cache
+def _declared() -> VariablesFile:
+    return read_toml(data_folder() / "results" / "variables.toml", VariablesFile)
+
+
+def variables(found: Mapping[str, object], *dimensions: str) -> dict[str, tuple]:
+    """Values with unit and meaning, on dimensions and on the quantity that their unit goes with."""
+    result: dict[str, tuple] = {}
+    for name, values in found.items():
+        unit, meaning, *clock = _declared().variables[name]
+        quantity = unit.removeprefix("see ").removesuffix("_unit")
+        own = () if quantity == unit else (quantity,)
+        attributes = ({"units": unit} if unit else {}) | {"long_name": meaning}
+        attributes |= {"clock": clock[0]} if clock else {}
+        result[name] = ((*dimensions, *own), values, attributes)
+    return result
+
+
+def meaning_of(dimension: str) -> str:
+    """What a dimension of a grid is."""
+    return _declared().dimensions.get(dimension, dimension.replace("_", " "))
 
 
 @dataclass(frozen=True)
@@ -45,145 +82,139 @@ class Outcome:
     floor: np.ndarray | None = None
 
 
-def metrics_dataset(
+def result_dataset(
     model: Model,
     experiment: Experiment,
-    outcome: Outcome | Failure,
+    outcomes: Sequence[Outcome | Failure],
     reduced: ReducedModel | Failure,
     in_training: bool = False,
 ) -> xr.Dataset:
-    """Result of the one test scenario.
+    """Result of an experiment.
 
     Parameters
     ----------
+    model
+        With the parameters of the tested scenarios.
     in_training
-        Whether the method has learnt from that very run.
+        Whether the method has learnt from the very run that is tested.
 
     Returns
     -------
     xarray.Dataset
-        Errors by output, coordinate and speed, floors, counts, seconds and status; histories too if
-        the experiment keeps trajectories.
+        Errors, counts, seconds, trust and status of every run, on the dimension `scenario` if the
+        experiment keeps `errors`; rank and cost of the fit; histories if it keeps them.
     """
-    if isinstance(outcome, Failure):
-        reduced, missing = outcome, _missing(model, experiment.test[0].maneuver, outcome)
-        outcome = Outcome(missing, missing)
-    run = outcome.trajectory
-    found, histories = _compared(model, outcome)
-    if model.speeds:
-        found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
-    if model.kind == "ae":
-        residuals = model.along("residual", run.coordinates, run.inputs)
-        found["largest_residual"] = float(np.abs(residuals).max())
-    found |= {**fit_cost(reduced)._asdict(), "in_training": in_training}
-    dataset = trajectory_dataset(model, run, variables(found) | histories)
-    if experiment.keep == "metrics":
-        dataset = dataset.drop_dims(["time", "input"])
-    dataset.attrs |= _attributes(experiment)
+    import xarray as xr
+
+    many = experiment.keep == "errors"
+    runs = [_compared(model, e, s, many) for e, s in zip(outcomes, experiment.test, strict=True)]
+    tables = [_measured(model, run) for run in runs]
+    found = tables[0]
+    if many:
+        found = {name: np.array([table[name] for table in tables]) for name in found}
+    else:
+        found |= _of_one_run(model, runs[0]) | {"in_training": in_training}
+        if model.speeds:
+            found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
+    scenarios = ("scenario",) * many
+    counts = {name: found.pop(name) for name in model.counts}
+    described = variables(found, *scenarios) | variables(fit_cost(reduced))
+    for name, text in model.counts.items():
+        described[name] = scenarios, counts[name], {"units": "1", "long_name": text}
+    if experiment.keep == "trajectories":
+        if (full := runs[0].reference) is not None:
+            # A reference may be kept for further results.
+            described |= variables({"reference_outputs": full.outputs.copy()}, "time")
+        dataset = trajectory_dataset(model, runs[0].trajectory, described)
+    else:
+        dataset = with_units(xr.Dataset(described, _labels(model)))
+    if many:
+        dataset = dataset.assign_coords(scenario=[scenario.label for scenario in experiment.test])
+    title = f"{experiment.method} on {experiment.model}"
+    own = {"cell": experiment.key, "configuration": experiment.configuration}
+    dataset.attrs |= attributes(title, experiment.kernel, **own)
     return dataset
 
 
-def _compared(model: Model, outcome: Outcome) -> tuple[dict[str, object], dict[str, tuple]]:
-    """Errors and floors, and the reference's histories; nothing where there is none."""
-    run, full, floor = outcome.trajectory, outcome.reference, outcome.floor
-    if full is None:
-        return {}, {}
-    error = run.outputs - full.outputs
-    found: dict[str, object] = {
-        "rms_error": rms(error),
-        "max_error": max_abs(error),
-        "floor_rms_error": np.full(len(model.outputs), np.nan) if floor is None else floor,
-        "signal_range": signal_range(full.outputs),
-        "rms_coordinate_error": rms(run.coordinates - full.coordinates),
-    }
-    if model.speeds:
-        found["rms_speed_error"] = rms(run.speeds - full.speeds)
-    # A reference may be kept for further results.
-    return found, variables({"reference_outputs": full.outputs.copy()}, "time")
+def _compared(
+    model: Model, outcome: Outcome | Failure, scenario: Scenario, finished: bool
+) -> Outcome:
+    """What is measured: histories without numbers of a run that there is not.
 
-
-class FitCost(NamedTuple):
-    """Rank of a fit, and what it has cost; zero and missing of one that has failed."""
-
-    effective_rank: int
-    offline_seconds: float
-    offline_evaluations: int
-
-
-def fit_cost(reduced: ReducedModel | Failure) -> FitCost:
-    """Rank and cost of one fit."""
-    if isinstance(reduced, Failure):
-        return FitCost(0, np.nan, 0)
-    offline = reduced.offline
-    return FitCost(reduced.effective_rank, offline.seconds, offline.evaluations)
+    Parameters
+    ----------
+    finished
+        Whether nothing counts of a run that has not come to its end.
+    """
+    if not isinstance(outcome, Failure):
+        run = outcome.trajectory
+        if run.finished or not finished:
+            return outcome
+        outcome = Failure(run.status, run.message)
+    missing = _missing(model, scenario.maneuver, outcome)
+    return Outcome(missing, missing)
 
 
 def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
     times = maneuver.times
-    return Trajectory(
-        times,
-        maneuver.at(times),
-        np.full((len(times), len(model.coordinates)), np.nan),
-        np.full((len(times), len(model.speeds)), np.nan),
-        np.full((len(times), len(model.outputs)), np.nan),
-        {},
-        np.nan,
-        failure.status,
-        failure.message,
+    coordinates, speeds, outputs = (
+        np.full((len(times), len(names)), np.nan)
+        for names in (model.coordinates, model.speeds, model.outputs)
     )
+    inputs, end = maneuver.at(times), (failure.status, failure.message)
+    return Trajectory(times, inputs, coordinates, speeds, outputs, {}, np.nan, *end)
 
 
-def errors_dataset(
-    model: Model,
-    experiment: Experiment,
-    outcomes: Sequence[Outcome | Failure],
-    cost: FitCost,
-) -> xr.Dataset:
-    """Errors of the outputs, counts and status on the dimension `scenario`.
-
-    A run that has failed has no errors and counts nothing.
-    """
-    import xarray as xr
-
-    ends = [o if isinstance(o, Failure) else o.trajectory for o in outcomes]
-    compared = [None if isinstance(o, Failure) else o for o in outcomes]
-    finished = [o if o and o.trajectory.finished else None for o in compared]
-    missing = (np.full(len(model.outputs), np.nan),) * 4
-    errors = zip(*[_errors(o) if o else missing for o in finished], strict=True)
-    names = ("rms_error", "max_error", "largest_output", "smallest_output")
-    found: dict[str, object] = dict(zip(names, map(np.array, errors), strict=True))
-    found["seconds"] = np.array([o.trajectory.seconds if o else np.nan for o in finished])
-    for name in ("status", "message"):
-        found[name] = np.array([getattr(end, name) for end in ends], dtype=object)
-    remarks = [o.trajectory.remark if o else "" for o in finished]
-    found["remark"] = np.array(remarks, dtype=object)
-    trusted = [o.trajectory.trust if o else None for o in finished]
-    found["trust_indicator"] = np.array([t.indicator if t else np.nan for t in trusted])
-    found["trusted_until"] = np.array([t.until if t else np.inf for t in trusted])
-    described = variables(found, "scenario") | variables(cost._asdict())
-    for name, text in model.counts.items():
-        values = np.array([o.trajectory.counts.get(name, 0) if o else 0 for o in finished])
-        described[name] = ("scenario", values, {"units": "1", "long_name": text})
-    outputs = model.definition.outputs
-    coordinates = {
-        "scenario": [scenario.label for scenario in experiment.test],
-        "output": [quantity.name for quantity in outputs],
-        "output_unit": ("output", [quantity.unit for quantity in outputs]),
+def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
+    """What is known of any run, by names of variables; no errors without a reference."""
+    run, full, trust = outcome.trajectory, outcome.reference, outcome.trajectory.trust
+    outputs, times = run.outputs, run.time
+    found: dict[str, object] = {
+        "largest_output": max_abs(outputs[times <= FIRST_SECONDS]),
+        "smallest_output": outputs[times >= min(LANDED, times[-1])].min(axis=0),
+        **{name: getattr(run, name) for name in ("seconds", "status", "message", "remark")},
+        **{name: run.counts.get(name, 0) for name in model.counts},
+        "trust_indicator": trust.indicator if trust else np.nan,
+        "trusted_until": trust.until if trust else np.inf,
+        "warned": run.status == "untrusted" or bool(run.finished and trust and trust.reason),
     }
-    return with_units(xr.Dataset(described, coordinates, _attributes(experiment)))
+    if full is not None:
+        error = outputs - full.outputs
+        found |= {
+            "rms_error": rms(error),
+            "max_error": max_abs(error),
+            "signal_range": signal_range(full.outputs),
+            "rms_coordinate_error": rms(run.coordinates - full.coordinates),
+        }
+        if model.speeds:
+            found["rms_speed_error"] = rms(run.speeds - full.speeds)
+    return found
 
 
-def _errors(outcome: Outcome) -> tuple[np.ndarray, ...]:
-    """RMS and largest errors (outputs,), largest magnitudes of the first seconds, least values."""
-    assert outcome.reference is not None
-    outputs = outcome.trajectory.outputs
-    error = outputs - outcome.reference.outputs
-    times = outcome.trajectory.time
-    least = outputs[times >= min(LANDED, times[-1])].min(axis=0)
-    return rms(error), max_abs(error), max_abs(outputs[times <= FIRST_SECONDS]), least
+def _of_one_run(model: Model, outcome: Outcome) -> dict[str, object]:
+    """What takes time to find, and is not known of the many runs of a protocol."""
+    run, found = outcome.trajectory, dict[str, object]()
+    if outcome.reference is not None:
+        none = np.full(len(model.outputs), np.nan)
+        found["floor_rms_error"] = none if outcome.floor is None else outcome.floor
+    if model.kind == "ae":
+        residuals = model.along("residual", run.coordinates, run.inputs)
+        found["largest_residual"] = float(np.abs(residuals).max())
+    return found
 
 
-def _attributes(experiment: Experiment) -> dict[str, object]:
-    title = f"{experiment.method} on {experiment.model}"
-    own = {"cell": experiment.key, "configuration": experiment.configuration}
-    return attributes(title, experiment.kernel, **own)
+def fit_cost(reduced: ReducedModel | Failure) -> dict[str, object]:
+    """Rank of a fit, and what it has cost; zero and missing of one that has failed."""
+    failed = isinstance(reduced, Failure)
+    return {
+        "effective_rank": 0 if failed else reduced.effective_rank,
+        "offline_seconds": np.nan if failed else reduced.offline.seconds,
+        "offline_evaluations": 0 if failed else reduced.offline.evaluations,
+    }
+
+
+@lru_cache(maxsize=16)
+def _labels(model: Model) -> xr.Coordinates:
+    """Names and units of all quantities of a model."""
+    nothing = _missing(model, component("maneuver", model.definition.maneuver), Failure("", ""))
+    return trajectory_dataset(model, nothing).drop_dims(["time", "input"]).coords

@@ -11,17 +11,15 @@ from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.errors import InputError
-from vehiclemor.progress import telling
-from vehiclemor.study.cluster import LOCAL, reached
-from vehiclemor.study.combined import combined_path, stored
+from vehiclemor.progress import tell, telling
+from vehiclemor.study.cluster import reached
 from vehiclemor.study.plans.grid import Grid, expand
-from vehiclemor.study.plans.grid_results import cells_digest, combined
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
+from vehiclemor.study.plans.results import cells_digest, combined
 from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
-from vehiclemor.study.progress import tell
-from vehiclemor.study.store import cell_path
+from vehiclemor.study.store import cell_path, combined_path, stored
 from vehiclemor.study.workers import Workers
 
 if TYPE_CHECKING:
@@ -47,7 +45,7 @@ def run_studies(
     jobs
         Number of processes.
     scheduler
-        Address of a dask scheduler whose workers compute, or `local` for one that is started here.
+        Address of a dask scheduler whose workers compute.
     seed
         Of the drawn test runs of protocols, for an audit; by default that of their files.
 
@@ -59,18 +57,18 @@ def run_studies(
     count("jobs", jobs, most=MOST_JOBS)
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
-    if jobs > 1 and scheduler not in ("", LOCAL):
-        raise InputError("jobs: a scheduler at an address has its own workers")
+    if jobs > 1 and scheduler:
+        raise InputError("jobs: a scheduler has its own workers")
     files = studies_and_files(study)
     protocols = [
-        load_protocol(str(path), seed if found.drawn else None)
-        for path, found in files.values()
+        load_protocol(str(path), seed if found.drawn else None, name)
+        for name, (path, found) in files.items()
         if found.bounds
     ]
     if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
         raise InputError(f"seed: {study} draws no test runs")
     grids = [_expanded(name, found) for name, (_, found) in files.items() if not found.bounds]
-    with reached(scheduler, jobs) if scheduler else nullcontext() as elsewhere:
+    with reached(scheduler) if scheduler else nullcontext() as elsewhere:
         results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
         for grid in grids:
             workers = Workers(grid.name, folder, jobs, elsewhere, set(grid.unique))

@@ -93,6 +93,19 @@ class Scenario:
         """Equal for scenarios that are one run of the model, whatever their names."""
         return input_hash(self.maneuver), self.start, self.speed, self.parameters
 
+    @classmethod
+    def of(
+        cls,
+        maneuver: str,
+        factors: Sequence[float],
+        start: str,
+        speed: float | None = None,
+        parameters: Overrides = (),
+    ) -> "Scenario":
+        """The run of a registered maneuver with two factors: of frequency, of amplitude."""
+        chosen: Maneuver = component("maneuver", maneuver)
+        return cls(chosen.perturbed(*factors), start, speed, parameters)
+
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"maneuver": _sent(self.maneuver)}
 

@@ -13,13 +13,11 @@ import numpy as np
 from vehiclemor.arguments import count
 from vehiclemor.errors import FileError
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.combined import result_path
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.protocol_run import validation_experiments
 from vehiclemor.study.plans.study_file import MOST_SEED
-from vehiclemor.study.store import cell_end
+from vehiclemor.study.store import read_cell, result_path
 
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
@@ -91,14 +89,16 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
     found: dict[str, StudyStatus] = {}
-    for study_name, (path, definition) in studies_and_files(study).items():
+    for name, (path, definition) in studies_and_files(study).items():
         later = LATER if definition.bounds else ""
         if definition.bounds:
             protocol = load_protocol(str(path), seed if definition.drawn else None)
-            name, experiments = protocol.study, validation_experiments(protocol)
-            cells = {e.key: e.method for e in experiments}
+            name = protocol.study  # noqa: PLW2901  (an audit has a name of its own)
+            validation = protocol.sets["validation"]
+            groups = [e.experiments(protocol.model, validation) for e in protocol.entries]
+            cells = {e.key: e.method for group in groups for e in group}
         else:
-            name, cells = study_name, _methods(expand(study_name, definition))
+            cells = _methods(expand(name, definition))
         result = result_path(folder, name, content_hash(definition))
         found[name] = _status(cells, result, folder, later)
     return found
@@ -121,19 +121,19 @@ def _status(
     missing: Counter[str] = Counter()
     for key, method in cells.items():
         try:
-            end, finished = cell_end(folder, key)
+            cell = read_cell(folder, key)
         except FileError:
             # Missing, or set aside by the next run.
             missing[method] += 1
             continue
-        for (name, message), runs in end.runs.items():
+        for (name, message), runs in cell.ends.items():
             alike = name, NUMBER.sub("#", message)
             status.ends[examples.setdefault(alike, (name, message))] += runs
-        if finished:
-            status.done += 1
-            seconds[method].append(end.seconds)
-        else:
+        if cell.broken:
             missing[method] += 1
+        else:
+            status.done += 1
+            seconds[method].append(cell.seconds)
     status.seconds_left = _seconds_left(missing, seconds)
     return status
 

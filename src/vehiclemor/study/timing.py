@@ -14,7 +14,6 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,21 +21,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.codegen.cache import compiler_identity
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.progress import tell
 from vehiclemor.reduction.interface import ReducedModel
-from vehiclemor.registry import component
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, timed
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.study.combined import stored
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
-from vehiclemor.study.experiment import Experiment, make_experiment
+from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure, attempt
-from vehiclemor.study.method_settings import complete_settings
-from vehiclemor.study.progress import tell
 from vehiclemor.study.provenance import attributes, machine
-from vehiclemor.study.scenario import Scenario, start_of
-from vehiclemor.study.variables import variables
+from vehiclemor.study.result import variables
+from vehiclemor.study.scenario import start_of
+from vehiclemor.study.store import stored
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,55 +57,31 @@ SPEED_UPS = {
 QUANTILES = {"seconds_median": 0.5, "seconds_lower": 0.25, "seconds_upper": 0.75}
 
 
-@dataclass(frozen=True)
-class TimingCase:
-    """One row of a cost table: a method with settings, run on the nominal maneuver.
+def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path) -> xr.Dataset:
+    """Stored timing of cases, measured first if it is missing or out of date.
 
-    Attributes
+    Parameters
     ----------
-    id
-        By which the row is known; `baseline` is the paper's kind of full-order run and `strongest`
-        the best full-order solver, for every model.
-    label
-        As it is printed.
-    method, preset, settings
-        Registered name, one of its presets, and settings that differ from that.
-    """
-
-    id: str
-    label: str
-    method: str
-    preset: str = "recommended"
-    settings: Mapping[str, float | int | str | bool] = field(default_factory=dict)
-
-
-def timed_model(model: Model, cases: Sequence[TimingCase], folder: Path, name: str) -> xr.Dataset:
-    """Stored timing of cases on the model's nominal maneuver, from every start.
-
-    Measured first if the file `studies/<name>.nc` is missing or out of date.
+    experiments
+        Initial condition -> name of a case -> experiment from there.
 
     Returns
     -------
     xarray.Dataset
         As of `timed_cases`, on the dimension `start` too.
     """
-    maneuver: Maneuver = component("maneuver", component("model", model.name).maneuver)
-    content = [
-        [start, case.label, identifier, experiment.key]
-        for start in model.starts
-        for case, (identifier, experiment) in zip(
-            cases, case_experiments(model, cases, maneuver, start).items(), strict=True
-        )
-    ]
 
     def every_start() -> xr.Dataset:
         import xarray as xr
 
-        parts = [timed_cases(model, cases, maneuver, start) for start in model.starts]
+        parts = [timed_cases(cases).assign_coords(start=s) for s, cases in experiments.items()]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    path = folder / "studies" / f"{name}.nc"
-    return stored_timing(path, [content, CASE_ROUNDS], every_start)
+    keys = {
+        start: {case: experiment.key for case, experiment in cases.items()}
+        for start, cases in experiments.items()
+    }
+    return stored_timing(path, [keys, CASE_ROUNDS], every_start)
 
 
 def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
@@ -119,62 +91,44 @@ def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -
     return stored(path, "timing", key, make)
 
 
-def case_experiments(
-    model: Model, cases: Sequence[TimingCase], maneuver: Maneuver, start: str
-) -> dict[str, Experiment]:
-    """Id of a case -> its experiment, trained on the unperturbed run."""
-    nominal, test = Scenario(maneuver.perturbed(), start), Scenario(maneuver, start)
-    found: dict[str, Experiment] = {}
-    for case in cases:
-        settings = complete_settings(model, case.method, case.settings, case.preset)
-        found[case.id] = make_experiment(
-            model, case.method, settings, (nominal,), (test,), "metrics"
-        )
-    return found
+def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None) -> xr.Dataset:
+    """Time experiments on the one run that all are tested on.
 
-
-def timed_cases(
-    model: Model,
-    cases: Sequence[TimingCase],
-    maneuver: Maneuver,
-    start: str,
-    rounds: int | None = None,
-) -> xr.Dataset:
-    """Time the cases on one run of the model.
+    The case `baseline` is the paper's kind of full-order run and `strongest` the best full-order
+    solver, for every model.
 
     Returns
     -------
     xarray.Dataset
-        On the dimension `case` (ids, with `label`): median and quartiles of the seconds of a run,
-        seconds for a time point and in the compiled loop alone, speed-ups against the cases
-        `baseline` and `strongest`, offline seconds, counts, rank, status; errors on `output` too.
+        On the dimension `case`: median and quartiles of the seconds of a run, seconds for a time
+        point and in the compiled loop alone, speed-ups against the two full orders, offline
+        seconds, counts, rank, status; errors on `output` too.
     """
     import xarray as xr
 
-    experiments = case_experiments(model, cases, maneuver, start)
-    kept = ["effective_rank", "offline_evaluations", "rms_error", "status", *model.counts]
+    first = next(iter(experiments.values()))
+    samples, start = first.test[0].maneuver.samples, first.test[0].start
+    kept = ["effective_rank", "offline_evaluations", "rms_error", "status"]
+    kept += model_of(first).counts
     results = [evaluate(experiment)[kept] for experiment in experiments.values()]
-    dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop")
+    dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop_conflicts")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
-    every = rounds or CASE_ROUNDS
-    seconds, offline = _rounds(list(experiments.values()), (every, every), f"from {start}")
-    points = f"{maneuver.samples} time points"
-    times = _dataset(experiments, seconds, offline, points).isel(scenario=0, drop=True)
-    dataset = dataset.merge(times)
+    every, what = rounds or CASE_ROUNDS, f"from {start}"
+    seconds, offline = _rounds(list(experiments.values()), (every, every), what)
+    times = _dataset(experiments, seconds, offline, f"{samples} time points")
+    dataset = dataset.merge(times.isel(scenario=0, drop=True))
     tolerances = [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()]
     columns: dict[str, object] = {
-        "seconds_per_sample": times["seconds"].values / maneuver.samples,
+        "seconds_per_sample": dataset["seconds"].values / samples,
         "tolerance": tolerances,
     }
     # Round by round, so that a burst of other load on the machine hits both alike.
     own = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
-    for name, (against, what) in SPEED_UPS.items():
+    for name, (against, part) in SPEED_UPS.items():
         if against in experiments:
-            baseline = own[:, [list(experiments).index(against)], what]
-            columns[name] = np.median(baseline / own[:, :, what], axis=0)
-    labels = ("case", [case.label for case in cases])
-    dataset = dataset.assign(variables(columns, "case")).assign_coords(start=start, label=labels)
-    return dataset.assign_attrs(times.attrs)
+            baseline = own[:, [list(experiments).index(against)], part]
+            columns[name] = np.median(baseline / own[:, :, part], axis=0)
+    return dataset.assign(variables(columns, "case")).assign_attrs(times.attrs)
 
 
 def timed_tests(

@@ -18,13 +18,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from vehiclemor.codegen.cache import cache_folder
-from vehiclemor.errors import FileError, MachineError, machine_reason
-from vehiclemor.study.evaluate import evaluate, layout_of
+from vehiclemor.errors import MachineError, machine_reason
+from vehiclemor.progress import tell
+from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.progress import tell
 from vehiclemor.study.store import (
-    cell_end,
     finished_cells,
+    is_stored,
     prepare_folder,
     read_cell,
     write_cell,
@@ -93,9 +93,7 @@ class Workers:
         """
         wanted = {e.key: e for group in groups for e in group}
         self.asked |= wanted.keys()
-        self.finished |= finished_cells(
-            self.folder, wanted.keys() - self.finished, lambda key: layout_of(wanted[key])
-        )
+        self.finished |= finished_cells(self.folder, wanted.keys() - self.finished)
         if self._missing(groups):
             # A folder that can't be is told before anything is announced.
             prepare_folder(self.folder)
@@ -118,7 +116,7 @@ class Workers:
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        return read_cell(self.folder, experiment.key)
+        return read_cell(self.folder, experiment.key).dataset()
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -176,14 +174,6 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
             write_cell(dataset, folder, experiment.key, time.perf_counter() - began)
         finished.append(experiment.key)
     return Done(finished, fault, time.perf_counter() - first)
-
-
-def is_stored(folder: Path, key: str) -> bool:
-    """Whether a finished result is stored, by its header."""
-    try:
-        return cell_end(folder, key)[1]
-    except (FileError, MachineError):
-        return False
 
 
 def in_batches(

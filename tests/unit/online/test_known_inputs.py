@@ -9,8 +9,7 @@ from scipy.signal import lfilter
 import vehiclemor as vm
 from vehiclemor.errors import InputError
 from vehiclemor.simulation.input_polynomials import extent_of
-from vehiclemor.study.plans.drawn_runs import drawn
-from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol import drawn, load_protocol
 
 CAR = "independent_suspension_vehicle"
 # Steering (rad) that the 14-DOF vehicle allows, and about the largest that its model has learnt.

@@ -18,7 +18,7 @@ from vehiclemor.report.shown import (
 )
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
-from vehiclemor.study.method_settings import complete_settings
+from vehiclemor.study.experiment import complete_settings
 from vehiclemor.study.plans.loading import load_studies
 
 PLAIN = standard_problems.DEFINITION

@@ -5,7 +5,7 @@ import time
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
-from vehiclemor.study.variables import variables
+from vehiclemor.study.result import variables
 
 
 def test_the_clock_does_not_run_while_others_have_the_processor():

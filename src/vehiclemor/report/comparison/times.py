@@ -8,9 +8,8 @@ from vehiclemor.registry import component
 from vehiclemor.report.comparison.rows import Row, claim_row, number_row, undecided
 from vehiclemor.report.criteria.finding import IN_WORDS, PRINTED, Finding
 from vehiclemor.report.published import Claim, Number, rms_numbers
-from vehiclemor.report.shown import timing_cases
+from vehiclemor.report.shown import Case, timing_cases
 from vehiclemor.report.verdicts import MET, NOT_COMPARABLE, PUBLISHED_START, scatter
-from vehiclemor.study.timing import TimingCase
 
 # Preset -> what its rows are called.
 PRESETS = {"recommended": "default", "literal": "literal"}
@@ -48,7 +47,7 @@ def time_rows(number: Number, costs: pd.DataFrame) -> list[Row]:
     return rows
 
 
-def _cases(model: str, states: int) -> list[TimingCase]:
+def _cases(model: str, states: int) -> list[Case]:
     """Timing cases of control-period POD with so many states and nothing else set."""
     cases = timing_cases(component("model", model))
     return [c for c in cases if c.method == "pod" and dict(c.settings) == {"rank": states}]

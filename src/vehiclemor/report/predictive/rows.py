@@ -17,7 +17,7 @@ from vehiclemor.report.predictive.targets import (
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.plans.protocol_results import judged_part, judged_set
+from vehiclemor.study.plans.results import judged_part, judged_set
 from vehiclemor.study.plans.study_file import StudyFile
 
 OUTSIDE = ("outside", "drawn_outside")
@@ -78,7 +78,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         "kind": "method",
         "model": protocol.model,
         "label": label,
-        "contestant": str(part["contestant"].item()),
+        "contestant": str(part["series"].item()),
         "role": str(part["role"].item()),
         "method": str(part["method"].item()),
         "rank": int(part["effective_rank"]),

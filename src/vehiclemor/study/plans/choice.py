@@ -1,4 +1,9 @@
-"""Scores against bounds, and the choice of settings from validation results alone."""
+"""Scores against bounds, and the choice of settings from validation results alone.
+
+Drawn runs on which the full order itself is sensitive are found by rule and reported apart: where
+two tolerances of the full order disagree by more than a bound, where the car spins, tips over or
+has a wheel in the air, no error against one of them tells anything of a reduced model.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.protocol import Entry
+from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
+from vehiclemor.study.plans.protocol import Entry, Protocol, Scenarios
 from vehiclemor.study.plans.study_file import Bound
 
 if TYPE_CHECKING:
@@ -64,6 +70,11 @@ class Row:
     def label(self) -> str:
         """Label of the row."""
         return self.entry.row_label(self.candidate)
+
+    @property
+    def settings(self) -> Settings:
+        """Those of the candidate."""
+        return self.entry.candidates[self.candidate]
 
 
 def validation_of(dataset: xr.Dataset, bounds: Mapping[str, Bound], count: str) -> Validation:
@@ -125,9 +136,40 @@ def choose(results: Sequence[Validation]) -> int:
     """
     most = max(result.stable for result in results)
     stable = [i for i, result in enumerate(results) if result.stable == most]
-    fitting = [i for i in stable if results[i].score <= MARGIN]
-    if fitting:
-        return min(fitting, key=lambda i: (results[i].evaluations, results[i].score, i))
     best = min(results[i].score for i in stable)
+    fitting = [i for i in stable if results[i].score <= MARGIN]
     tied = [i for i in stable if results[i].score <= (1.0 + TIE) * best]
-    return min(tied, key=lambda i: (results[i].evaluations, results[i].score, i))
+    return min(fitting or tied, key=lambda i: (results[i].evaluations, results[i].score, i))
+
+
+def second_run(protocol: Protocol, scenarios: Scenarios) -> Experiment:
+    """The full order at its default tolerance, a thousand times that of the references."""
+    settings = complete_settings(protocol.model, "full_order")
+    return make_experiment(protocol.model, "full_order", settings, (), scenarios, "errors")
+
+
+def reasons(protocol: Protocol, second: xr.Dataset) -> list[str]:
+    """Why each scenario of the second run is reported apart; empty if it is not."""
+    bounds, loads = protocol.definition.bounds, protocol.model.definition.loads
+    largest = protocol.definition.sensitive
+    parts = [second.isel(scenario=index) for index in range(second.sizes["scenario"])]
+    return [
+        _reason(part, float(score), largest, loads)
+        for part, score in zip(parts, scores(second, bounds), strict=True)
+    ]
+
+
+def _reason(
+    part: xr.Dataset, score: float, largest: Mapping[str, float], loads: Sequence[str]
+) -> str:
+    if not np.isfinite(score):
+        return f"full order: {part['message'].item()}"
+    if score > 1.0:
+        return f"two tolerances of the full order differ by {score:.2g} times a bound"
+    for output, limit in largest.items():
+        value = float(part["largest_output"].sel(output=output))
+        if value > limit:
+            return f"{output} of the full order reaches {value:.3g}, beyond {limit:g}"
+    # A dropped car has landed before.
+    lifted = [o for o in loads if float(part["smallest_output"].sel(output=o)) <= 0.0]
+    return f"without load: {', '.join(lifted)}" if lifted else ""

@@ -1,13 +1,19 @@
 """Study files by name or path: the study itself, or the members of a collection."""
 
 import hashlib
+import json
 from pathlib import Path
+from typing import Any
 
 from vehiclemor.errors import FileError
+from vehiclemor.files import write_text
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.toml_files import FileSchema, read_toml
+
+# Entries of the longest lists of a study that is written stand on lines of their own.
+LINE = "\n  "
 
 
 def study_path(study: str) -> Path:
@@ -52,3 +58,20 @@ def content_hash(definition: FileSchema) -> str:
     """Short hash of what a file says."""
     text = definition.model_dump_json(exclude_defaults=True)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def write_study(definition: StudyFile, path: Path) -> Path:
+    """Write what a study says beyond the defaults as a TOML file."""
+    content = definition.model_dump(exclude_defaults=True).items()
+    lines = [f"{name} = {_toml(value, ',' + LINE)}" for name, value in content]
+    return write_text(path, "\n".join([*lines, ""]))
+
+
+def _toml(value: Any, between: str = ", ") -> str:
+    if isinstance(value, dict):
+        keys = [key if key.isidentifier() else json.dumps(key) for key in value]
+        pairs = zip(keys, map(_toml, value.values()), strict=True)
+        return f"{{ {', '.join(f'{key} = {text}' for key, text in pairs)} }}"
+    if isinstance(value, list):
+        return f"[{between.join(map(_toml, value))}]"
+    return json.dumps(value, ensure_ascii=False)

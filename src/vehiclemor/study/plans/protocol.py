@@ -1,18 +1,24 @@
-"""Studies with bounds: training, validation and test scenarios of a model, and who competes."""
+"""Studies with bounds: training, validation and test scenarios of a model, and who competes.
+
+Drawn test runs follow from the file alone: its seed, its version and its boxes.  Every machine and
+every commit gets the same runs, whatever methods compete on them.
+"""
 
 import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
 
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
-from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.experiment import Experiment, make_experiment
-from vehiclemor.study.method_settings import Settings, complete_settings
+from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import study_path
 from vehiclemor.study.plans.study_file import (
     DRAWN,
@@ -29,6 +35,15 @@ from vehiclemor.toml_files import read_toml
 FULL_ORDER, CONTENDER = "full order", "contender"
 # Of the names of the package's own; the model follows.
 PREFIX = "predictive-"
+# Decimals of drawn factors and speeds: what a table prints is what was run.
+DECIMALS = 3
+# Draws tried for each run before a box counts as too small.
+TRIES = 100
+# Sets that models have learned from or were chosen by.
+LEARNED = ("training", "validation")
+
+Scenarios = tuple[Scenario, ...]
+Part = TypeVar("Part", Group, Box)
 
 
 @dataclass(frozen=True)
@@ -39,19 +54,22 @@ class Entry:
     method: str
     role: str
     candidates: tuple[Settings, ...]
-    training: tuple[Scenario, ...]
+    training: Scenarios
 
-    def experiment(self, model: Model, candidate: int, test: tuple[Scenario, ...]) -> Experiment:
+    def experiment(self, model: Model, candidate: int, test: Scenarios) -> Experiment:
         """A candidate, tested on some scenarios."""
         settings = self.candidates[candidate]
         return make_experiment(model, self.method, settings, self.training, test, "errors")
 
+    def experiments(self, model: Model, test: Scenarios) -> list[Experiment]:
+        """All candidates, tested on some scenarios."""
+        return [self.experiment(model, number, test) for number in range(len(self.candidates))]
+
     @property
     def row_labels(self) -> list[str]:
         """Labels of its rows."""
-        if self.role != FULL_ORDER:
-            return [self.label]
-        return [self.row_label(candidate) for candidate in range(len(self.candidates))]
+        numbers = range(len(self.candidates) if self.role == FULL_ORDER else 1)
+        return [self.row_label(number) for number in numbers]
 
     def row_label(self, candidate: int) -> str:
         """Label of a candidate's row; of a full-order method every candidate has its own."""
@@ -67,24 +85,26 @@ class Protocol:
 
     Attributes
     ----------
+    name
+        Of its results, but for audits.
     sets
         Name of `SETS` -> scenarios.
     seed
         Of the drawn runs: the file's, or another one for an audit.
     """
 
+    name: str
     path: Path
     definition: StudyFile
     model: Model
-    sets: dict[str, tuple[Scenario, ...]]
+    sets: dict[str, Scenarios]
     entries: tuple[Entry, ...]
     seed: int
 
     @property
     def study(self) -> str:
         """Name of its results; an audit's are apart."""
-        audit = "" if self.seed == self.definition.seed else f"-seed-{self.seed}"
-        return f"{self.path.stem}{audit}"
+        return self.name + f"-seed-{self.seed}" * (self.seed != self.definition.seed)
 
     @property
     def test_set(self) -> str:
@@ -98,13 +118,15 @@ def protocol_names() -> dict[str, str]:
     return {name.removeprefix(PREFIX): name for name in known}
 
 
-def load_protocol(study: str, seed: int | None = None) -> Protocol:
+def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protocol:
     """A study with bounds, by name or TOML file.
 
     Parameters
     ----------
     seed
         Of the drawn runs, for an audit; by default that of the file.
+    name
+        Of its results, by default that of the file.
 
     Raises
     ------
@@ -115,110 +137,93 @@ def load_protocol(study: str, seed: int | None = None) -> Protocol:
     definition = read_toml(path, StudyFile)
     if not definition.bounds:
         raise FileError(f"{path}: has no bounds")
+    seed = definition.seed if seed is None else seed
     try:
-        return _resolved(path, definition, definition.seed if seed is None else seed)
+        return _resolved(name or path.stem, path, definition, seed)
     except PlugInError:
         raise
     except (GeometryError, InputError) as error:
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(path: Path, definition: StudyFile, seed: int) -> Protocol:
-    model = build(definition.model)
+def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protocol:
+    model, straight = build(definition.model), definition.straight
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
-    if definition.straight:
-        outputs.append(definition.straight.output)
-    for output in outputs:
+    for output in [*outputs, straight.output] if straight else outputs:
         choice(f"output of {model.name}", output, model.outputs)
-    sets = {key: _scenarios(model, key, definition) for key in SETS}
+    sets: dict[str, Scenarios] = {}
+    for key in SETS:
+        groups = enumerate(getattr(definition, key), start=1)
+        parts = [_checked(model, f"{key}, group {n}", _of_group, group) for n, group in groups]
+        sets[key] = tuple(itertools.chain(*parts))
     _check_apart(sets)
-    _check_boxes(model, definition)
-    entries = tuple(_entry(model, e, sets) for e in definition.methods)
+    draws = {key: draw for key in DRAWN if (draw := getattr(definition, key))}
+    for key, draw in draws.items():
+        for number, box in enumerate(draw.boxes, start=1):
+            _checked(model, f"{key}, box {number}", _corners, box)
+    entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
     labels = [label for entry in entries for label in entry.row_labels]
     for label in labels:
         if labels.count(label) > 1:
             raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
-    if definition.straight:
-        _check_driven(definition, definition.straight.maneuver)
+    if straight:
+        boxes = [box for draw in draws.values() for box in draw.boxes]
+        driven = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
+        choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
         choice("row that a target is against", target.against, known)
-    return Protocol(path, definition, model, sets, entries, seed)
+    return Protocol(name, path, definition, model, sets, entries, seed)
 
 
-def _scenarios(model: Model, key: str, definition: StudyFile) -> tuple[Scenario, ...]:
-    """Scenarios of one set, checked against the model."""
-    found: list[Scenario] = []
-    for number, group in enumerate(getattr(definition, key), start=1):
-        try:
-            found += _of_group(model, group)
-        except InputError as error:
-            raise type(error)(f"{key}, group {number}: {error}") from None
-    return tuple(found)
+def _checked(
+    model: Model, where: str, make: Callable[[Model, Part], list[Scenario]], part: Part
+) -> list[Scenario]:
+    """Scenarios of a part of a file, in which the model can be run."""
+    try:
+        scenarios = make(model, part)
+        for scenario in scenarios:
+            check(model, scenario)
+    except InputError as error:
+        raise type(error)(f"{where}: {error}") from None
+    return scenarios
 
 
 def _of_group(model: Model, group: Group) -> list[Scenario]:
     """Every point of a group from every start."""
-    maneuver: Maneuver = component("maneuver", group.maneuver)
-    own = own_speed(model)
-    speeds = group.speed or [own]
-    products = itertools.product(group.frequency or [1.0], group.amplitude or [1.0], speeds)
-    found: list[Scenario] = []
-    for point in group.points or products:
-        frequency, amplitude, speed = (*point, own)[:3]
-        perturbed = maneuver.perturbed(frequency or 0.0, amplitude or 0.0)
-        for start in group.start or model.starts[:1]:
-            scenario = Scenario(perturbed, start, None if speed is None else float(speed))
-            check(model, scenario)
-            found.append(scenario)
-    return found
+    lists = group.frequency or [1.0], group.amplitude or [1.0]
+    # A point may leave the speed to the model.
+    speeds = [[speed] for speed in group.speed] or [[]]
+    products = itertools.product(*lists, speeds)
+    points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
+    return [
+        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else own_speed(model))
+        for point in points
+        for start in group.start or model.starts[:1]
+    ]
 
 
-def _check_apart(sets: dict[str, tuple[Scenario, ...]]) -> None:
+def _corners(model: Model, box: Box) -> list[Scenario]:
+    """Scenarios of the corners of a box, and one from every start."""
+    starts = box.start or list(model.starts[:1])
+    factors = list(itertools.product(box.frequency, box.amplitude))
+    corners = itertools.product(factors, starts[:1], box.speed or [None])
+    others = itertools.product(factors[:1], starts[1:], (box.speed or [None])[:1])
+    return [Scenario.of(box.maneuver, *corner) for corner in (*corners, *others)]
+
+
+def _check_apart(sets: dict[str, Scenarios]) -> None:
     """No run stands twice: what a method has learned from or was chosen by can't test it."""
     seen: dict[tuple, str] = {}
-    for key in SETS:
-        for scenario in sets[key]:
+    for key, scenarios in sets.items():
+        for scenario in scenarios:
             run = scenario.run_key
             if run in seen:
                 raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
             seen[run] = key
 
 
-def _check_boxes(model: Model, definition: StudyFile) -> None:
-    """Raise `InputError` if a corner of a box is no scenario of the model."""
-    for purpose in DRAWN:
-        draw: Draw | None = getattr(definition, purpose)
-        for number, box in enumerate(draw.boxes if draw else (), start=1):
-            try:
-                _check_corners(model, box)
-            except InputError as error:
-                raise type(error)(f"{purpose}, box {number}: {error}") from None
-
-
-def _check_driven(definition: StudyFile, maneuver: str) -> None:
-    """Raise `InputError` if no test run is of a maneuver."""
-    boxes = [box for name in DRAWN if (d := getattr(definition, name)) for box in d.boxes]
-    known = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
-    choice("maneuver of a test, in straight", maneuver, sorted(known))
-
-
-def _check_corners(model: Model, box: Box) -> None:
-    maneuver: Maneuver = component("maneuver", box.maneuver)
-    for start in box.start:
-        choice(f"start of {model.name}", start, model.starts)
-    for frequency in box.frequency:
-        for speed in box.speed or [None]:
-            for amplitude in box.amplitude:
-                corner = maneuver.perturbed(frequency, amplitude)
-                check(model, Scenario(corner, (box.start or model.starts)[0], speed))
-
-
-def _entry(
-    model: Model,
-    entry: MethodEntry,
-    sets: dict[str, tuple[Scenario, ...]],
-) -> Entry:
+def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
     method: Method = component("method", entry.method)
     label = entry.label or entry.method
     where = f"method {label!r}"
@@ -226,16 +231,76 @@ def _entry(
     for given in entry.candidates:
         own: dict[str, object] = dict(given)
         preset = str(own.pop("preset", entry.preset))
-        settings = {**entry.settings, **own}
-        complete = complete_settings(model, entry.method, settings, preset)
+        complete = complete_settings(model, entry.method, {**entry.settings, **own}, preset)
         # Of a method that refuses the model all candidates are empty.
         if complete in candidates and method.accepts(model)[0]:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)
-    known = {scenario.maneuver.name for scenario in sets["training"]}
     learned = [entry.training] if isinstance(entry.training, str) else entry.training
     learned = [name for name in learned if name]
+    known = {scenario.maneuver.name for scenario in training}
     for name in learned:
         choice(f"maneuver in the training of {where}", name, known)
-    training = tuple(s for s in sets["training"] if not learned or s.maneuver.name in learned)
-    return Entry(label, entry.method, entry.role, tuple(candidates), training)
+    runs = tuple(run for run in training if not learned or run.maneuver.name in learned)
+    return Entry(label, entry.method, entry.role, tuple(candidates), runs)
+
+
+def drawn_sets(protocol: Protocol) -> dict[str, Scenarios]:
+    """Drawn sets of a protocol by name; none of their runs is one of training or validation.
+
+    Raises
+    ------
+    InputError
+        If the boxes hold too few different runs.
+    """
+    # What is listed for other ends may be drawn again: else a list could strike runs from a draw.
+    known = [scenario for name in LEARNED for scenario in protocol.sets[name]]
+    found: dict[str, Scenarios] = {}
+    for number, name in enumerate(DRAWN):
+        if draw := getattr(protocol.definition, name):
+            seeds = protocol.seed, protocol.definition.version, number
+            found[name] = drawn(protocol.model, draw, seeds, known)
+            known += found[name]
+    return found
+
+
+def drawn(
+    model: Model, draw: Draw, seeds: Sequence[int], known: Sequence[Scenario] = ()
+) -> Scenarios:
+    """Different scenarios of a draw, none of them known; the same wherever the seeds are the same.
+
+    Raises
+    ------
+    InputError
+        If the boxes hold too few different runs.
+    """
+    # Of the generator only `random` is used: NumPy may change how the other functions draw.
+    generator = np.random.Generator(np.random.PCG64(seeds))
+    shares = np.cumsum([box.share for box in draw.boxes])
+    seen, found = {scenario.run_key for scenario in known}, list[Scenario]()
+    for _ in range(TRIES * draw.runs):
+        place = generator.random() * shares[-1]
+        box = draw.boxes[int(np.searchsorted(shares, place, side="right"))]
+        scenario = _one(model, box, generator)
+        if scenario.run_key not in seen:
+            seen.add(scenario.run_key)
+            found.append(scenario)
+        if len(found) == draw.runs:
+            return tuple(found)
+    raise InputError(f"the boxes hold fewer than {draw.runs} different runs")
+
+
+def _one(model: Model, box: Box, generator: np.random.Generator) -> Scenario:
+    """One point of a box."""
+
+    def within(limits: Sequence[float]) -> float:
+        low, high = limits
+        return round(low + (high - low) * generator.random(), DECIMALS)
+
+    frequency, amplitude = within(box.frequency), within(box.amplitude)
+    if generator.random() < 0.5 and box.both_signs:
+        amplitude = -amplitude
+    speed = own_speed(model) if box.speed is None else within(box.speed)
+    starts = box.start or model.starts[:1]
+    start = starts[int(generator.random() * len(starts))]
+    return Scenario.of(box.maneuver, (frequency, amplitude), start, speed)

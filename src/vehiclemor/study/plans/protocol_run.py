@@ -17,18 +17,28 @@ from vehiclemor.errors import FileError, InputError
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
-from vehiclemor.study.combined import combined_path, stored
-from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.plans.choice import MARGIN_OF_CHOSEN, TIE_OF_TIMES, Row, choose, validation_of
-from vehiclemor.study.plans.drawn_runs import drawn_sets
+from vehiclemor.study.plans.choice import (
+    MARGIN_OF_CHOSEN,
+    TIE_OF_TIMES,
+    Row,
+    choose,
+    reasons,
+    second_run,
+    validation_of,
+)
 from vehiclemor.study.plans.loading import content_hash
-from vehiclemor.study.plans.protocol import CONTENDER, FULL_ORDER, Entry, Protocol
-from vehiclemor.study.plans.protocol_results import protocol_dataset
-from vehiclemor.study.plans.sensitive import reasons, second_run
+from vehiclemor.study.plans.protocol import (
+    CONTENDER,
+    FULL_ORDER,
+    Entry,
+    Protocol,
+    Scenarios,
+    drawn_sets,
+)
+from vehiclemor.study.plans.results import judged_set, protocol_dataset
 from vehiclemor.study.plans.study_file import DRAWN, StudyFile
 from vehiclemor.study.provenance import layout_digest
-from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import cell_path
+from vehiclemor.study.store import cell_path, combined_path, stored
 from vehiclemor.study.workers import Engine, Workers
 
 if TYPE_CHECKING:
@@ -54,16 +64,11 @@ def run_protocol(
         sets |= drawn_sets(protocol)
     except InputError as error:
         raise FileError(f"{protocol.path}: {error}") from None
-    path = combined_path(folder, protocol.study)
-    rows = validate(
-        protocol.model,
-        protocol.definition,
-        protocol.entries,
-        protocol.sets["validation"],
-        workers,
-    )
+    path, model = combined_path(folder, protocol.study), protocol.model
+    validation = protocol.sets["validation"]
+    rows = validate(model, protocol.definition, protocol.entries, validation, workers)
     rows = with_winner(protocol, rows, path)
-    found = test(protocol.model, rows, sets, workers)
+    found = test(model, rows, sets, workers)
     apart = _sensitive(protocol, sets, workers)
     if "drawn" in sets and all(apart["drawn"]):
         raise FileError(
@@ -76,7 +81,7 @@ def run_protocol(
         path,
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
-        lambda: protocol_dataset(protocol, rows, found, (timed, apart)),
+        lambda: protocol_dataset(protocol, rows, found, timed, apart),
         lambda: (cell_path(folder, key) for key in keys),
         content_hash(protocol.definition),
     )
@@ -86,42 +91,28 @@ def validate(
     model: Model,
     definition: StudyFile,
     entries: Sequence[Entry],
-    validation: tuple[Scenario, ...],
+    validation: Scenarios,
     workers: Workers,
 ) -> list[Row]:
     """Fit every candidate on its training, simulate the validation set, choose.
 
     Of a full-order method every candidate becomes a row.
     """
-    experiments = [_candidates(model, entry, validation) for entry in entries]
+    experiments = [entry.experiments(model, validation) for entry in entries]
     # Most candidates of an entry share a fit.
     workers(experiments)
     rows: list[Row] = []
     for entry, candidates in zip(entries, experiments, strict=True):
-        results = tuple(
-            validation_of(workers.result(experiment), definition.bounds, model.evaluations)
-            for experiment in candidates
-        )
+        found = map(workers.result, candidates)
+        results = tuple(validation_of(f, definition.bounds, model.evaluations) for f in found)
         every = entry.role == FULL_ORDER
         chosen = range(len(candidates)) if every else [choose(results)]
         rows += [Row(entry, candidate, results) for candidate in chosen]
     return rows
 
 
-def validation_experiments(protocol: Protocol) -> list[Experiment]:
-    """What is computed before anything is chosen."""
-    validation = protocol.sets["validation"]
-    found = (_candidates(protocol.model, c, validation) for c in protocol.entries)
-    return [experiment for candidates in found for experiment in candidates]
-
-
-def _candidates(model: Model, entry: Entry, validation: tuple[Scenario, ...]) -> list[Experiment]:
-    candidates = range(len(entry.candidates))
-    return [entry.experiment(model, candidate, validation) for candidate in candidates]
-
-
 def test(
-    model: Model, rows: Sequence[Row], sets: dict[str, tuple[Scenario, ...]], workers: Workers
+    model: Model, rows: Sequence[Row], sets: dict[str, Scenarios], workers: Workers
 ) -> dict[str, list[xr.Dataset]]:
     """Results of the chosen candidates: set -> one dataset for each row."""
     experiments = [
@@ -129,10 +120,8 @@ def test(
         for row in rows
     ]
     workers(experiments)
-    return {
-        name: [workers.result(group[index]) for group in experiments]
-        for index, name in enumerate(sets)
-    }
+    results = [[workers.result(experiment) for experiment in group] for group in experiments]
+    return dict(zip(sets, map(list, zip(*results, strict=True)), strict=True))
 
 
 def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row]:
@@ -150,20 +139,18 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
     """
     racing = [i for i, row in enumerate(rows) if row.entry.role == CONTENDER]
     results = {i: rows[i].validation[rows[i].candidate] for i in racing}
-    if not racing:
+    # What gives no run at all is not chosen.
+    if not any(result.stable for result in results.values()):
         return list(rows)
+    best = min(racing, key=lambda i: (-results[i].stable, results[i].score))
     within = [i for i in racing if results[i].score <= MARGIN_OF_CHOSEN]
     fitting = [i for i in within if results[i].stable == 1.0]
-    best = min(racing, key=lambda i: (-results[i].stable, results[i].score))
-    # What gives no run at all is not chosen.
-    if not results[best].stable:
-        return list(rows)
     if len(fitting) > 1:
         sample = protocol.sets["validation"][:TIMED]
-        experiments = {rows[i].label: _experiment(protocol, rows[i], sample) for i in fitting}
-        every = np.ones((len(experiments), len(sample)), dtype=bool)
+        every = np.ones((len(fitting), len(sample)), dtype=bool)
         what = f"validation set of {protocol.study}"
-        timed = _timed(_beside("timing-validation", path), experiments, every, what)
+        place = path.with_name(f"timing-validation-{path.name}")
+        timed = _timed(protocol, [rows[i] for i in fitting], (sample, every), place, what)
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda i: results[i].score)
@@ -176,7 +163,7 @@ def timed_rows(
     protocol: Protocol,
     rows: Sequence[Row],
     tested: dict[str, list[xr.Dataset]],
-    sets: dict[str, tuple[Scenario, ...]],
+    sets: dict[str, Scenarios],
     path: Path,
 ) -> xr.Dataset:
     """Stored timing of the rows on the first test runs, measured first if missing or out of date.
@@ -184,27 +171,26 @@ def timed_rows(
     A run whose result in the test set is a failure is not timed.  `path` is of the combined
     dataset.
     """
-    name = "drawn" if "drawn" in sets else "test"
+    name = judged_set(sets)
     sample = sets[name][:TIMED]
-    experiments = {row.label: _experiment(protocol, row, sample) for row in rows}
     ends = [found["status"].values[: len(sample)] for found in tested[name]]
-    finished = np.isin(np.array(ends), FINISHED)
-    what = f"test set of {protocol.study}"
-    return _timed(_beside("timing", path), experiments, finished, what)
-
-
-def _beside(what: str, path: Path) -> Path:
-    """File with the times of a protocol."""
-    return path.with_name(f"{what}-{path.name}")
-
-
-def _experiment(protocol: Protocol, row: Row, scenarios: tuple[Scenario, ...]) -> Experiment:
-    return row.entry.experiment(protocol.model, row.candidate, scenarios)
+    finished, what = np.isin(np.array(ends), FINISHED), f"test set of {protocol.study}"
+    place = path.with_name(f"timing-{path.name}")
+    return _timed(protocol, rows, (sample, finished), place, what)
 
 
 def _timed(
-    path: Path, experiments: dict[str, Experiment], finished: np.ndarray, what: str
+    protocol: Protocol,
+    rows: Sequence[Row],
+    wanted: tuple[Scenarios, np.ndarray],
+    path: Path,
+    what: str,
 ) -> xr.Dataset:
+    """Stored timing of rows on some scenarios, those of each row that are wanted."""
+    sample, finished = wanted
+    experiments = {
+        row.label: row.entry.experiment(protocol.model, row.candidate, sample) for row in rows
+    }
     content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(
         path,
@@ -214,7 +200,7 @@ def _timed(
 
 
 def _sensitive(
-    protocol: Protocol, sets: dict[str, tuple[Scenario, ...]], workers: Workers
+    protocol: Protocol, sets: dict[str, Scenarios], workers: Workers
 ) -> dict[str, list[str]]:
     """Why drawn runs are reported apart, by set."""
     second = {n: second_run(protocol, sets[n]) for n in DRAWN if n in sets}

@@ -342,9 +342,8 @@ class StudyFile(FileSchema):
             if not getattr(self, name):
                 raise ValueError(f"{name} is missing")
         labels = [entry.label or entry.method for entry in self.methods]
-        doubles = {label for label in labels if labels.count(label) > 1}
-        if doubles:
-            raise ValueError(f"label {sorted(doubles)[0]!r} is used twice")
+        if doubles := [label for label in labels if labels.count(label) > 1]:
+            raise ValueError(f"label {doubles[0]!r} is used twice")
         if self.bounds:
             self._check_test()
             return self
@@ -371,18 +370,16 @@ class StudyFile(FileSchema):
     def _set_once(self) -> None:
         own = {f"{PARAMETER}{name}" for name in self.parameters}
         own |= {name for name in ("maneuver", "start") if getattr(self, name)}
-        for where, names in (("sampling", self.sampling and self.sampling.ranges), ("study", own)):
-            for name in self.grid.keys() & set(names or ()):
-                raise ValueError(f"{name} is set twice: in the grid and in the {where}")
-        for name in own & set(self.sampling.ranges if self.sampling else ()):
-            raise ValueError(f"{name} is set twice: in the sampling and in the study")
-        for entry in self.methods:
-            given = {*entry.settings, *(["training"] if entry.training else [])}
-            for name in self.grid.keys() & given:
-                method = entry.label or entry.method
-                raise ValueError(
-                    f"{name} is set twice: in the grid and in the settings of {method}"
-                )
+        ranges = set(self.sampling.ranges if self.sampling else ())
+        grid, places = ("grid", set(self.grid)), [("sampling", ranges), ("study", own)]
+        settings = [
+            (f"settings of {label}", {*entry.settings, *["training"] * bool(entry.training)})
+            for label, entry in self.labelled.items()
+        ]
+        pairs = [*((grid, other) for other in [*places, *settings]), places]
+        for (one, names), (other, more) in pairs:
+            for name in sorted(names & more):
+                raise ValueError(f"{name} is set twice: in the {one} and in the {other}")
 
 
 def values(entry: Axis) -> list[int | float | str]:

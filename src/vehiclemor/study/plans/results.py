@@ -1,0 +1,240 @@
+"""Combined datasets: every cell of a grid at its place, every row of a protocol on its tests."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.parameters import AXES, parameter_and_axis
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.plans.choice import Row
+from vehiclemor.study.plans.grid import Grid
+from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.plans.study_file import PARAMETER, StudyFile
+from vehiclemor.study.provenance import attributes, layout_digest, versions
+from vehiclemor.study.result import meaning_of, variables
+from vehiclemor.study.store import read_cell
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Dimensions of a run's errors; each has the units of its labels beside it.
+QUANTITIES = ("output", "coordinate", "speed")
+
+
+def cells_digest(grid: Grid) -> str:
+    """Hash of a study and its cells at their places, for a combined dataset to be current."""
+    digest = hashlib.sha256(grid.definition.model_dump_json().encode())
+    digest.update(layout_digest().encode())
+    digest.update(grid.keys.tobytes())
+    return digest.hexdigest()[:20]
+
+
+def combined(grid: Grid, folder: Path) -> xr.Dataset:
+    """All cells of a grid put together.
+
+    Raises
+    ------
+    FileError
+        If a cell is missing, corrupt or foreign.
+    """
+    import xarray as xr
+
+    names, keys = tuple(grid.dimensions), grid.keys
+    found, numbers = np.unique(keys, return_inverse=True)
+    order = np.argsort(numbers, axis=None, kind="stable")
+    ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(found)))
+    template = read_cell(folder, found[0].decode()).dataset()
+    arrays = {
+        str(name): _empty(keys.shape + variable.shape, variable.dtype)
+        for name, variable in template.data_vars.items()
+    }
+    for key, flat in zip(found.astype(str), np.split(order, ends[:-1]), strict=True):
+        places = np.unravel_index(flat, keys.shape)
+        cell = read_cell(folder, key).variables
+        for name, array in arrays.items():
+            array[places] = cell[name][1][()]
+    whole = {
+        name: (names + template[name].dims, array, template[name].attrs)
+        for name, array in arrays.items()
+    }
+    whole |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
+    coordinates = {str(name): variable for name, variable in template.coords.items()}
+    dataset = xr.Dataset(whole, _coordinates(grid) | coordinates)
+    own = {"training": grid.definition.training_words}
+    return _told(dataset, grid.name, grid.definition, grid.model, **own)
+
+
+def _told(
+    dataset: xr.Dataset, study: str, definition: StudyFile, model: Model, **further: object
+) -> xr.Dataset:
+    """The dataset of a study with its global attributes."""
+    own = {
+        "study": study,
+        "model": model.name,
+        "configuration": definition.model_dump_json(exclude_defaults=True),
+    }
+    found = attributes(definition.title, model.kernel_hash, **own, **further)
+    return dataset.assign_attrs(found)
+
+
+def _coordinates(grid: Grid) -> dict[str, Any]:
+    """Values of the dimensions, and of what is sampled; with meanings."""
+    found = {name: (name, values) for name, values in grid.dimensions.items()}
+    found |= {name: ("sample", values) for name, values in grid.samples.items()}
+    found["method"] = "label", [entry.method for entry in grid.definition.methods]
+    return {
+        name: (dimension, values, described(grid.model, name))
+        for name, (dimension, values) in found.items()
+    }
+
+
+def described(model: Model, dimension: str) -> dict[str, str]:
+    """Meaning of a dimension, and unit of a parameter: as its parameter file has them."""
+    if not dimension.startswith(PARAMETER):
+        return {"long_name": meaning_of(dimension)}
+    given = dimension.removeprefix(PARAMETER)
+    name, axis = parameter_and_axis(model.name, model.definition.parameters, given)
+    entry = model.parameters.entries[name]
+    component = "" if axis is None else f", component {AXES[axis]}"
+    return {"long_name": f"{entry.description}{component}", "units": entry.unit}
+
+
+def _empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    return np.full(shape, "", dtype=object) if dtype.kind in "OUT" else np.zeros(shape, dtype)
+
+
+def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
+    """Combined datasets of several studies as rows of one, on the dimension `cell`.
+
+    Histories are left out; grid dimensions become coordinates of the rows, missing where a study
+    does not have them.
+    """
+    import xarray as xr
+
+    parts: list[xr.Dataset] = []
+    units: dict[str, dict[str, str]] = {name: {} for name in QUANTITIES}
+    for name, dataset in results.items():
+        rows = dataset.drop_dims([d for d in ("time", "input") if d in dataset.dims])
+        for quantity in QUANTITIES:
+            if quantity in rows.dims:
+                pairs = zip(rows[quantity].values, rows[f"{quantity}_unit"].values, strict=True)
+                units[quantity] |= {str(label): str(unit) for label, unit in pairs}
+                rows = rows.drop_vars(f"{quantity}_unit")
+        rows = rows.stack(cell=[d for d in rows.dims if d not in QUANTITIES]).reset_index("cell")
+        parts.append(rows.assign_coords(study=("cell", [name] * rows.sizes["cell"])))
+    labels = sorted({str(c) for part in parts for c in part.coords if part[c].dims == ("cell",)})
+    for place, part in enumerate(parts):
+        missing = "cell", np.full(part.sizes["cell"], np.nan)
+        parts[place] = part.assign_coords({n: missing for n in labels if n not in part.coords})
+    # Models differ in their quantities and counts: what a row does not have is missing in it.
+    dataset = xr.concat(parts, dim="cell", coords="minimal", compat="override", join="outer")
+    for quantity in QUANTITIES:
+        if quantity in dataset.dims:
+            column = [units[quantity][str(label)] for label in dataset[quantity].values]
+            told = {"long_name": f"SI unit of the {quantity}"}
+            dataset = dataset.assign_coords({f"{quantity}_unit": (quantity, column, told)})
+    dataset.attrs = {"source": "vehiclemor", "studies": ", ".join(results), "versions": versions()}
+    return dataset
+
+
+def protocol_dataset(
+    protocol: Protocol,
+    rows: Sequence[Row],
+    found: dict[str, list[xr.Dataset]],
+    timed: xr.Dataset,
+    apart: Mapping[str, list[str]],
+) -> xr.Dataset:
+    """Results of all rows on the dimensions `label`, `scenario` and `output`.
+
+    `scenario_set` tells which set a scenario is of, `apart` why a drawn one is not judged;
+    `validation` of a row is the JSON list of its candidates' settings and validation results.
+
+    Parameters
+    ----------
+    found
+        Set -> results of the rows.
+    timed
+        Timing of the first scenarios of what is judged.
+    apart
+        Set -> why scenarios are not judged.
+    """
+    import xarray as xr
+
+    parts: list[xr.Dataset] = []
+    for purpose, datasets in found.items():
+        number = datasets[0].sizes["scenario"]
+        of_run = {"scenario_set": [purpose] * number, "apart": apart.get(purpose, [""] * number)}
+        part = xr.concat(datasets, dim="label", combine_attrs="override")
+        parts.append(part.assign_coords(variables(of_run, "scenario")))
+    # What does not depend on the scenario is the same in every set, but for seconds.
+    fixed = [n for n, v in parts[0].data_vars.items() if "scenario" not in v.dims]
+    rest = [part.drop_vars(fixed) for part in parts]
+    dataset = xr.concat(rest, dim="scenario", combine_attrs="override").merge(parts[0][fixed])
+    # How the files store text holds for their own longest words only.
+    dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
+    per_row: dict[str, list[Any]] = {
+        "role": [row.entry.role for row in rows],
+        "series": [row.entry.label for row in rows],
+        "winner": [row.winner for row in rows],
+        "method": [row.entry.method for row in rows],
+        "settings": [json.dumps(row.settings, sort_keys=True) for row in rows],
+        "cell_keys": [
+            json.dumps({purpose: cells[index].attrs["cell"] for purpose, cells in found.items()})
+            for index in range(len(rows))
+        ],
+        "validation": [_validation(row) for row in rows],
+        "validation_score": [row.validation[row.candidate].score for row in rows],
+        "offline_seconds": [float(value) for value in timed["offline_seconds"]],
+    }
+    dataset = dataset.assign(variables(per_row, "label")).set_coords("method")
+    dataset = dataset.assign_coords(label=[row.label for row in rows])
+    for name in ("label", "scenario"):
+        dataset[name].attrs["long_name"] = meaning_of(name)
+    places = np.flatnonzero(dataset["scenario_set"].values == judged_set(found))
+    places = places[: timed.sizes["scenario"]]
+    for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
+        online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
+        online[:, places] = timed[name].values
+        dataset[name] = (("label", "scenario"), online, dict(timed[name].attrs))
+    # Of the first cell.
+    dataset.attrs.clear()
+    own = {"evaluations": protocol.model.evaluations, "test_set": _test_set(protocol, found)}
+    return _told(dataset, protocol.study, protocol.definition, protocol.model, **own)
+
+
+def _test_set(protocol: Protocol, found: Mapping[str, Sequence[xr.Dataset]]) -> str:
+    """Name of what is judged, with a hash of the very runs where they are drawn."""
+    if "drawn" not in found:
+        return "listed"
+    labels = "\n".join(str(label) for label in found["drawn"][0]["scenario"].values)
+    return f"{protocol.test_set}, runs {hashlib.sha256(labels.encode()).hexdigest()[:8]}"
+
+
+def judged_set(sets: Container[str]) -> str:
+    """The set on which a protocol judges: what is drawn, else what is listed."""
+    return "drawn" if "drawn" in sets else "test"
+
+
+def judged_part(dataset: xr.Dataset) -> xr.Dataset:
+    """What is judged of a combined dataset: without runs on which the full order is sensitive."""
+    sets = dataset["scenario_set"].values
+    chosen = (sets == judged_set(set(sets))) & (dataset["apart"].values == "")
+    return dataset.isel(scenario=chosen)
+
+
+def _validation(row: Row) -> str:
+    """Every candidate's settings and validation result as JSON text; the chosen one is marked."""
+    content = []
+    for index, result in enumerate(row.validation):
+        # JSON has no infinity: a number that is infinite is null.
+        finite = {n: v if np.isfinite(v) else None for n, v in asdict(result).items()}
+        chosen = {"settings": row.entry.candidates[index], "chosen": index == row.candidate}
+        content.append(chosen | finite)
+    return json.dumps(content, sort_keys=True)

@@ -1,0 +1,203 @@
+"""Grids: places are complete, experiments are made when asked for, parameters are axes."""
+
+import weakref
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from tests.study.small import small_study
+from vehiclemor.cli import main
+from vehiclemor.errors import FileError
+from vehiclemor.study.experiment import Experiment
+from vehiclemor.study.plans.grid import expand, sampled
+from vehiclemor.study.plans.loading import load_studies, write_study
+from vehiclemor.study.plans.results import flattened
+from vehiclemor.study.plans.study_file import Sampling, StudyFile
+from vehiclemor.study.run import run_studies
+from vehiclemor.toml_files import read_toml
+
+CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
+
+
+def grid_of(**given):
+    """A grid of a study with these entries."""
+    study = {"title": "t", "model": WISHBONE, "keep": "metrics", "methods": [{"method": "pod"}]}
+    return expand("mine", StudyFile.model_validate(study | given))
+
+
+def test_a_method_that_a_setting_does_not_concern_is_computed_once():
+    grid = expand("figures-6-7", load_studies("figures-6-7")["figures-6-7"])
+    labels = grid.dimensions["label"]
+    assert grid.keys.size == 2 * len(labels)
+    shared = {"full_order", "full_order_strongest", "replay"}
+    assert len(grid.unique) == len(shared) + 2 * (len(labels) - len(shared))
+
+
+def test_a_grid_over_parameters_is_single_simulations_of_these_cars(tmp_path):
+    text = """
+keep = "metrics"
+parameters = { roll_inertia = 250.0 }
+start = ["dropped"]
+methods = [{ method = "full_order" }, { method = "pod", settings = { rank = 4 } }]
+grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" = [25.0] }
+"""
+    found = vm.run_study(small_study(tmp_path, text, model=CAR), results=tmp_path)
+    axis = found["parameters.sprung_mass"]
+    assert (axis.attrs["units"], axis.values.tolist()) == ("kg", [900.0, 1100.0])
+    for mass in (900.0, 1100.0):
+        own = {"roll_inertia": 250.0, "sprung_mass": mass, "initial_speed": 25.0}
+        alone = vm.simulate(vm.model(CAR, own), "pod", rank=4, start="dropped")
+        here = found.sel({"parameters.sprung_mass": mass, "label": "pod"}).squeeze()
+        for name in ("rms_error", "floor_rms_error", "signal_range", "rms_speed_error"):
+            np.testing.assert_array_equal(here[name], alone[name])
+
+
+def test_samples_are_a_dimension_with_the_sampled_values(tmp_path):
+    text = """
+keep = "metrics"
+[sampling]
+plan = "latin_hypercube"
+count = 5
+seed = 3
+ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], amplitude_factor = [0.5, 1.0] }
+"""
+    found = vm.run_study(small_study(tmp_path, text, "full_order"), results=tmp_path)
+    assert found["status"].values.ravel().tolist() == ["ok"] * 5
+    at = found.isel(sample=4).squeeze()
+    car = vm.model(WISHBONE, {"tie_rod_inner.z": float(at["parameters.tie_rod_inner.z"])})
+    alone = vm.simulate(car, amplitude=float(at["amplitude_factor"]))
+    np.testing.assert_array_equal(at["signal_range"], alone["signal_range"])
+
+
+@pytest.mark.parametrize("plan", ["latin_hypercube", "sobol"])
+def test_a_plan_has_one_point_in_every_slice_of_every_range(plan):
+    ranges = {"parameters.a": [2.0, 4.0], "amplitude_factor": [0.0, 9.0]}
+    given = Sampling(plan=plan, count=64, seed=1, ranges=ranges)
+    for name, values in sampled(given).items():
+        low, high = ranges[name]
+        slices = np.floor(64 * (np.array(values) - low) / (high - low))
+        assert sorted(slices) == list(range(64))
+    assert sampled(given) == sampled(given)
+    assert sampled(given) != sampled(given.model_copy(update={"seed": 2}))
+
+
+def test_trainings_and_maneuvers_are_axes():
+    axes = {
+        "training": ["matched", "nominal", "travel_and_rack"],
+        "maneuver": ["sine_travel", "chirp_travel"],
+        "amplitude_factor": [0.9],
+        "parameters.tie_rod_inner.z": [-0.09],
+    }
+    seen = {
+        (run.maneuver.name, run.maneuver.amplitude_factor, run.parameters)
+        for cell in grid_of(grid=axes).unique.values()
+        for run in cell.training
+    }
+    # The tested ones, the model's own, and the named one.
+    runs = [("sine_travel", 0.9), ("chirp_travel", 0.9), ("sine_travel", 1.0)]
+    runs.append(("travel_and_rack", 1.0))
+    assert seen == {(*run, (("tie_rod_inner.z", -0.09),)) for run in runs}
+
+
+def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
+    made, alive, make = [], [], Experiment.__init__
+
+    def counted(self, *given, **further):
+        made.append(weakref.ref(self))
+        make(self, *given, **further)
+
+    monkeypatch.setattr(Experiment, "__init__", counted)
+    heights = {"parameters.tie_rod_inner.z": [-0.1, -0.09]}
+    samples = {"plan": "latin_hypercube", "count": 60, "seed": 1, "ranges": heights}
+    grid = grid_of(sampling=samples, methods=[{"method": "pod"}, {"method": "full_order"}])
+    assert len(grid.unique) == 120
+    for number, (key, cell) in enumerate(grid.unique.items()):
+        if number % 40 == 0:
+            assert cell.key == key
+            alive.append(sum(reference() is not None for reference in made))
+    assert len(made) >= 240
+    assert max(alive) < 10
+
+
+def test_rows_of_different_models_keep_their_units_and_counts(tmp_path):
+    car = small_study(tmp_path, "", "full_order", model=CAR)
+    rows = flattened(run_studies("figures-6-7", tmp_path) | run_studies(str(car), tmp_path))
+    assert rows.sizes["cell"] == 2 * 6 + 1
+    for output, unit in (("yaw", "rad"), ("spindle_y", "m")):
+        assert str(rows["output_unit"].sel(output=output).item()) == unit
+    of_car = rows["study"].values == "small"
+    for counted, there in (("rhs_calls", of_car), ("iterations", ~of_car)):
+        assert (np.isfinite(rows[counted].values) == there).all()
+    speeds = np.isfinite(rows["rms_speed_error"].transpose("cell", ...).values)
+    assert (speeds == of_car[:, None]).all()
+
+
+def test_a_study_that_is_written_is_the_same_again(tmp_path, protocol_text):
+    (tmp_path / "a.toml").write_text(protocol_text)
+    names = ["figure-11", "vehicle-perturbations", "predictive", str(tmp_path / "a.toml")]
+    for definition in (study for name in names for study in load_studies(name).values()):
+        path = write_study(definition, tmp_path / "b.toml")
+        assert read_toml(path, StudyFile) == definition
+
+
+# What can't be
+
+MASSES = '{ "parameters.sprung_mass" = [1e3, 1e5] }'
+SAMPLES = f'{{ plan = "sobol", count = 2, seed = 1, ranges = {MASSES} }}'
+TWICE = 'grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]'
+LARGE = """[grid]
+frequency_factor = { first = 0.7, last = 1.3, count = 600 }
+amplitude_factor = { first = 0.5, last = 0.9, count = 60 }
+"""
+SETTING = 'grid = { rank = [2] }\nmethods = [{ method = "pod", settings = { rank = 3 } }]'
+
+
+@pytest.mark.parametrize(
+    ("model", "text", "words"),
+    [
+        (WISHBONE, 'grid = { "parameters.tie_rod_iner.z" = [0.1] }', "tie_rod_inner"),
+        (WISHBONE, 'grid = { "parameters.tie_rod_inner" = [0.1] }', "tie_rod_inner"),
+        (WISHBONE, 'grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "millimetres"),
+        (WISHBONE, 'grid = { training = ["mached"] }', "matched"),
+        (WISHBONE, "grid = { rnk = [2] }", "rnk"),
+        (WISHBONE, "grid = { rank = [99] }\nmethods = [{ method = 'pod' }]", "rank"),
+        (WISHBONE, 'training = "lane_change"', "delta"),
+        (WISHBONE, 'training = "set"', "training_set"),
+        (WISHBONE, TWICE, "start is set twice"),
+        (WISHBONE, SETTING, "rank is set twice"),
+        (WISHBONE, 'start = ["equilibrium", "equilibrium"]', "start"),
+        (WISHBONE, LARGE, "GB"),
+        (CAR, 'grid = { maneuver = ["lane_change", "step_steer"] }', "metrics"),
+        (CAR, f"grid = {MASSES}", "sprung_mass = 100000"),
+        (CAR, f"sampling = {SAMPLES}", "sprung_mass = "),
+    ],
+)
+def test_what_can_not_be_run_is_told_before_the_first_cell(tmp_path, model, text, words):
+    methods = () if "methods" in text else ("full_order",)
+    path = small_study(tmp_path, f"{text}\n", *methods, model=model)
+    with pytest.raises(FileError, match=words) as error:
+        vm.run_study(path, results=tmp_path / "results")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"count": 6, "plan": "sobol"}, "count"),
+        ({"ranges": {"parameters.a": [2.0, 1.0]}}, "parameters.a"),
+        ({"ranges": {"a": [1.0, 2.0]}}, "a is neither"),
+    ],
+)
+def test_wrong_samplings_are_told(change, words):
+    given = {"plan": "latin_hypercube", "count": 2, "seed": 0, "ranges": {"parameters.a": [0, 1]}}
+    with pytest.raises(ValueError, match=words):
+        Sampling.model_validate(given | change)
+
+
+def test_a_run_says_why_cells_are_rejected(tmp_path, capsys):
+    path = small_study(tmp_path, 'keep = "metrics"\n', "two_track", model=CAR)
+    assert main(["run", str(path), "--results", str(tmp_path)]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"1 rejected: {CAR} has no y_dot" in printed
