@@ -115,6 +115,7 @@ def runs() -> Values:
             made = time.thread_time()
             with patch.object(Prepared, "__call__", timed):
                 run = car.simulate(signal, "equilibrium")
+                assert run.outputs is not None
             call = time.thread_time() - made
             spent.append((made - began, call, call - inside[0], made - began + call - run.seconds))
         parts = ("signal", "call", "Python", "beyond")
@@ -168,7 +169,10 @@ def scipy() -> Values:
     solve = partial(
         solve_ivp, rates, (0.0, 10.0), car.state(), "LSODA", TIMES, rtol=1e-5, atol=1e-5
     )
-    own = partial(car.reduced.simulate, signal, "equilibrium")
+
+    def own() -> np.ndarray:
+        return car.reduced.simulate(signal, "equilibrium").outputs
+
     fine = car.model.simulate(signal, "equilibrium", TIMES, tolerance=1e-10).outputs[:, place]
     found = car.outputs(solve().y.T, u[:, None])[:, place]
     ours = car.model.simulate(signal, "equilibrium", TIMES, **COARSE).outputs[:, place]

@@ -6,3 +6,4 @@ import vehiclemor as vm
 
 car = vm.rom("independent_suspension_vehicle")
 run = car.simulate(vm.Signal.from_samples(t, steering[0], "cubic"))
+lateral = run["lateral_position"]
