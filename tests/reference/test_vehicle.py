@@ -11,7 +11,6 @@ from vehiclemor.registry import component
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -238,26 +237,6 @@ def test_the_dropped_start_keeps_its_velocity_in_space(vehicle):
     np.testing.assert_allclose(vehicle.derivative(x, 0.0)[:3], [20.0, 0.0, 0.0], atol=1e-14)
 
 
-def test_the_mirrored_vehicle_moves_as_the_mirror_image(vehicle):
-    for x, delta in LARGE:
-        expected = oracle.mirror(vehicle.derivative(x, delta))
-        close(vehicle.derivative(oracle.mirror(x), -delta), expected, 1e-11)
-
-
-def test_place_heading_and_wheel_angles_have_no_influence(vehicle):
-    rng = np.random.default_rng(5)
-    for x, delta in LARGE[:12]:
-        moved = x.copy()
-        turn = rng.uniform(-3.0, 3.0)
-        moved[:2] += rng.uniform(-100.0, 100.0, 2)
-        moved[3] += turn
-        moved[10:14] += rng.uniform(-50.0, 50.0, 4)
-        before, after = vehicle.derivative(x, delta), vehicle.derivative(moved, delta)
-        path = (before[0] + 1j * before[1]) * np.exp(1j * turn)
-        close(after[:2], [path.real, path.imag], 1e-12)
-        close(after[2:], before[2:], 1e-12)
-
-
 # Energy
 
 
@@ -351,46 +330,3 @@ def test_the_lane_change_ends_where_its_amplitude_was_calibrated(vehicle):
     end = integrate(vehicle, LANE_CHANGE, vehicle.start(), "dopri5", 1e-10, np.array([25.0]))
     assert end.outputs[0, 1] == pytest.approx(3.4999973, abs=1e-6)
     assert end.outputs[0, 2] == pytest.approx(6.8e-4, abs=5e-6)
-
-
-# Until the pulse of the lane change is over, and a little more.
-TIMES = np.array([0.9, 1.7, 2.6, 3.4, 4.0])
-
-
-@pytest.mark.parametrize("solver", INTEGRATORS)
-def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
-    exact = integrate(vehicle, LANE_CHANGE, vehicle.start(), "dopri5", 1e-12, TIMES).states
-    errors = []
-    for tolerance in (1e-4, 1e-6, 1e-8):
-        found = integrate(vehicle, LANE_CHANGE, vehicle.start(), solver, tolerance, TIMES).states
-        errors.append(np.abs(found - exact).max())
-    assert errors[2] < 0.2 * errors[1] < 0.04 * errors[0]
-
-
-@pytest.mark.parametrize(
-    ("solver", "order"), [("dopri5", 5), ("rodas4", 4), ("ros34pw2", 3), ("etdrk4", 4)]
-)
-def test_the_path_in_the_plane_converges_with_the_order_of_the_method(vehicle, solver, order):
-    """Though the Jacobian leaves out how the path turns with the heading."""
-    exact = integrate(vehicle, LANE_CHANGE, vehicle.start(), "dopri5", 1e-13, TIMES).states
-    # Fixed steps, where the explicit pair is stable and rounding plays no part.
-    steps = np.array([0.008, 0.004]) if solver == "dopri5" else np.array([0.04, 0.02])
-    errors = []
-    for step in steps:
-        found = vehicle.integrate(
-            LANE_CHANGE, vehicle.start(), whole_space(28), solver, 1e6, TIMES, step
-        )
-        errors.append(np.abs(found.states - exact)[:, [0, 1]].max())
-    assert np.log2(errors[0] / errors[1]) > order - 1.2, errors
-
-
-@pytest.mark.parametrize("solver", INTEGRATORS)
-def test_the_heading_does_not_change_the_steps(vehicle, solver):
-    """A vehicle that sets off in another direction makes the same manoeuvre, turned."""
-    turned = vehicle.start()
-    turned[3] = 1.1
-    found = integrate(vehicle, LANE_CHANGE, turned, solver, 1e-5, TIMES)
-    plain = integrate(vehicle, LANE_CHANGE, vehicle.start(), solver, 1e-5, TIMES)
-    place = (plain.states[:, 0] + 1j * plain.states[:, 1]) * np.exp(1.1j)
-    np.testing.assert_allclose(found.states[:, 0] + 1j * found.states[:, 1], place, atol=5e-3)
-    np.testing.assert_allclose(found.states[:, 14:], plain.states[:, 14:], atol=1e-3)
