@@ -5,7 +5,9 @@ Written from the text of the vehicle's specification alone; `high_fidelity_vehic
 Arrays over two sides are in the order left, right.  SI units throughout.
 """
 
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -32,77 +34,16 @@ HOLDERS = [BODIES.index(name) for name in ("carrier_FL", "carrier_FR", "arm_RL",
 AXLES = ("front", "front", "rear", "rear")  # of the wheels and springs in the order FL to RR
 DEPENDENT = [k for k in range(6, 20) if k not in {10, 17}]  # corner coordinates but theta_l
 
-PARAMETERS = {
-    "general.gravity": 9.81,
-    "general.baumgarte_a": 50.0,
-    "general.baumgarte_b": 50.0,
-    "general.initial_speed": 20.0,
-    "frames.S_origin_in_V": [1.388, 0.0, 0.1199],
-    "frames.R_origin_in_V": [-1.388, 0.7979, 0.0],
-    "frames.C_origin_in_V": [0.0, 0.0, 0.2277],
-    "chassis.mass": 1515.0,
-    "chassis.inertia_diag": [460.0, 2580.0, 2800.0],
-    "front.points.upper_pivot_front": [-0.1, 0.47, 0.105],
-    "front.points.upper_pivot_rear": [-0.25, 0.51, 0.11],
-    "front.points.upper_ball": [-0.04, 0.695, 0.105],
-    "front.points.lower_pivot_front": [0.2, 0.42, -0.27],
-    "front.points.lower_pivot_rear": [-0.2, 0.47, -0.265],
-    "front.points.lower_ball": [0.0, 0.77, -0.32],
-    "front.points.rack_end": [-0.2, 0.4921, -0.0962],
-    "front.points.tie_rod_outer": [-0.15, 0.77, -0.12],
-    "front.points.wheel_centre": [0.0, 0.7979, -0.1199],
-    "front.points.spring_chassis": [-0.04, 0.52, 0.23],
-    "front.points.spring_arm": [0.0, 0.62, -0.27],
-    "front.upper_arm.mass": 1.032,
-    "front.upper_arm.cg": [-0.1083, 0.5972, 0.1063],
-    "front.upper_arm.inertia_arm_frame": [0.00591, 0.0019, 0.00769],
-    "front.lower_arm.mass": 1.611,
-    "front.lower_arm.cg": [0.0048, 0.6112, -0.2932],
-    "front.lower_arm.inertia_arm_frame": [0.0151, 0.0207, 0.0355],
-    "front.upright.mass": 1.397,
-    "front.upright.cg": [-0.0224, 0.747, -0.1118],
-    "front.upright.inertia_diag": [0.0138, 0.0146, 0.00283],
-    "front.tie_rod.mass": 0.55,
-    "front.tie_rod.inertia_transverse": 0.0057,
-    "front.tie_rod.inertia_axial": 2e-05,
-    "front.wheel.mass": 25.803,
-    "front.wheel.inertia_spin": 1.099496,
-    "front.wheel.inertia_transverse": 0.396478,
-    "front.spring.stiffness": 73574.10163,
-    "front.spring.damping": 15054.53731,
-    "front.spring.free_length": 0.6093460427981641,
-    "rear.pivot": [0.45, -0.25, -0.03],
-    "rear.arm.mass": 14.25,
-    "rear.arm.cg": [0.069614, -0.135789, -0.053421],
-    "rear.arm.inertia": [
-        [0.268112, 0.058977, 0.068806],
-        [0.058977, 0.359839, -0.033655],
-        [0.068806, -0.033655, 0.349422],
-    ],
-    "rear.wheel.mass": 24.7,
-    "rear.wheel.inertia_spin": 1.099,
-    "rear.wheel.inertia_transverse": 0.396,
-    "rear.spring.chassis_point": [0.17, -0.2075, 0.335],
-    "rear.spring.arm_point": [0.09, -0.23, -0.045],
-    "rear.spring.stiffness": 43780.0,
-    "rear.spring.damping": 4000.0,
-    "rear.spring.free_length": 0.4990957602849919,
-    "tyre.unloaded_radius": 0.3266,
-    "tyre.vertical_stiffness": 280835.2941,
-    "tyre.vertical_damping": 2000.0,
-    "tyre.c_long": 115000.0,
-    "tyre.c_alpha": 117000.0,
-    "tyre.mu_max": 0.75,
-    "tyre.mu_min": 0.2,
-    "tyre.width": 0.32,
-    "tyre.v_low": 0.5,
-    "steering.amplitude": -0.0046903,
-    "steering.start": 1.0,
-    "steering.period": 2.5,
-    "steering.duration": 10.0,
-    "dropped_start.dz": 0.03,
-    "dropped_start.dpitch": 0.015,
-}
+
+def _flat(table: Mapping, before: str = "") -> dict[str, float | list]:
+    found = {}
+    for key, value in table.items():
+        name = f"{before}{key}"
+        found |= _flat(value, f"{name}.") if isinstance(value, dict) else {name: value}
+    return found
+
+
+PARAMETERS = _flat(tomllib.loads(Path(__file__).with_suffix(".toml").read_text()))
 NO_DAMPERS = {"front.spring.damping": 0.0, "rear.spring.damping": 0.0}
 NO_TYRES = {"tyre.vertical_stiffness": 0.0, "tyre.vertical_damping": 0.0}
 

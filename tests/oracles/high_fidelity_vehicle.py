@@ -29,20 +29,7 @@ from tests.oracles.high_fidelity_data import (
     rear_points,
     tie_rod_length,
 )
-
-X, Y, Z = np.eye(3)
-# [u]x = u @ CROSS, shape (3, 3, 3)
-CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)
-
-
-# Taylor polynomials: coefficients of 1, t, t^2
-
-
-def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Matrix product of two polynomials, truncated."""
-    return np.array(
-        [a[0] @ b[0], a[0] @ b[1] + a[1] @ b[0], a[0] @ b[2] + a[1] @ b[1] + a[2] @ b[0]]
-    )
+from tests.oracles.taylor import X, Y, Z, axial, euler_321, times, turned
 
 
 def along(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -55,24 +42,6 @@ def about(pivot: np.ndarray, turn: np.ndarray, point: np.ndarray) -> np.ndarray:
     moved = along(turn, point - pivot)
     moved[0] += pivot
     return moved
-
-
-def turned(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotations E + sin [u]x + (1 - cos) [u]x^2 (3, ..., 3, 3) about constant unit axes."""
-    cross = np.tensordot(axis, CROSS, 1)
-    s, c = np.sin(angle[0]), np.cos(angle[0])
-    half = angle[1] ** 2 / 2
-    sine = np.array([s, c * angle[1], c * angle[2] - s * half])
-    versine = np.array([1 - c, s * angle[1], s * angle[2] + c * half])
-    matrix = sine[..., None, None] * cross + versine[..., None, None] * (cross @ cross)
-    matrix[0] += np.eye(3)
-    return matrix
-
-
-def axial(matrix: np.ndarray) -> np.ndarray:
-    """Axial vector of a matrix's skew part."""
-    skew = (matrix - np.swapaxes(matrix, -1, -2)) / 2
-    return np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
 
 
 # kinematics
@@ -104,10 +73,10 @@ def front_axle(path: np.ndarray, rack: np.ndarray, p: Numbers) -> Axle:
     """Upper arms, lower arms, carriers, tie rods and wheels."""
     at = front_points(p)
     corner = path[..., 6:20].reshape(*path.shape[:2], 2, 7)
-    zeta, eta, xi, theta_u, theta_l, alpha, beta = np.moveaxis(corner, -1, 0)
+    theta_u, theta_l, alpha, beta = np.moveaxis(corner[..., 3:], -1, 0)
 
     upper, lower = turned(arm_axis("upper", at), theta_u), turned(arm_axis("lower", at), theta_l)
-    carrier = times(times(turned(Z, zeta), turned(Y, eta)), turned(X, xi))
+    carrier = euler_321(corner[..., :3])
     rod = times(turned(Z, alpha), turned(X, beta))
 
     on_upper = partial(about, at["upper_pivot_rear"], upper)
@@ -168,8 +137,7 @@ class Instant:
         self.springs = np.concatenate([front.springs, rear.springs], axis=2)
         self.masses, tensors = masses_and_tensors(p)
 
-        chassis = times(turned(Z, path[..., 3]), turned(Y, path[..., 4]))
-        chassis = times(chassis, turned(X, path[..., 5]))[:, :, None]
+        chassis = euler_321(path[..., 3:6])[:, :, None]
         still, level = np.zeros((3, 27, 1, 3)), np.zeros((3, 27, 1, 3, 3))
         level[0] = np.eye(3)
         cgs = np.concatenate([still, *front.cgs, *rear.cgs], axis=2)

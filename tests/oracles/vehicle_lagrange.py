@@ -7,11 +7,11 @@ accelerations.  Rotational inertia is the second moment of a body's mass, so no 
 gyroscopic term or Euler rate is written down.  Everything is analytic: states may be complex.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from tests.oracles.taylor import Y, Z, axial, euler_321, times, turned
 from tests.oracles.vehicle_data import (
     PARAMETERS,
     Numbers,
@@ -38,37 +38,6 @@ __all__ = [
     "tire_forces",
 ]
 
-Product = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-# Taylor polynomials: coefficients of 1, t, t^2 along the first axis
-
-
-def times(a: np.ndarray, b: np.ndarray, product: Product = np.multiply) -> np.ndarray:
-    """Product of two polynomials, truncated."""
-    return np.array(
-        [
-            product(a[0], b[0]),
-            product(a[0], b[1]) + product(a[1], b[0]),
-            product(a[0], b[2]) + product(a[1], b[1]) + product(a[2], b[0]),
-        ]
-    )
-
-
-def turned(angle: np.ndarray, axis: int) -> np.ndarray:
-    """Elementary right-handed rotations (3, ..., 3, 3) about a coordinate axis."""
-    s, c = np.sin(angle[0]), np.cos(angle[0])
-    half = angle[1] ** 2 / 2
-    sine = np.array([s, c * angle[1], c * angle[2] - s * half])
-    cosine = np.array([c, -s * angle[1], -s * angle[2] - c * half])
-    matrix = np.zeros((*angle.shape, 3, 3), dtype=angle.dtype)
-    second, third = (axis + 1) % 3, (axis + 2) % 3
-    matrix[0, ..., axis, axis] = 1.0
-    matrix[..., second, second] = matrix[..., third, third] = cosine
-    matrix[..., third, second] = sine
-    matrix[..., second, third] = -sine
-    return matrix
-
 
 @dataclass
 class Placement:
@@ -85,26 +54,18 @@ def place(q: np.ndarray, directions: np.ndarray, delta: complex, p: Numbers) -> 
     d = derived(p)
     path = np.array([np.broadcast_to(q, directions.shape), directions, 0 * directions])
     cg = path[..., :3]
-    chassis = turned(path[..., 3], 2)
-    for coordinate, axis in ((4, 1), (5, 0)):
-        chassis = times(chassis, turned(path[..., coordinate], axis), np.matmul)
+    chassis = euler_321(path[..., 3:6])
     attached = np.zeros((*path.shape[:2], 4, 3), dtype=path.dtype)
     attached[0, ..., 0] = [d["a_s"]] * 2 + [-d["b_s"]] * 2
     attached[0, ..., 1] = per_wheel(p, "T") / 2 * [1, -1, 1, -1]
     attached[0, ..., 2] = -per_wheel(d, "h")
     attached[..., 2] += path[..., 6:10]
-    carried = times(chassis, attached, lambda r, v: v @ np.swapaxes(r, -1, -2))
+    carried = times(attached, np.swapaxes(chassis, -1, -2))
     steer = np.zeros((*path.shape[:2], 4), dtype=np.result_type(path, delta))
     steer[0, :, :2] = delta
-    wheels = times(chassis[..., None, :, :], turned(steer, 2), np.matmul)
-    wheels = times(wheels, turned(path[..., 10:14], 1), np.matmul)
+    wheels = times(chassis[..., None, :, :], turned(Z, steer))
+    wheels = times(wheels, turned(Y, path[..., 10:14]))
     return Placement(cg, chassis, cg[..., None, :] + carried, wheels)
-
-
-def axial(matrix: np.ndarray) -> np.ndarray:
-    """Axial vector of a matrix's skew part."""
-    skew = (matrix - np.swapaxes(matrix, -1, -2)) / 2
-    return np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
 
 
 def second_moments(p: Numbers) -> tuple[np.ndarray, np.ndarray]:
