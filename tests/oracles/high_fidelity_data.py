@@ -48,6 +48,18 @@ NO_DAMPERS = {"front.spring.damping": 0.0, "rear.spring.damping": 0.0}
 NO_TYRES = {"tyre.vertical_stiffness": 0.0, "tyre.vertical_damping": 0.0}
 
 
+# Places of the mirror image's coordinates, and those that it reverses.
+PARTNERS = [*range(6), *range(13, 20), *range(6, 13), 21, 20, 23, 22, 25, 24]
+REVERSED = [1, 3, 5, *(k for first in (6, 13) for k in (first, *range(first + 2, first + 7)))]
+
+
+def mirror(vectors: np.ndarray) -> np.ndarray:
+    """States, or coordinates, of the mirror image; along the last axis."""
+    halves = vectors.reshape(*vectors.shape[:-1], -1, 26)[..., PARTNERS]
+    halves[..., REVERSED] *= -1
+    return halves.reshape(vectors.shape)
+
+
 class State(NamedTuple):
     """Coordinates, their rates, and the rack's position, velocity and acceleration."""
 

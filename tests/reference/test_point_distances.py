@@ -31,13 +31,6 @@ def test_wheel_follows_the_same_path(model, mechanism, rack, direction):
             assert drawn[name] == pytest.approx(place, abs=1e-11)
 
 
-@pytest.mark.parametrize(("side", "direction"), [(0, -1.0), (1, 1.0)])
-def test_limits_of_reach_are_turning_points_of_the_height(model, mechanism, side, direction):
-    turning_point = mechanism.extreme_height(direction)
-    # The search ends when its step falls below 1e-6 m, on the near side.
-    assert 0.0 <= direction * (turning_point - model.reach()[side]) < 2e-6
-
-
 @pytest.mark.parametrize("side", [0, 1])
 def test_the_jacobian_is_singular_at_the_limits(model, side):
     limit = model.reach()[side]

@@ -22,6 +22,7 @@ LANE_CHANGE = {
 }
 # The same inputs as the oracles have them, and a sample of them.
 STEERING = {PLAIN: vehicle_lagrange.lane_change, FIDELITY: high_fidelity_data.lane_change}
+MIRROR = {PLAIN: vehicle_lagrange.mirror, FIDELITY: high_fidelity_data.mirror}
 INPUTS = {PLAIN: np.array([0.3]), FIDELITY: np.array([0.02, 0.1, 1.0])}
 STARTS = ("equilibrium", "dropped")
 # The pulse of the steering is not smooth at its ends.
@@ -43,16 +44,6 @@ def integrate(model, start, solver="dopri5", tolerance=1e-9, longest_step=None, 
 def exact(name: str, start: str = "equilibrium") -> np.ndarray:
     model = build(name)
     return integrate(model, model.start(start), tolerance=1e-13 if name == PLAIN else 1e-12).states
-
-
-def mirror(name: str, x: np.ndarray) -> np.ndarray:
-    """State, or derivative of a state, of the mirror image."""
-    if name == PLAIN:
-        return vehicle_lagrange.mirror(x)
-    corner = [k for first in (6, 13) for k in (first, *range(first + 2, first + 7))]
-    halves = x.reshape(2, 26)[:, [*range(6), *range(13, 20), *range(6, 13), 21, 20, 23, 22, 25, 24]]
-    halves[:, [1, 3, 5, *corner]] *= -1
-    return halves.reshape(-1)
 
 
 def turn(model, x: np.ndarray, angle: float) -> np.ndarray:
@@ -91,7 +82,7 @@ def test_mirrored_turned_and_moved_the_vehicle_accelerates_alike(name, rng):
     for _ in range(60):
         x, u = random_motion(model, rng)
         rates = model.derivative(x, u)
-        close(model.derivative(mirror(name, x), -u), mirror(name, rates))
+        close(model.derivative(MIRROR[name](x), -u), MIRROR[name](rates))
         # Place, heading and wheel angles have no influence.
         angle = rng.uniform(-6.0, 6.0)
         moved = turn(model, x, angle)
@@ -108,8 +99,7 @@ def test_the_mirrored_steering_drives_the_mirror_image(start):
     x = model.start(start)
     left, right = (integrate(model, x, tolerance=1e-10, factor=f).states for f in (1.0, -1.0))
     assert left[-1, 1] > 3.0
-    images = [mirror(FIDELITY, state) for state in left]
-    np.testing.assert_allclose(right, images, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(right, MIRROR[FIDELITY](left), rtol=0, atol=1e-6)
 
 
 @each_vehicle
