@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.maneuver import Maneuver
@@ -131,66 +132,59 @@ def test_second_order_form_holds_with_the_oracles_second_derivatives(vehicle):
         close(vehicle.mass_matrix(x), expected, 1e-11)
 
 
+def pinocchio_tree(p: dict[str, float], delta: float):
+    """The open tree with front wheels steered, its spin joints, places of the coordinates."""
+    d, tree, spins = oracle.derived(), pin.Model(), []
+    body = tree.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
+    inertia = np.diag([p["roll_inertia"], p["pitch_inertia"], d["Izz"]])
+    sprung = pin.Inertia(p["sprung_mass"], np.zeros(3), inertia)
+    tree.appendBodyToJoint(body, sprung, pin.SE3.Identity())
+    about, across = p["spin_inertia"], p["diametral_inertia"]
+    disc = pin.Inertia(p["unsprung_mass"], np.zeros(3), np.diag([across, about, across]))
+    # Depth first: Pinocchio numbers the joints in this order.
+    for wheel in range(WHEELS):
+        end, name, reach = ("f", "front", d["a_s"]) if wheel < 2 else ("r", "rear", -d["b_s"])
+        y = p[f"{name}_track"] / 2 * (1.0 if wheel % 2 == 0 else -1.0)
+        place = pin.SE3(np.eye(3), np.array([reach, y, -d[f"h_{end}"]]))
+        slide = tree.addJoint(body, pin.JointModelPZ(), place, f"slide_{wheel}")
+        steer = pin.SE3(pin.utils.rotate("z", delta if wheel < 2 else 0.0), np.zeros(3))
+        spins.append(tree.addJoint(slide, pin.JointModelRY(), steer, f"spin_{wheel}"))
+        tree.appendBodyToJoint(spins[-1], disc, pin.SE3.Identity())
+    order = [*range(6), *(6 + k + 4 * part for k in range(WHEELS) for part in (0, 1))]
+    return tree, spins, order
+
+
 def test_equations_of_motion_are_those_of_pinocchio(vehicle):
     """Recursive Newton-Euler of the tree, fed with the model's accelerations and tire forces."""
     p = {name: float(value) for name, value in vehicle.parameters.values().items()}
-    d = oracle.derived()
+    preload = oracle.per_wheel(oracle.derived(), "S0")
+    stiffness, damping = (
+        np.repeat([p[f"front_{name}"], p[f"rear_{name}"]], 2) for name in ("stiffness", "damping")
+    )
     for x, delta in [*LARGE[:12], LARGE[-1]]:
         q, nu = x[:14], x[14:]
-        tree = pin.Model()
-        body = tree.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
-        inertia = np.diag([p["roll_inertia"], p["pitch_inertia"], d["Izz"]])
-        sprung = pin.Inertia(p["sprung_mass"], np.zeros(3), inertia)
-        tree.appendBodyToJoint(body, sprung, pin.SE3.Identity())
-        spins = []
-        # Depth first: Pinocchio numbers the joints in this order.
-        for wheel in range(WHEELS):
-            end, side = ("f" if wheel < 2 else "r"), (1.0 if wheel % 2 == 0 else -1.0)
-            track = p["front_track" if wheel < 2 else "rear_track"]
-            reach = d["a_s"] if wheel < 2 else -d["b_s"]
-            place = pin.SE3(np.eye(3), np.array([reach, side * track / 2, -d[f"h_{end}"]]))
-            slide = tree.addJoint(body, pin.JointModelPZ(), place, f"slide_{wheel}")
-            steer = pin.utils.rotate("z", delta if wheel < 2 else 0.0)
-            turned = pin.SE3(steer, np.zeros(3))
-            spin = tree.addJoint(slide, pin.JointModelRY(), turned, f"spin_{wheel}")
-            about, across = p["spin_inertia"], p["diametral_inertia"]
-            disc = pin.Inertia(p["unsprung_mass"], np.zeros(3), np.diag([across, about, across]))
-            tree.appendBodyToJoint(spin, disc, pin.SE3.Identity())
-            spins.append(spin)
-        rotation = (
-            pin.utils.rotate("z", q[3]) @ pin.utils.rotate("y", q[4]) @ pin.utils.rotate("x", q[5])
-        )
-        place = [*q[:3], *pin.Quaternion(rotation).coeffs()]
-        order = [*range(6), *(6 + k + 4 * part for k in range(WHEELS) for part in (0, 1))]
-        data = tree.createData()
-        position = np.array([*place, *q[order[6:]]])
+        tree, spins, order = pinocchio_tree(p, delta)
+        data, turned = tree.createData(), Rotation.from_euler("ZYX", q[3:6])
+        position = np.array([*q[:3], *turned.as_quat(), *q[order[6:]]])
         pin.forwardKinematics(tree, data, position)
-        forces = outputs(vehicle, x, delta)
+        forces, up = outputs(vehicle, x, delta), np.array([0.0, 0.0, 1.0])
         outside = [pin.Force.Zero() for _ in range(tree.njoints)]
         for wheel, spin in enumerate(spins):
             at = data.oMi[spin]
-            axle, up = at.rotation[:, 1], np.array([0.0, 0.0, 1.0])
-            ahead = np.cross(axle, up) / np.linalg.norm(np.cross(axle, up))
+            ahead = np.cross(at.rotation[:, 1], up)
+            ahead /= np.linalg.norm(ahead)
             shear = forces["Fx"][wheel] * ahead + forces["Fy"][wheel] * np.cross(up, ahead)
             moment = np.cross(-at.translation[2] * up, shear) + forces["Mz"][wheel] * up
             push = shear + forces["Fz"][wheel] * up
             outside[spin] = pin.Force(at.rotation.T @ push, at.rotation.T @ moment)
-        acceleration = vehicle.derivative(x, delta)[14:]
-        joint_forces = pin.rnea(
-            tree, data, position, nu[order], acceleration[order], pin.StdVec_Force(outside)
-        )
-        found = np.empty(14)
-        found[order] = joint_forces
+        rates, found, expected = vehicle.derivative(x, delta)[14:], np.empty(14), np.zeros(14)
+        loads = pin.StdVec_Force(outside)
+        found[order] = pin.rnea(tree, data, position, nu[order], rates[order], loads)
         # What the joints must do: nothing but the springs and dampers on the slides.
-        expected = np.zeros(14)
-        for wheel in range(WHEELS):
-            end, side = ("f", "front") if wheel < 2 else ("r", "rear")
-            spring = d[f"S0_{end}"] + p[f"{side}_stiffness"] * q[6 + wheel]
-            expected[6 + wheel] = -spring - p[f"{side}_damping"] * nu[6 + wheel]
+        expected[6:10] = -preload - stiffness * q[6:10] - damping * nu[6:10]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
-        mass = np.empty((14, 14))
         # Pinocchio promises the upper triangle alone.
-        upper = np.triu(pin.crba(tree, data, position))
+        mass, upper = np.empty((14, 14)), np.triu(pin.crba(tree, data, position))
         mass[np.ix_(order, order)] = upper + np.triu(upper, 1).T
         per_rate = np.array([speeds(vehicle, q, e) for e in np.eye(14)]).T
         close(second_order(vehicle, x, delta)[0], per_rate.T @ mass @ per_rate, 1e-10)
