@@ -1,4 +1,4 @@
-"""The high-fidelity vehicle's numbers, points, tensors, steering input, tyre and random states.
+"""The high-fidelity vehicle's numbers, points, tensors, steering input and tyre.
 
 Written from the text of the vehicle's specification alone; `high_fidelity_vehicle` and
 `high_fidelity_pinocchio` use it.  Numbers are of the left side; the right side is mirrored.
@@ -8,7 +8,6 @@ Arrays over two sides are in the order left, right.  SI units throughout.
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +31,6 @@ WHEELS = [BODIES.index(f"wheel_{corner}") for corner in ("FL", "FR", "RL", "RR")
 # what a wheel turns on: the front carriers and the rear arms
 HOLDERS = [BODIES.index(name) for name in ("carrier_FL", "carrier_FR", "arm_RL", "arm_RR")]
 AXLES = ("front", "front", "rear", "rear")  # of the wheels and springs in the order FL to RR
-DEPENDENT = [k for k in range(6, 20) if k not in {10, 17}]  # corner coordinates but theta_l
 
 
 def _flat(table: Mapping, before: str = "") -> dict[str, float | list]:
@@ -45,7 +43,6 @@ def _flat(table: Mapping, before: str = "") -> dict[str, float | list]:
 
 PARAMETERS = _flat(tomllib.loads(Path(__file__).with_suffix(".toml").read_text()))
 NO_DAMPERS = {"front.spring.damping": 0.0, "rear.spring.damping": 0.0}
-NO_TYRES = {"tyre.vertical_stiffness": 0.0, "tyre.vertical_damping": 0.0}
 
 
 # Places of the mirror image's coordinates, and those that it reverses.
@@ -58,16 +55,6 @@ def mirror(vectors: np.ndarray) -> np.ndarray:
     halves = vectors.reshape(*vectors.shape[:-1], -1, 26)[..., PARTNERS]
     halves[..., REVERSED] *= -1
     return halves.reshape(vectors.shape)
-
-
-class State(NamedTuple):
-    """Coordinates, their rates, and the rack's position, velocity and acceleration."""
-
-    q: np.ndarray
-    qd: np.ndarray
-    s: float
-    sd: float
-    sdd: float
 
 
 def both_sides(point: np.ndarray) -> np.ndarray:
@@ -187,116 +174,3 @@ def fiala(fz: float, kappa: float, t: float, p: Numbers) -> tuple[float, float, 
     h = 1 - pull / (3 * grip)
     fy = -np.sign(t) * grip * (1 - h**3)
     return fx, fy, np.sign(t) * grip * p["tyre.width"] * (1 - h) * h**3
-
-
-def random_states(
-    count: int, seed: int = 0, speeds: tuple[float, float] = (5.0, 30.0), p: Numbers = PARAMETERS
-) -> list[State]:
-    """States over the reachable range; the seed fixes them.
-
-    In states of even number the loops are closed (Phi = Phi' = 0); in the others the corner
-    coordinates are off by up to 1e-3 and their rates are independent of each other.  Every third
-    state moves gently, so that tyres slip little.  Wheels are in the air or on the road.
-
-    Parameters
-    ----------
-    count
-        How many states.
-    seed
-        Seed of the generator.
-    speeds
-        Range of the forward speed in m/s.  Small ones reach the lower bound of |V_x|.
-    p
-        The vehicle's numbers.
-    """
-    rng = np.random.default_rng(seed)
-    states = []
-    while len(states) < count:
-        closed, gentle = len(states) % 2 == 0, len(states) % 3 == 2
-        state = random_state(rng, speeds, p, closed=closed, gentle=gentle)
-        if state is not None:
-            states.append(state)
-    return states
-
-
-def random_state(
-    rng: np.random.Generator,
-    speeds: tuple[float, float],
-    p: Numbers,
-    *,
-    closed: bool,
-    gentle: bool,
-) -> State | None:
-    """One state, or None if a wheel would be deep in the road."""
-    from tests.oracles.high_fidelity_vehicle import tyres
-
-    scale = rng.uniform()  # postures near design are as likely as far ones
-    s = rng.uniform(-0.03, 0.03)
-    q = design(p)
-    q[[10, 17]] = scale * rng.uniform(-0.35, 0.35, 2)
-    q = close_corners(q, s, p)
-    q[20:22] = scale * rng.uniform(-0.25, 0.25, 2)
-    if not closed:
-        q[6:22] += rng.uniform(-1e-3, 1e-3, 16)
-    q[:2] = rng.uniform(-50, 50, 2)
-    q[3] = rng.uniform(-np.pi, np.pi)
-    q[4:6] = scale * rng.uniform(-0.2, 0.2, 2)
-    q[22:] = rng.uniform(-np.pi, np.pi, 4)
-
-    # one of the wheels is near the road; radii at z = 0 differ but for camber as at the right z
-    below = tyres(q, np.zeros(26), p)[rng.integers(4)]["r"]
-    q[2] = p["tyre.unloaded_radius"] - rng.uniform(-0.003, 0.03) - below
-    radii = np.array([tyre["r"] for tyre in tyres(q, np.zeros(26), p)])
-    if radii.min() < p["tyre.unloaded_radius"] - 0.1:
-        return None
-
-    vivid = 0.02 if gentle else 1.0
-    forward = rng.uniform(*speeds)
-    sideward, upward = vivid * rng.uniform(-2, 2), vivid * rng.uniform(-1, 1)
-    cos, sin = np.cos(q[3]), np.sin(q[3])
-    qd = np.zeros(26)
-    qd[:3] = cos * forward - sin * sideward, sin * forward + cos * sideward, upward
-    qd[3:6] = vivid * rng.uniform(-1, 1, 3)
-    qd[6:22] = vivid * rng.uniform(-2, 2, 16)
-    qd[22:] = forward / radii * (1 + vivid * rng.uniform(-0.2, 0.2, 4))
-    sd, sdd = vivid * rng.uniform(-0.1, 0.1), rng.uniform(-1, 1)
-    if closed:
-        qd = consistent_rates(q, qd, s, sd, p)
-    return State(q, qd, s, sd, sdd)
-
-
-def close_corners(q: np.ndarray, s: float, p: Numbers = PARAMETERS, steps: int = 2) -> np.ndarray:
-    """The coordinates with both front loops closed, at the given theta_l and rack position.
-
-    The corners' other coordinates follow from the design position by continuation.
-    """
-    # that module uses this one's numbers, so it cannot be imported at the top
-    from tests.oracles.high_fidelity_vehicle import constraints
-
-    target, rest = np.array(q, dtype=float), design(p)
-    closed = target.copy()
-    closed[6:20] = rest[6:20]
-    for share in np.arange(1, steps + 1) / steps:
-        closed[[10, 17]] = share * target[[10, 17]]
-        for _ in range(20):
-            phi, _, jacobian, _ = constraints(closed, np.zeros(26), share * s, 0.0, 0.0, p)
-            change = np.linalg.solve(jacobian[:, DEPENDENT], phi)
-            closed[DEPENDENT] -= change
-            if np.abs(change).max() < 1e-12:  # converges quadratically: the next would be rounding
-                break
-        else:
-            raise ValueError("front loops cannot be closed")
-    return closed
-
-
-def consistent_rates(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS
-) -> np.ndarray:
-    """The rates with Phi' = 0: those of the corners' dependent coordinates are replaced."""
-    from tests.oracles.high_fidelity_vehicle import constraints
-
-    rates = np.array(qd, dtype=float)
-    rates[DEPENDENT] = 0.0
-    _, rest, jacobian, _ = constraints(q, rates, s, sd, 0.0, p)
-    rates[DEPENDENT] = -np.linalg.solve(jacobian[:, DEPENDENT], rest)
-    return rates

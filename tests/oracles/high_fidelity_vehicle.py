@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.optimize import root
 
 from tests.oracles.high_fidelity_data import (
     AXLES,
@@ -22,7 +21,6 @@ from tests.oracles.high_fidelity_data import (
     WHEELS,
     Numbers,
     arm_axis,
-    design,
     fiala,
     front_points,
     masses_and_tensors,
@@ -229,13 +227,6 @@ def mass_and_bias(
     return Instant(q, qd, s, sd, sdd, p).mass_and_bias()
 
 
-def applied_forces(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS
-) -> np.ndarray:
-    """Q (26,): gravity, springs with dampers, tyres."""
-    return Instant(q, qd, s, sd, 0.0, p).applied_forces()
-
-
 def constraints(
     q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers = PARAMETERS
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -254,11 +245,6 @@ def accelerations(
     return np.linalg.solve(system, np.concatenate([now.applied_forces() - bias, gamma]))[:26]
 
 
-def tyres(q: np.ndarray, qd: np.ndarray, p: Numbers = PARAMETERS) -> list[dict]:
-    """Loaded radius, slips, forces and moment of each tyre: FL, FR, RL, RR."""
-    return Instant(q, qd, 0.0, 0.0, 0.0, p).tyres()  # the rack moves the tie rods alone
-
-
 def energy(q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS) -> float:
     """Kinetic energy and the potential of gravity and springs in J, without the tyres'."""
     now = Instant(q, qd, s, sd, 0.0, p)
@@ -269,36 +255,3 @@ def energy(q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARA
         squeezed = p[f"{axle}.spring.free_length"] - now.spring(number)[0]
         stored += p[f"{axle}.spring.stiffness"] * squeezed**2 / 2
     return kinetic + stored
-
-
-def equilibrium(p: Numbers = PARAMETERS) -> tuple[float, float, float, float]:
-    """Static z in m and theta, and free lengths of the front and rear springs in m.
-
-    With them all joints rest at design.  Free lengths among the numbers are first guesses only.
-    """
-
-    def unbalanced(unknowns: np.ndarray) -> np.ndarray:
-        q = design(p)
-        q[2], q[4] = unknowns[:2]
-        lengths = {"front.spring.free_length": unknowns[2], "rear.spring.free_length": unknowns[3]}
-        return accelerations(q, np.zeros(26), 0.0, 0.0, 0.0, {**p, **lengths})[[2, 4, 10, 20]]
-
-    # wheels touch the road at design when the chassis is this high
-    touching = p["tyre.unloaded_radius"] - rear_points(p)["wheel_centre"][0, 2]
-    guess = [touching - 0.01, 0.0, p["front.spring.free_length"], p["rear.spring.free_length"]]
-    found = root(unbalanced, guess, tol=1e-15)
-    if np.abs(unbalanced(found.x)).max() > 1e-8:
-        raise ValueError("no static equilibrium found")
-    return tuple(found.x)
-
-
-def start(name: str, p: Numbers = PARAMETERS) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates of the "equilibrium" or "dropped" start."""
-    q, qd = design(p), np.zeros(26)
-    q[2], q[4] = equilibrium(p)[:2]
-    qd[0] = p["general.initial_speed"]
-    qd[22:] = [qd[0] / tyre["r"] for tyre in tyres(q, qd, p)]
-    if name == "dropped":
-        q[2] += p["dropped_start.dz"]
-        q[4] += p["dropped_start.dpitch"]
-    return q, qd

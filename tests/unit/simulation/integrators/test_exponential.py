@@ -4,7 +4,6 @@ N. Higham, Functions of Matrices (SIAM 2008), chapter 10; S. Krogstad, J. Comput
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,64 +153,3 @@ def test_a_system_without_a_jacobian_is_left_to_the_adams_formulas():
     times = np.linspace(0.0, 4.0, 9)
     found = run(system, [1.0, 0.0], 1e-10, times)
     np.testing.assert_allclose(found.path[:, 0], 1.0 / np.sqrt(1.0 + 2.0 * times), atol=1e-9)
-
-
-# A body in the plane: place, heading, velocity in the ground's frame, yaw rate.
-START = [3.0, -2.0, 0.0, 10.0, 0.5, 0.3]
-
-
-def body(x, u):
-    """A drag that differs along and across, and a moment against slipping."""
-    del u
-    c, s = math.cos(x[2]), math.sin(x[2])
-    along, across = c * x[3] + s * x[4], -s * x[3] + c * x[4]
-    drive, side = 2.0 - 0.2 * along, -8.0 * across - 0.4 * across**3
-    rates = [c * drive - s * side, s * drive + c * side]
-    return [x[3], x[4], x[5], *rates, 0.8 * math.sin(along) + 0.5 * across - 3.0 * x[5]]
-
-
-def turning_body():
-    system = python_system(body, [0.0, 0.0, 0.0, 10.0, 0.0, 0.0], 3)
-    return replace(
-        system, rotating=np.array([2, 0, 1, 3, 4]), active=np.arange(2, 6), error_scale=np.ones(6)
-    )
-
-
-def rotated(states: np.ndarray, angle: float) -> np.ndarray:
-    result = np.array(states, dtype=float)
-    for a, b in ((0, 1), (3, 4)):
-        pair = np.exp(1j * angle) * (result[..., a] + 1j * result[..., b])
-        result[..., a], result[..., b] = pair.real, pair.imag
-    result[..., 2] += angle
-    return result
-
-
-def test_the_jacobian_in_the_vehicles_frame_is_that_of_the_transformed_equations():
-    system, reference = turning_body(), np.array([0.0, 0.0, 0.0, 10.0, 0.0, 0.0])
-    np.testing.assert_array_equal(system.turning, [2, 3, 4])
-
-    def slopes(y):
-        c, s = math.cos(y[2]), math.sin(y[2])
-        x = [*y[:3], c * y[3] - s * y[4], s * y[3] + c * y[4], y[5]]
-        dx = np.array(body(x, None))
-        a, b = c * dx[3] + s * dx[4], -s * dx[3] + c * dx[4]
-        return np.array([*dx[:3], a + dx[2] * y[4], b - dx[2] * y[3], dx[5]])
-
-    steps = 1e-6 * np.eye(6)
-    columns = [(slopes(reference + e) - slopes(reference - e)) / 2e-6 for e in steps]
-    expected = np.transpose(columns)
-    # Rates of the place turn with the heading.
-    expected[:2] = 0.0
-    np.testing.assert_allclose(system.turning_jacobian, expected, atol=1e-7)
-
-
-@pytest.mark.parametrize("angle", [0.7, 2.5, -20.0])
-def test_a_run_does_not_depend_on_the_heading(angle):
-    system, times = turning_body(), np.linspace(0.0, 4.0, 9)
-    ahead = run(system, START, 1e-6, times)
-    elsewhere = run(system, rotated(np.array(START), angle), 1e-6, times)
-    # Not even the error does, but for what counts relative to the states' own size.
-    np.testing.assert_allclose(elsewhere.path, rotated(ahead.path, angle), atol=1e-5)
-    assert abs(elsewhere.counts[1] - ahead.counts[1]) < 0.2 * ahead.counts[1]
-    exact = run(system, START, 1e-11, times)
-    np.testing.assert_allclose(ahead.path, exact.path, atol=2e-5)
