@@ -13,6 +13,7 @@ import vehiclemor
 from tests.plugin.installation import installed
 from tests.texts.markdown import NAMES, ROOT, TEXTS, blocks, console_commands, inline_commands
 from vehiclemor.cli.app import app, main
+from vehiclemor.exporting import fmu
 from vehiclemor.report.citation import citations
 from vehiclemor.report.figures import theme
 from vehiclemor.report.published import load_published
@@ -80,6 +81,9 @@ def test_commands_can_be_parsed(path):
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # One picture of each figure is enough here, and machine code that is not optimised.
+    monkeypatch.setattr(theme, "FORMATS", ("png",))
+    monkeypatch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0"))
     return tmp_path
 
 
@@ -117,9 +121,7 @@ def test_the_example_study_runs(here, capsys):
         assert main(words[1:]) == 0, words
 
 
-def test_a_plug_in_is_made_step_by_step(here, capsys, monkeypatch):
-    # One picture of each figure is enough here.
-    monkeypatch.setattr(theme, "FORMATS", ("png",))
+def test_a_plug_in_is_made_step_by_step(here, capsys):
     first, *rest = console_commands(PLUG_IN)
     assert main(first[1:]) == 0
     (code,) = [b.content for b in blocks(PLUG_IN) if b.language == "python" and b.above[:1] != "`"]
