@@ -27,6 +27,12 @@ NAME = "kernels/some-0123.o"
 CONTENT = b"some content"
 
 
+@pytest.fixture(autouse=True)
+def _warnings_alone(caplog: pytest.LogCaptureFixture) -> None:
+    """On a busy machine it is told, too, what takes long to compile."""
+    caplog.set_level(logging.WARNING, "vehiclemor")
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache."""
