@@ -29,12 +29,14 @@ IN_CI = os.environ.get("CI", "").lower() in ("1", "true", "yes")
 hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN_CI else "dev"))
 
 
-# What takes long to derive and compile, for two processes side by side.
+# What takes long to derive and compile, and many files need, for two processes side by side.
 COMPILATIONS = (
     """
 import vehiclemor as vm
 from vehiclemor.inputs.steering import straight_ahead
-vm.model("independent_suspension_vehicle").simulate(straight_ahead, tolerance=1e-2)
+car = vm.model("independent_suspension_vehicle")
+for solver in ("dopri5", "ros34pw2", "etdrk4", "exponential_adams"):
+    car.simulate(straight_ahead, times=[0.1], solver=solver, tolerance=1e-2)
 """,
     """
 import vehiclemor as vm

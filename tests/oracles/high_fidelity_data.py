@@ -1,12 +1,13 @@
-"""The high-fidelity vehicle's numbers, points, tensors, steering input, tyre and random states.
+"""The high-fidelity vehicle's numbers, points, tensors, steering input and tyre.
 
 Written from the text of the vehicle's specification alone; `high_fidelity_vehicle` and
 `high_fidelity_pinocchio` use it.  Numbers are of the left side; the right side is mirrored.
 Arrays over two sides are in the order left, right.  SI units throughout.
 """
 
+import tomllib
 from collections.abc import Mapping
-from typing import NamedTuple
+from pathlib import Path
 
 import numpy as np
 
@@ -30,91 +31,30 @@ WHEELS = [BODIES.index(f"wheel_{corner}") for corner in ("FL", "FR", "RL", "RR")
 # what a wheel turns on: the front carriers and the rear arms
 HOLDERS = [BODIES.index(name) for name in ("carrier_FL", "carrier_FR", "arm_RL", "arm_RR")]
 AXLES = ("front", "front", "rear", "rear")  # of the wheels and springs in the order FL to RR
-DEPENDENT = [k for k in range(6, 20) if k not in {10, 17}]  # corner coordinates but theta_l
 
-PARAMETERS = {
-    "general.gravity": 9.81,
-    "general.baumgarte_a": 50.0,
-    "general.baumgarte_b": 50.0,
-    "general.initial_speed": 20.0,
-    "frames.S_origin_in_V": [1.388, 0.0, 0.1199],
-    "frames.R_origin_in_V": [-1.388, 0.7979, 0.0],
-    "frames.C_origin_in_V": [0.0, 0.0, 0.2277],
-    "chassis.mass": 1515.0,
-    "chassis.inertia_diag": [460.0, 2580.0, 2800.0],
-    "front.points.upper_pivot_front": [-0.1, 0.47, 0.105],
-    "front.points.upper_pivot_rear": [-0.25, 0.51, 0.11],
-    "front.points.upper_ball": [-0.04, 0.695, 0.105],
-    "front.points.lower_pivot_front": [0.2, 0.42, -0.27],
-    "front.points.lower_pivot_rear": [-0.2, 0.47, -0.265],
-    "front.points.lower_ball": [0.0, 0.77, -0.32],
-    "front.points.rack_end": [-0.2, 0.4921, -0.0962],
-    "front.points.tie_rod_outer": [-0.15, 0.77, -0.12],
-    "front.points.wheel_centre": [0.0, 0.7979, -0.1199],
-    "front.points.spring_chassis": [-0.04, 0.52, 0.23],
-    "front.points.spring_arm": [0.0, 0.62, -0.27],
-    "front.upper_arm.mass": 1.032,
-    "front.upper_arm.cg": [-0.1083, 0.5972, 0.1063],
-    "front.upper_arm.inertia_arm_frame": [0.00591, 0.0019, 0.00769],
-    "front.lower_arm.mass": 1.611,
-    "front.lower_arm.cg": [0.0048, 0.6112, -0.2932],
-    "front.lower_arm.inertia_arm_frame": [0.0151, 0.0207, 0.0355],
-    "front.upright.mass": 1.397,
-    "front.upright.cg": [-0.0224, 0.747, -0.1118],
-    "front.upright.inertia_diag": [0.0138, 0.0146, 0.00283],
-    "front.tie_rod.mass": 0.55,
-    "front.tie_rod.inertia_transverse": 0.0057,
-    "front.tie_rod.inertia_axial": 2e-05,
-    "front.wheel.mass": 25.803,
-    "front.wheel.inertia_spin": 1.099496,
-    "front.wheel.inertia_transverse": 0.396478,
-    "front.spring.stiffness": 73574.10163,
-    "front.spring.damping": 15054.53731,
-    "front.spring.free_length": 0.6093460427981641,
-    "rear.pivot": [0.45, -0.25, -0.03],
-    "rear.arm.mass": 14.25,
-    "rear.arm.cg": [0.069614, -0.135789, -0.053421],
-    "rear.arm.inertia": [
-        [0.268112, 0.058977, 0.068806],
-        [0.058977, 0.359839, -0.033655],
-        [0.068806, -0.033655, 0.349422],
-    ],
-    "rear.wheel.mass": 24.7,
-    "rear.wheel.inertia_spin": 1.099,
-    "rear.wheel.inertia_transverse": 0.396,
-    "rear.spring.chassis_point": [0.17, -0.2075, 0.335],
-    "rear.spring.arm_point": [0.09, -0.23, -0.045],
-    "rear.spring.stiffness": 43780.0,
-    "rear.spring.damping": 4000.0,
-    "rear.spring.free_length": 0.4990957602849919,
-    "tyre.unloaded_radius": 0.3266,
-    "tyre.vertical_stiffness": 280835.2941,
-    "tyre.vertical_damping": 2000.0,
-    "tyre.c_long": 115000.0,
-    "tyre.c_alpha": 117000.0,
-    "tyre.mu_max": 0.75,
-    "tyre.mu_min": 0.2,
-    "tyre.width": 0.32,
-    "tyre.v_low": 0.5,
-    "steering.amplitude": -0.0046903,
-    "steering.start": 1.0,
-    "steering.period": 2.5,
-    "steering.duration": 10.0,
-    "dropped_start.dz": 0.03,
-    "dropped_start.dpitch": 0.015,
-}
+
+def _flat(table: Mapping, before: str = "") -> dict[str, float | list]:
+    found = {}
+    for key, value in table.items():
+        name = f"{before}{key}"
+        found |= _flat(value, f"{name}.") if isinstance(value, dict) else {name: value}
+    return found
+
+
+PARAMETERS = _flat(tomllib.loads(Path(__file__).with_suffix(".toml").read_text()))
 NO_DAMPERS = {"front.spring.damping": 0.0, "rear.spring.damping": 0.0}
-NO_TYRES = {"tyre.vertical_stiffness": 0.0, "tyre.vertical_damping": 0.0}
 
 
-class State(NamedTuple):
-    """Coordinates, their rates, and the rack's position, velocity and acceleration."""
+# Places of the mirror image's coordinates, and those that it reverses.
+PARTNERS = [*range(6), *range(13, 20), *range(6, 13), 21, 20, 23, 22, 25, 24]
+REVERSED = [1, 3, 5, *(k for first in (6, 13) for k in (first, *range(first + 2, first + 7)))]
 
-    q: np.ndarray
-    qd: np.ndarray
-    s: float
-    sd: float
-    sdd: float
+
+def mirror(vectors: np.ndarray) -> np.ndarray:
+    """States, or coordinates, of the mirror image; along the last axis."""
+    halves = vectors.reshape(*vectors.shape[:-1], -1, 26)[..., PARTNERS]
+    halves[..., REVERSED] *= -1
+    return halves.reshape(vectors.shape)
 
 
 def both_sides(point: np.ndarray) -> np.ndarray:
@@ -234,116 +174,3 @@ def fiala(fz: float, kappa: float, t: float, p: Numbers) -> tuple[float, float, 
     h = 1 - pull / (3 * grip)
     fy = -np.sign(t) * grip * (1 - h**3)
     return fx, fy, np.sign(t) * grip * p["tyre.width"] * (1 - h) * h**3
-
-
-def random_states(
-    count: int, seed: int = 0, speeds: tuple[float, float] = (5.0, 30.0), p: Numbers = PARAMETERS
-) -> list[State]:
-    """States over the reachable range; the seed fixes them.
-
-    In states of even number the loops are closed (Phi = Phi' = 0); in the others the corner
-    coordinates are off by up to 1e-3 and their rates are independent of each other.  Every third
-    state moves gently, so that tyres slip little.  Wheels are in the air or on the road.
-
-    Parameters
-    ----------
-    count
-        How many states.
-    seed
-        Seed of the generator.
-    speeds
-        Range of the forward speed in m/s.  Small ones reach the lower bound of |V_x|.
-    p
-        The vehicle's numbers.
-    """
-    rng = np.random.default_rng(seed)
-    states = []
-    while len(states) < count:
-        closed, gentle = len(states) % 2 == 0, len(states) % 3 == 2
-        state = random_state(rng, speeds, p, closed=closed, gentle=gentle)
-        if state is not None:
-            states.append(state)
-    return states
-
-
-def random_state(
-    rng: np.random.Generator,
-    speeds: tuple[float, float],
-    p: Numbers,
-    *,
-    closed: bool,
-    gentle: bool,
-) -> State | None:
-    """One state, or None if a wheel would be deep in the road."""
-    from tests.oracles.high_fidelity_vehicle import tyres
-
-    scale = rng.uniform()  # postures near design are as likely as far ones
-    s = rng.uniform(-0.03, 0.03)
-    q = design(p)
-    q[[10, 17]] = scale * rng.uniform(-0.35, 0.35, 2)
-    q = close_corners(q, s, p)
-    q[20:22] = scale * rng.uniform(-0.25, 0.25, 2)
-    if not closed:
-        q[6:22] += rng.uniform(-1e-3, 1e-3, 16)
-    q[:2] = rng.uniform(-50, 50, 2)
-    q[3] = rng.uniform(-np.pi, np.pi)
-    q[4:6] = scale * rng.uniform(-0.2, 0.2, 2)
-    q[22:] = rng.uniform(-np.pi, np.pi, 4)
-
-    # one of the wheels is near the road; radii at z = 0 differ but for camber as at the right z
-    below = tyres(q, np.zeros(26), p)[rng.integers(4)]["r"]
-    q[2] = p["tyre.unloaded_radius"] - rng.uniform(-0.003, 0.03) - below
-    radii = np.array([tyre["r"] for tyre in tyres(q, np.zeros(26), p)])
-    if radii.min() < p["tyre.unloaded_radius"] - 0.1:
-        return None
-
-    vivid = 0.02 if gentle else 1.0
-    forward = rng.uniform(*speeds)
-    sideward, upward = vivid * rng.uniform(-2, 2), vivid * rng.uniform(-1, 1)
-    cos, sin = np.cos(q[3]), np.sin(q[3])
-    qd = np.zeros(26)
-    qd[:3] = cos * forward - sin * sideward, sin * forward + cos * sideward, upward
-    qd[3:6] = vivid * rng.uniform(-1, 1, 3)
-    qd[6:22] = vivid * rng.uniform(-2, 2, 16)
-    qd[22:] = forward / radii * (1 + vivid * rng.uniform(-0.2, 0.2, 4))
-    sd, sdd = vivid * rng.uniform(-0.1, 0.1), rng.uniform(-1, 1)
-    if closed:
-        qd = consistent_rates(q, qd, s, sd, p)
-    return State(q, qd, s, sd, sdd)
-
-
-def close_corners(q: np.ndarray, s: float, p: Numbers = PARAMETERS, steps: int = 2) -> np.ndarray:
-    """The coordinates with both front loops closed, at the given theta_l and rack position.
-
-    The corners' other coordinates follow from the design position by continuation.
-    """
-    # that module uses this one's numbers, so it cannot be imported at the top
-    from tests.oracles.high_fidelity_vehicle import constraints
-
-    target, rest = np.array(q, dtype=float), design(p)
-    closed = target.copy()
-    closed[6:20] = rest[6:20]
-    for share in np.arange(1, steps + 1) / steps:
-        closed[[10, 17]] = share * target[[10, 17]]
-        for _ in range(20):
-            phi, _, jacobian, _ = constraints(closed, np.zeros(26), share * s, 0.0, 0.0, p)
-            change = np.linalg.solve(jacobian[:, DEPENDENT], phi)
-            closed[DEPENDENT] -= change
-            if np.abs(change).max() < 1e-12:  # converges quadratically: the next would be rounding
-                break
-        else:
-            raise ValueError("front loops cannot be closed")
-    return closed
-
-
-def consistent_rates(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS
-) -> np.ndarray:
-    """The rates with Phi' = 0: those of the corners' dependent coordinates are replaced."""
-    from tests.oracles.high_fidelity_vehicle import constraints
-
-    rates = np.array(qd, dtype=float)
-    rates[DEPENDENT] = 0.0
-    _, rest, jacobian, _ = constraints(q, rates, s, sd, 0.0, p)
-    rates[DEPENDENT] = -np.linalg.solve(jacobian[:, DEPENDENT], rest)
-    return rates

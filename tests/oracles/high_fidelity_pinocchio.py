@@ -114,13 +114,3 @@ def mass_and_bias(
     bias = pin.rnea(model, model.createData(), joints, rates, second)
     coordinates = matrix[:, :26]
     return coordinates.T @ mass @ coordinates, coordinates.T @ bias
-
-
-def gravity_forces(q: np.ndarray, s: float, p: Numbers = PARAMETERS) -> np.ndarray:
-    """Gravity's part of Q (26,)."""
-    import pinocchio as pin
-
-    model, matrix = tree(p)
-    model.gravity.linear = np.array([0.0, 0.0, -p["general.gravity"]])
-    needed = pin.computeGeneralizedGravity(model, model.createData(), matrix @ [*q, s])
-    return -matrix[:, :26].T @ needed

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.optimize import root
 
 from tests.oracles.high_fidelity_data import (
     AXLES,
@@ -22,27 +21,13 @@ from tests.oracles.high_fidelity_data import (
     WHEELS,
     Numbers,
     arm_axis,
-    design,
     fiala,
     front_points,
     masses_and_tensors,
     rear_points,
     tie_rod_length,
 )
-
-X, Y, Z = np.eye(3)
-# [u]x = u @ CROSS, shape (3, 3, 3)
-CROSS = np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), 1, 2)
-
-
-# Taylor polynomials: coefficients of 1, t, t^2
-
-
-def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Matrix product of two polynomials, truncated."""
-    return np.array(
-        [a[0] @ b[0], a[0] @ b[1] + a[1] @ b[0], a[0] @ b[2] + a[1] @ b[1] + a[2] @ b[0]]
-    )
+from tests.oracles.taylor import X, Y, Z, axial, euler_321, times, turned
 
 
 def along(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -55,24 +40,6 @@ def about(pivot: np.ndarray, turn: np.ndarray, point: np.ndarray) -> np.ndarray:
     moved = along(turn, point - pivot)
     moved[0] += pivot
     return moved
-
-
-def turned(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotations E + sin [u]x + (1 - cos) [u]x^2 (3, ..., 3, 3) about constant unit axes."""
-    cross = np.tensordot(axis, CROSS, 1)
-    s, c = np.sin(angle[0]), np.cos(angle[0])
-    half = angle[1] ** 2 / 2
-    sine = np.array([s, c * angle[1], c * angle[2] - s * half])
-    versine = np.array([1 - c, s * angle[1], s * angle[2] + c * half])
-    matrix = sine[..., None, None] * cross + versine[..., None, None] * (cross @ cross)
-    matrix[0] += np.eye(3)
-    return matrix
-
-
-def axial(matrix: np.ndarray) -> np.ndarray:
-    """Axial vector of a matrix's skew part."""
-    skew = (matrix - np.swapaxes(matrix, -1, -2)) / 2
-    return np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
 
 
 # kinematics
@@ -104,10 +71,10 @@ def front_axle(path: np.ndarray, rack: np.ndarray, p: Numbers) -> Axle:
     """Upper arms, lower arms, carriers, tie rods and wheels."""
     at = front_points(p)
     corner = path[..., 6:20].reshape(*path.shape[:2], 2, 7)
-    zeta, eta, xi, theta_u, theta_l, alpha, beta = np.moveaxis(corner, -1, 0)
+    theta_u, theta_l, alpha, beta = np.moveaxis(corner[..., 3:], -1, 0)
 
     upper, lower = turned(arm_axis("upper", at), theta_u), turned(arm_axis("lower", at), theta_l)
-    carrier = times(times(turned(Z, zeta), turned(Y, eta)), turned(X, xi))
+    carrier = euler_321(corner[..., :3])
     rod = times(turned(Z, alpha), turned(X, beta))
 
     on_upper = partial(about, at["upper_pivot_rear"], upper)
@@ -168,8 +135,7 @@ class Instant:
         self.springs = np.concatenate([front.springs, rear.springs], axis=2)
         self.masses, tensors = masses_and_tensors(p)
 
-        chassis = times(turned(Z, path[..., 3]), turned(Y, path[..., 4]))
-        chassis = times(chassis, turned(X, path[..., 5]))[:, :, None]
+        chassis = euler_321(path[..., 3:6])[:, :, None]
         still, level = np.zeros((3, 27, 1, 3)), np.zeros((3, 27, 1, 3, 3))
         level[0] = np.eye(3)
         cgs = np.concatenate([still, *front.cgs, *rear.cgs], axis=2)
@@ -261,13 +227,6 @@ def mass_and_bias(
     return Instant(q, qd, s, sd, sdd, p).mass_and_bias()
 
 
-def applied_forces(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS
-) -> np.ndarray:
-    """Q (26,): gravity, springs with dampers, tyres."""
-    return Instant(q, qd, s, sd, 0.0, p).applied_forces()
-
-
 def constraints(
     q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers = PARAMETERS
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -286,11 +245,6 @@ def accelerations(
     return np.linalg.solve(system, np.concatenate([now.applied_forces() - bias, gamma]))[:26]
 
 
-def tyres(q: np.ndarray, qd: np.ndarray, p: Numbers = PARAMETERS) -> list[dict]:
-    """Loaded radius, slips, forces and moment of each tyre: FL, FR, RL, RR."""
-    return Instant(q, qd, 0.0, 0.0, 0.0, p).tyres()  # the rack moves the tie rods alone
-
-
 def energy(q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARAMETERS) -> float:
     """Kinetic energy and the potential of gravity and springs in J, without the tyres'."""
     now = Instant(q, qd, s, sd, 0.0, p)
@@ -301,36 +255,3 @@ def energy(q: np.ndarray, qd: np.ndarray, s: float, sd: float, p: Numbers = PARA
         squeezed = p[f"{axle}.spring.free_length"] - now.spring(number)[0]
         stored += p[f"{axle}.spring.stiffness"] * squeezed**2 / 2
     return kinetic + stored
-
-
-def equilibrium(p: Numbers = PARAMETERS) -> tuple[float, float, float, float]:
-    """Static z in m and theta, and free lengths of the front and rear springs in m.
-
-    With them all joints rest at design.  Free lengths among the numbers are first guesses only.
-    """
-
-    def unbalanced(unknowns: np.ndarray) -> np.ndarray:
-        q = design(p)
-        q[2], q[4] = unknowns[:2]
-        lengths = {"front.spring.free_length": unknowns[2], "rear.spring.free_length": unknowns[3]}
-        return accelerations(q, np.zeros(26), 0.0, 0.0, 0.0, {**p, **lengths})[[2, 4, 10, 20]]
-
-    # wheels touch the road at design when the chassis is this high
-    touching = p["tyre.unloaded_radius"] - rear_points(p)["wheel_centre"][0, 2]
-    guess = [touching - 0.01, 0.0, p["front.spring.free_length"], p["rear.spring.free_length"]]
-    found = root(unbalanced, guess, tol=1e-15)
-    if np.abs(unbalanced(found.x)).max() > 1e-8:
-        raise ValueError("no static equilibrium found")
-    return tuple(found.x)
-
-
-def start(name: str, p: Numbers = PARAMETERS) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates of the "equilibrium" or "dropped" start."""
-    q, qd = design(p), np.zeros(26)
-    q[2], q[4] = equilibrium(p)[:2]
-    qd[0] = p["general.initial_speed"]
-    qd[22:] = [qd[0] / tyre["r"] for tyre in tyres(q, qd, p)]
-    if name == "dropped":
-        q[2] += p["dropped_start.dz"]
-        q[4] += p["dropped_start.dpitch"]
-    return q, qd

@@ -73,49 +73,6 @@ class PointMechanism:
             found.append(x)
         return np.array(found)
 
-    def extreme_height(self, direction: float, step: float = 0.01) -> float:
-        """Turning point of the height along the mechanism's curve, rack at 0.
-
-        The curve is followed along its arc length: nothing is singular at the turning point.
-        """
-        x, tangent = self.design, np.zeros(9)
-        tangent[2] = direction
-        while True:
-            tangent = self._tangent(x, tangent)
-            ahead = self._along(x, tangent, step)
-            if direction * self._slope(ahead, self._tangent(ahead, tangent)) < 0.0:
-                break
-            x = ahead
-
-        def slope(length: float) -> float:
-            at = self._along(x, tangent, length)
-            return self._slope(at, self._tangent(at, tangent))
-
-        length = optimize.brentq(slope, 0.0, step, xtol=1e-13)
-        return self.height(self._along(x, tangent, float(length)))
-
-    def _tangent(self, x: np.ndarray, like: np.ndarray) -> np.ndarray:
-        gradient = np.empty((8, 9))
-        for k in range(9):
-            # Squared distances are quadratic: central differences are exact but for rounding.
-            step = np.zeros(9)
-            step[k] = 0.5
-            gradient[:, k] = self.closures(x + step, 0.0) - self.closures(x - step, 0.0)
-        null = np.linalg.svd(gradient)[2][-1]
-        return null if null @ like > 0.0 else -null
-
-    def _along(self, x: np.ndarray, tangent: np.ndarray, length: float) -> np.ndarray:
-        def equations(y: np.ndarray) -> np.ndarray:
-            return np.append(self.closures(y, 0.0), tangent @ (y - x) - length)
-
-        solution = optimize.root(equations, x + length * tangent, tol=1e-14)
-        assert np.abs(solution.fun).max() < 1e-12
-        return solution.x
-
-    def _slope(self, x: np.ndarray, tangent: np.ndarray) -> float:
-        step = 1e-6
-        return (self.height(x + step * tangent) - self.height(x - step * tangent)) / (2.0 * step)
-
 
 def edges(x: np.ndarray) -> np.ndarray:
     """Two edges of the carrier and their vector product, in columns; its hand never changes."""

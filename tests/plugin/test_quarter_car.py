@@ -1,4 +1,4 @@
-"""The quarter car of a plug-in package: its physics, and what it gets without declaring it."""
+"""The quarter car of a plug-in package and its method: exact solutions, and good citizens."""
 
 import subprocess
 import sys
@@ -9,13 +9,18 @@ import pytest
 from scipy.linalg import expm
 
 import vehiclemor as vm
+from vehiclemor.contracts import check_method
+from vehiclemor.errors import InputError
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.steering import lane_change
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.shown import main_outputs, of_kind, tabled_outputs, timing_cases
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
-SOLVERS = [("dopri5", 1e-10), ("rodas4", 1e-9), ("ros34pw2", 1e-8), ("etdrk4", 1e-8)]
-SOLVERS += [("exponential_adams", 1e-9)]
+SOLVERS = {"dopri5": 1e-10, "rodas4": 1e-9, "ros34pw2": 1e-8, "etdrk4": 1e-8}
+SOLVERS["exponential_adams"] = 1e-9
 
 
 @pytest.fixture(scope="module")
@@ -34,15 +39,28 @@ def matrices(model) -> tuple[np.ndarray, np.ndarray]:
     return a, np.array([0.0, 0.0, 0.0, p["tire_stiffness"] / p["unsprung_mass"]])
 
 
-def exact(model, start: np.ndarray, frequency: float, times: np.ndarray) -> np.ndarray:
-    """States over a sine road: exponential of the system with the oscillator that is its road."""
+def exact(model, start: np.ndarray, drive: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """States over a road by the exponential of the system with what its road is the solution of.
+
+    Parameters
+    ----------
+    drive
+        Matrix (2, 2) of z' = drive z, z(0) = (0, 1), whose first component is the road in m.
+    times
+        Equidistant, from 0.
+    """
     a, b = matrices(model)
-    rate = 2.0 * np.pi * 1.5 * frequency
     whole = np.zeros((6, 6))
-    whole[:4, :4], whole[:4, 4] = a, 0.02 * b
-    whole[4:, 4:] = [[0.0, rate], [-rate, 0.0]]
-    at_start = np.concatenate([start, [0.0, 1.0]])
-    return np.array([expm(whole * t) @ at_start for t in times])[:, :4]
+    whole[:4, :4], whole[:4, 4], whole[4:, 4:] = a, b, drive
+    step, states = expm(whole * times[1]), [np.concatenate([start, [0.0, 1.0]])]
+    for _ in times[1:]:
+        states.append(step @ states[-1])
+    return np.array(states)[:, :4]
+
+
+def sine(frequency: float) -> np.ndarray:
+    rate = 2.0 * np.pi * 1.5 * frequency
+    return np.array([[0.0, 0.02 * rate], [-rate / 0.02, 0.0]])
 
 
 def test_an_installed_plug_in_is_listed_in_a_new_process():
@@ -56,7 +74,7 @@ def test_loose_steps_from_rest_do_not_pass_over_the_road(car, frequency):
     # The W-method's error estimate of one step over the whole run is zero by chance at 0.9.
     road = component("maneuver", car.definition.maneuver).perturbed(frequency, 1.0)
     run = car.simulate(road, solver="ros34pw2", tolerance=2e-3)
-    expected = exact(car, np.zeros(4), frequency, run.time)
+    expected = exact(car, np.zeros(4), sine(frequency), run.time)
     assert run.counts["steps"] > 50
     np.testing.assert_allclose(run.states, expected, atol=0.05 * np.abs(expected).max())
 
@@ -65,33 +83,21 @@ def test_loose_steps_from_rest_do_not_pass_over_the_road(car, frequency):
 @pytest.mark.parametrize("frequency", [1.0, 1.7])
 def test_runs_are_those_of_the_linear_system(car, start, frequency):
     maneuver = component("maneuver", "quarter_car_road").perturbed(frequency)
-    expected = exact(car, car.start(start), frequency, maneuver.times)
+    expected = exact(car, car.start(start), sine(frequency), maneuver.times)
     size = np.abs(expected).max(axis=0)
-    for solver, tolerance in SOLVERS:
+    for solver, tolerance in SOLVERS.items():
         run = car.simulate(maneuver, start, solver=solver, tolerance=tolerance)
         error = np.abs(run.states - expected).max(axis=0)
         assert np.all(error < 1e-6 * size), solver
-
-
-def test_outputs_are_acceleration_travel_and_tire_force(car):
-    run = car.simulate(component("maneuver", "quarter_car_road"), "dropped")
+    # Outputs: acceleration, travel, tire force; what the tire gives moves both masses.
     a, b = matrices(car)
-    rates = run.states @ a.T + run.inputs * b
-    tire = float(car.parameters["tire_stiffness"])
-    np.testing.assert_allclose(run.outputs[:, 0], rates[:, 2], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(run.outputs[:, 1], run.states[:, 1] - run.states[:, 0], atol=1e-15)
-    np.testing.assert_allclose(
-        run.outputs[:, 2], tire * (run.inputs[:, 0] - run.states[:, 1]), rtol=0, atol=1e-9
-    )
-    # Newton's second law of the whole: what the tire gives moves both masses.
-    masses = [float(car.parameters[name]) for name in ("sprung_mass", "unsprung_mass")]
-    np.testing.assert_allclose(rates[:, 2:] @ masses, run.outputs[:, 2], rtol=0, atol=1e-9)
-
-
-def test_second_order_form_is_that_of_the_masses(car):
-    x = np.array([0.01, -0.02, 0.3, -0.4])
-    np.testing.assert_array_equal(car.mass_matrix(x), np.diag([250.0, 45.0]))
-    np.testing.assert_array_equal(car.speeds_of_rates(x), x[2:])
+    rates, x, outputs = run.states @ a.T + run.inputs * b, run.states, run.outputs
+    tire = float(car.parameters["tire_stiffness"]) * (run.inputs[:, 0] - x[:, 1])
+    named = np.column_stack([rates[:, 2], x[:, 1] - x[:, 0], tire])
+    np.testing.assert_allclose(outputs, named, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(rates[:, 2:] @ [250.0, 45.0], outputs[:, 2], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(car.mass_matrix(x[7]), np.diag([250.0, 45.0]))
+    np.testing.assert_array_equal(car.speeds_of_rates(x[7]), x[7, 2:])
 
 
 def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
@@ -129,3 +135,60 @@ def test_windows_at_rest_have_no_growth_rate_and_the_others_have(car):
         assert still["effective_rank"].item() == 0
         assert np.isnan(still["growth_rate"])
         assert (still["rms_error"] == 0.0).all()
+
+
+# The method
+
+
+def fitted(model, **settings):
+    method = component("method", "quarter_car_modes")
+    return method.fit(model, (), validated(method, model.kind, settings))
+
+
+def ramp(samples: int) -> Maneuver:
+    names = component("maneuver", "quarter_car_road").inputs
+    return Maneuver("ramp", "", lambda t, *_: 0.3 * t[:, None], names, 4.0, samples, lambda _: ())
+
+
+def test_all_modes_of_a_linear_model_give_its_exact_solution(car):
+    start = car.start("dropped")
+    reduced, few = fitted(car, fastest=1e4), fitted(car, fastest=20.0)
+    assert (reduced.effective_rank, few.effective_rank) == (4, 2)
+    run = reduced.simulate(ramp(201), start)
+    # An input that is linear between the output times.
+    expected = exact(car, start, np.array([[0.0, 0.3], [0.0, 0.0]]), run.time)
+    np.testing.assert_allclose(run.states, expected, rtol=0, atol=1e-9)
+    # Whatever these are.
+    finer = reduced.simulate(ramp(4001), start)
+    np.testing.assert_allclose(run.states, finer.states[::20], rtol=0, atol=1e-10)
+    assert np.abs(few.simulate(ramp(201), start).states - expected).max() > 1e-4
+
+
+def test_modes_are_projected_without_loss(car, rng):
+    reduced, (matrix, _) = fitted(car, fastest=20.0), matrices(car)
+    best = reduced.best_approximation(rng.normal(size=(6, 4)))
+    np.testing.assert_allclose(reduced.best_approximation(best), best, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(reduced.left @ reduced.right, np.eye(2), rtol=0, atol=1e-12)
+    # The subspace is invariant.
+    image = matrix @ reduced.right
+    close = {"rtol": 0, "atol": 1e-6 * np.abs(image).max()}
+    np.testing.assert_allclose(reduced.right @ reduced.left @ image, image, **close)
+
+
+def test_a_vehicle_is_near_its_modes_at_small_amplitude():
+    check_method("quarter_car_modes", "independent_suspension_vehicle")
+    model = vm.model("independent_suspension_vehicle")
+    small = replace(lane_change, amplitude_factor=1e-3, duration=10.0, samples=1001)
+    full = model.simulate(small, tolerance=1e-9)
+    run = fitted(model, fastest=1e4).simulate(small, model.starts[0])
+    for name in ("yaw_rate", "roll", "lateral_position"):
+        column = model.outputs.index(name)
+        error = np.abs(run.outputs[:, column] - full.outputs[:, column]).max()
+        assert error < 2e-3 * np.abs(full.outputs[:, column]).max()
+
+
+def test_the_method_simulates_as_a_built_in():
+    data = vm.simulate("independent_suspension_vehicle", "quarter_car_modes", amplitude=0.01)
+    assert data["status"].item() == "ok"
+    with pytest.raises(InputError, match="double_wishbone is of kind ae"):
+        vm.simulate("double_wishbone", "quarter_car_modes")

@@ -1,13 +1,9 @@
-"""Symmetries, energy, constraints and runs of the high-fidelity vehicle."""
+"""Energy, constraints and runs of the high-fidelity vehicle."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS
@@ -33,15 +29,9 @@ REST = np.zeros(3)
 TIMES = np.array([0.05, 0.3, 0.9, 1.7, 2.6, 3.4, 4.0])
 
 
-@cache
-def built() -> DynamicModel:
-    """For tests of Hypothesis, which would print a fixture with every example."""
-    return build(NAME)
-
-
 @pytest.fixture(scope="module")
 def vehicle() -> DynamicModel:
-    return built()
+    return build(NAME)
 
 
 def integrate(
@@ -66,110 +56,6 @@ def series(path: Trajectory, model: DynamicModel, *names: str) -> np.ndarray:
 
 def loads(path: Trajectory, model: DynamicModel) -> np.ndarray:
     return series(path, model, *(f"Fz_{wheel}" for wheel in ("FL", "FR", "RL", "RR")))
-
-
-# Symmetries
-
-MIRRORED = [1, 3, 5, *(6 + corner + k for corner in (0, 7) for k in (0, 2, 3, 4, 5, 6))]
-PARTNERS = [*range(6), *range(13, 20), *range(6, 13), 21, 20, 23, 22, 25, 24]
-
-
-def mirror(vectors: np.ndarray) -> np.ndarray:
-    """States, or coordinates, of the mirror image; along the last axis."""
-    halves = vectors.reshape(*vectors.shape[:-1], -1, N)[..., PARTNERS]
-    halves[..., MIRRORED] *= -1
-    return halves.reshape(vectors.shape)
-
-
-def turn(x: np.ndarray, angle: float) -> np.ndarray:
-    """States (..., 52) of the vehicle turned about the world's origin."""
-    turned = np.array(x)
-    turned[..., 3] += angle
-    for k in (0, N):
-        place = (x[..., k] + 1j * x[..., k + 1]) * np.exp(1j * angle)
-        turned[..., k], turned[..., k + 1] = place.real, place.imag
-    return turned
-
-
-# About straight running: loops may be open, wheels in the air or deep in the road.
-RANGES = np.concatenate(
-    [
-        *([50.0, 50.0, 0.05, 3.0], np.full(18, 0.1), np.full(4, 3.0)),
-        *([15.0], np.full(21, 2.0), np.full(4, 20.0), [0.03, 0.1, 1.0]),
-    ]
-)
-shares = arrays(float, 2 * N + 3, elements=st.floats(-1.0, 1.0))
-
-
-def motion(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """State and inputs."""
-    change = share * RANGES
-    x = built().start() + change[: 2 * N]
-    x[3] = 0.0
-    return turn(x, change[3]), change[2 * N :]
-
-
-def close(found: np.ndarray, expected: np.ndarray) -> None:
-    """But for rounding of forces that cancel each other at rest."""
-    assert np.abs(found - expected).max() < 1e-10 * max(1.0, np.abs(expected).max())
-
-
-@given(share=shares)
-def test_the_mirrored_vehicle_accelerates_as_the_mirror_image(share):
-    x, u = motion(share)
-    expected = mirror(built().derivative(x, u)[N:])
-    close(built().derivative(mirror(x), -u)[N:], expected)
-
-
-@given(share=shares, angle=st.floats(-6.0, 6.0), spins=arrays(float, 4, elements=st.floats(-9, 9)))
-def test_place_heading_and_wheel_angles_have_no_influence(share, angle, spins):
-    x, u = motion(share)
-    moved = turn(x, angle)
-    moved[:2] += 100.0 * share[:2]
-    moved[22:N] += spins
-    expected = turn(built().derivative(x, u), angle)
-    close(built().derivative(moved, u)[N:], expected[N:])
-
-
-@pytest.mark.parametrize("start", STARTS)
-def test_the_mirrored_steering_drives_the_mirror_image(vehicle, start):
-    x = vehicle.start(start)
-    left = integrate(vehicle, LANE_CHANGE, x, tolerance=1e-10)
-    right = integrate(vehicle, LANE_CHANGE.perturbed(amplitude=-1.0), x, tolerance=1e-10)
-    assert left.states[-1, 1] > 3.0
-    np.testing.assert_allclose(right.states, mirror(left.states), rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize("solver", INTEGRATORS)
-def test_the_run_does_not_depend_on_the_heading(vehicle, solver):
-    """With equal steps not even its error does, though the frozen Jacobian is of one heading."""
-    x, angle = vehicle.start("dropped"), 2.0
-    # The explicit pair and the formulas of many steps are stable with short ones.
-    step = {"dopri5": 0.002, "exponential_adams": 0.004}.get(solver, 0.01)
-    options = {"solver": solver, "tolerance": 1e9, "longest_step": step}
-    plain = integrate(vehicle, LANE_CHANGE, x, **options)
-    turned = integrate(vehicle, LANE_CHANGE, turn(x, angle), **options)
-    np.testing.assert_allclose(turned.states, turn(plain.states, angle), rtol=0, atol=1e-6)
-    assert turned.counts == plain.counts
-    exact = integrate(vehicle, LANE_CHANGE, x, tolerance=1e-11).states
-    assert np.abs(plain.states - exact).max() > 1e-5
-
-
-@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
-def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(vehicle, solver):
-    """Its steps are at the limit of stability, where rounding changes their number, too."""
-    x = vehicle.start()
-
-    def calls(model: DynamicModel, start: np.ndarray, tolerance: float) -> int:
-        path = integrate(model, LANE_CHANGE, start, TIMES, solver, tolerance)
-        return path.counts["rhs_calls"]
-
-    for tolerance in (1e-3, 1e-4, 1e-5):
-        expected = pytest.approx(calls(vehicle, x, tolerance), rel=0.1)
-        assert calls(vehicle, turn(x, 2.0), tolerance) == expected
-    # As it would without turning states into the Jacobian's heading and back.
-    fixed = replace(vehicle, definition=replace(vehicle.definition, heading_pairs=()))
-    assert calls(fixed, turn(x, 2.0), 1e-5) > 1.4 * calls(vehicle, x, 1e-5)
 
 
 # Energy and constraints
@@ -302,17 +188,6 @@ def test_stabilisation_does_not_change_the_run(vehicle, start):
     assert np.abs(found.coordinates - expected.coordinates)[:, :22].max() < 1e-7
     drift = series(expected, vehicle, "position_drift", "velocity_drift")
     assert drift.max() < 1e-12
-
-
-@pytest.mark.parametrize("solver", INTEGRATORS)
-def test_a_tighter_tolerance_gives_a_smaller_error(vehicle, solver):
-    x = vehicle.start()
-    exact = integrate(vehicle, LANE_CHANGE, x, tolerance=1e-12).states
-    errors = []
-    for tolerance in (1e-4, 1e-6, 1e-8):
-        found = integrate(vehicle, LANE_CHANGE, x, TIMES, solver, tolerance).states
-        errors.append(np.abs(found - exact).max())
-    assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
 
 
 @pytest.mark.parametrize("factor", [20.0, 25.0, -30.0, 50.0])

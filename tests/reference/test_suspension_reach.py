@@ -5,7 +5,6 @@ import pytest
 
 from tests.reference.suspension_reach import failures, is_on_branch, points
 from vehiclemor.errors import InputError, UnreachableError
-from vehiclemor.simulation.algebraic import AlgebraicModel
 
 # Change of the limits (m) for 1 m of rack: 3.8 at the most, where the stop of the wheel's angle is
 # met at a rack of 0.1 m; and what the search for the limits leaves open.
@@ -13,13 +12,13 @@ SLOPE, LEFT_OPEN = 4.0, 1e-6
 
 
 @pytest.mark.parametrize("racks", [np.linspace(-0.1, 0.1, 101), np.linspace(-1e-3, 1e-3, 101)])
-def test_reach_is_continuous_in_the_rack(model: AlgebraicModel, racks: np.ndarray) -> None:
+def test_reach_is_continuous_in_the_rack(model, racks):
     limits = np.array([model.reach(rack) for rack in racks])
     changes = np.abs(np.diff(limits, axis=0))
     assert changes.max() <= SLOPE * (racks[1] - racks[0]) + LEFT_OPEN
 
 
-def test_all_of_the_reach_is_solved_on_the_branch(model: AlgebraicModel) -> None:
+def test_all_of_the_reach_is_solved_on_the_branch(model):
     racks = np.concatenate([np.linspace(-0.1, 0.1, 17), [2e-4, 2.7e-4, 3e-4, 1e-3, 9e-3]])
     failed, wrong, largest = failures(model, points(model, racks, 18))
     assert (failed, wrong) == (0, 0)
@@ -27,7 +26,7 @@ def test_all_of_the_reach_is_solved_on_the_branch(model: AlgebraicModel) -> None
 
 
 @pytest.mark.parametrize("rack", [4e-4, 1e-3, 9e-3])
-def test_below_the_reach_no_other_branch_is_taken(model: AlgebraicModel, rack: float) -> None:
+def test_below_the_reach_no_other_branch_is_taken(model, rack):
     low, _ = model.reach(rack)
     for height in (*np.linspace(low - 1e-6, -0.2538, 9), -0.2167):
         with pytest.raises(UnreachableError, match="reachable range"):
@@ -35,7 +34,7 @@ def test_below_the_reach_no_other_branch_is_taken(model: AlgebraicModel, rack: f
 
 
 @pytest.mark.parametrize("solver", ["newton", "newton_lanes"])
-def test_jumps_along_the_limits_stay_on_the_branch(model: AlgebraicModel, solver: str) -> None:
+def test_jumps_along_the_limits_stay_on_the_branch(model, solver):
     rng = np.random.default_rng(5)
     for spread in (3e-3, 3e-2):
         racks = np.clip(rng.normal(0.0, spread, 400), -0.1, 0.1)
@@ -49,9 +48,7 @@ def test_jumps_along_the_limits_stay_on_the_branch(model: AlgebraicModel, solver
 
 @pytest.mark.parametrize("samples", [9, 17, 101, 1001])
 @pytest.mark.parametrize("rack", [0.0, 2e-4, 1e-3, 9e-3])
-def test_lanes_beyond_the_reach_take_no_other_branch(
-    model: AlgebraicModel, rack: float, samples: int
-) -> None:
+def test_lanes_beyond_the_reach_take_no_other_branch(model, rack, samples):
     times = np.linspace(0.0, 1.0, samples)
     for limit in model.reach(rack):
         for beyond in (1.0001, 1.002, 1.05, 1.3):
@@ -66,7 +63,7 @@ def test_lanes_beyond_the_reach_take_no_other_branch(
         assert all(is_on_branch(model, q, u) for q, u in zip(run.coordinates, inputs, strict=True))
 
 
-def test_a_stop_ends_the_reach(model: AlgebraicModel) -> None:
+def test_a_stop_ends_the_reach(model):
     low, _ = model.reach(0.05)
     assert model.solve([low, 0.05])[0] == pytest.approx(-1.0, abs=1e-4)
     model.reach(0.1)
@@ -75,7 +72,7 @@ def test_a_stop_ends_the_reach(model: AlgebraicModel) -> None:
 
 
 @pytest.mark.parametrize("rack", [np.nan, np.inf, "x", None, [0.0, 0.1], [[0.0]], np.zeros(0)])
-def test_a_rack_that_is_no_number_is_one_line(model: AlgebraicModel, rack) -> None:
+def test_a_rack_that_is_no_number_is_one_line(model, rack):
     with pytest.raises(InputError, match="rack displacement") as error:
         model.reach(rack)
     assert "\n" not in str(error.value)

@@ -5,6 +5,7 @@ import runpy
 import tomllib
 from configparser import ConfigParser
 
+import numpy as np
 import pytest
 import schemas
 
@@ -12,6 +13,7 @@ import vehiclemor
 from tests.plugin.installation import installed
 from tests.texts.markdown import NAMES, ROOT, TEXTS, blocks, console_commands, inline_commands
 from vehiclemor.cli.app import app, main
+from vehiclemor.exporting import fmu
 from vehiclemor.report.citation import citations
 from vehiclemor.report.figures import theme
 from vehiclemor.report.published import load_published
@@ -19,7 +21,8 @@ from vehiclemor.study.plans.loading import study_path
 
 README, HANDBOOK = ROOT / "README.md", ROOT / "paper" / "handbook"
 FIRST_STEPS, PLUG_IN = HANDBOOK / "first-steps.md", HANDBOOK / "my-plug-in.md"
-STUDY_FILES = HANDBOOK / "study-files.md"
+STUDY_FILES, TEN_THOUSAND = HANDBOOK / "study-files.md", HANDBOOK / "ten-thousand-maneuvers.md"
+TASKS = ROOT / "paper" / "tasks"
 PAGES = pytest.mark.parametrize("path", TEXTS, ids=NAMES)
 
 
@@ -78,6 +81,9 @@ def test_commands_can_be_parsed(path):
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # One picture of each figure is enough here, and machine code that is not optimised.
+    monkeypatch.setattr(theme, "FORMATS", ("png",))
+    monkeypatch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0"))
     return tmp_path
 
 
@@ -115,9 +121,7 @@ def test_the_example_study_runs(here, capsys):
         assert main(words[1:]) == 0, words
 
 
-def test_a_plug_in_is_made_step_by_step(here, capsys, monkeypatch):
-    # One picture of each figure is enough here.
-    monkeypatch.setattr(theme, "FORMATS", ("png",))
+def test_a_plug_in_is_made_step_by_step(here, capsys):
     first, *rest = console_commands(PLUG_IN)
     assert main(first[1:]) == 0
     (code,) = [b.content for b in blocks(PLUG_IN) if b.language == "python" and b.above[:1] != "`"]
@@ -150,6 +154,38 @@ def test_the_code_of_a_page_runs(name, here, capsys):
     (here / "page.py").write_text("\n".join(own).replace("10_000", "100"))
     runpy.run_path("page.py")
     assert capsys.readouterr().out
+
+
+def test_lines_of_user_code_are_those_of_the_scripts():
+    told = re.findall(r"\[(\d+)\]\(../tasks/(\w+).py\)", TEN_THOUSAND.read_text(encoding="utf-8"))
+    paths = {path.stem: path for path in TASKS.glob("*.py") if path.stem != "maneuvers"}
+    # All but the first line, which says what it is, and empty ones.
+    texts = {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
+    counts = {
+        name: len([*filter(str.strip, text.splitlines())]) - 1 for name, text in texts.items()
+    }
+    assert {name: int(lines) for lines, name in told} == counts
+
+
+@pytest.mark.parametrize("name", ["step", "step_full", "fresh_input", "fresh_input_full"])
+def test_a_task_runs(name, monkeypatch):
+    monkeypatch.syspath_prepend(TASKS)
+    found = runpy.run_path(str(TASKS / f"{name}.py"))
+    result = found["run"].outputs if "run" in found else found["state"]
+    assert np.isfinite(result).all()
+
+
+def test_hard_points_of_the_design_are_an_optimum_within_bounds_that_the_path_map_finds():
+    design = runpy.run_path(str(ROOT / "examples" / "design.py"))
+    full = design["Designer"]("full_order", 2)
+    found = {way: design["hard_points"](way, 2) for way in ("full_order", "path_map")}
+    np.testing.assert_allclose(found["path_map"], found["full_order"], atol=1e-7)
+    place = found["full_order"]
+    slope = full.off(place) @ full.slopes(place)
+    at = np.sign(place) * (np.abs(place) > design["LARGEST"] * (1.0 - 1e-4))
+    assert 0 < np.count_nonzero(at) < len(at)
+    assert np.abs(slope[at == 0]).max() < 1e-4 * np.abs(slope).max()
+    assert (slope[at != 0] * at[at != 0] < 0.0).all()
 
 
 def test_citation_names_this_version_and_the_published_paper():

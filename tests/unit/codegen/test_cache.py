@@ -27,6 +27,12 @@ NAME = "kernels/some-0123.o"
 CONTENT = b"some content"
 
 
+@pytest.fixture(autouse=True)
+def _warnings_alone(caplog: pytest.LogCaptureFixture) -> None:
+    """On a busy machine it is told, too, what takes long to compile."""
+    caplog.set_level(logging.WARNING, "vehiclemor")
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache."""
@@ -194,16 +200,9 @@ def test_the_environment_chooses_the_folder(tmp_path, monkeypatch, fetch, made):
 
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
     monkeypatch.chdir(tmp_path)
-    for chosen, expected in (
-        (None, "own/vehiclemor"),
-        (tmp_path / "a", "a"),
-        ("relative", "relative"),
-    ):
+    for chosen, expected in (("", "own/vehiclemor"), (tmp_path / "a", "a"), ("b", "b")):
         cache._folders.cache_clear()
-        if chosen is None:
-            monkeypatch.delenv("VEHICLEMOR_CACHE", raising=False)
-        else:
-            monkeypatch.setenv("VEHICLEMOR_CACHE", str(chosen))
+        monkeypatch.setenv("VEHICLEMOR_CACHE", str(chosen))
         assert cache_folder() == tmp_path / expected
     # A process that goes elsewhere keeps its cache.
     fetch()

@@ -14,34 +14,31 @@ CAR = "independent_suspension_vehicle"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("model", "arguments", "words"),
     [
-        ({"to": "matlab"}, "unknown target 'matlab'"),
-        ({"to": "c", "step": 0.0}, "step: 0 s is below 1e-07 s"),
-        ({"to": "c", "out": "no-such-folder/car"}, "does not exist"),
-        ({"to": "jax", "out": "car.py"}, "what is made for jax is an object, no file"),
+        (CAR, {"to": "matlab"}, "'matlab'"),
+        (CAR, {"to": "c", "step": 0.0}, "step: 0 s"),
+        (CAR, {"to": "c", "out": "no-such-folder/car"}, "no-such-folder"),
+        (CAR, {"to": "jax", "out": "car.py"}, "jax"),
+        (3, {"to": "casadi"}, "model: 3"),
     ],
 )
-def test_wrong_arguments(tmp_path, monkeypatch, arguments, words):
+def test_wrong_arguments(tmp_path, monkeypatch, model, arguments, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(vm.VehiclemorError, match=words):
-        vm.export(CAR, **arguments)
+        vm.export(model, **arguments)
     assert not list(tmp_path.iterdir())
 
 
-def test_what_has_no_equations_to_export(model, nominal):
-    with pytest.raises(vm.VehiclemorError, match="neither a name nor a full or reduced model"):
-        vm.export(3, "casadi")
+def test_what_has_no_equations_to_export(model, nominal, monkeypatch):
     reduced = fitted(model, nominal, "pod", rank=2)
-    with pytest.raises(vm.VehiclemorError, match="double_wishbone_pod can't be exported"):
+    with pytest.raises(vm.VehiclemorError, match="double_wishbone_pod"):
         vm.export(ReducedOrderModel(model, "pod", {}, (), reduced), "casadi")
-    with pytest.raises(vm.VehiclemorError, match="reads a table"):
+    with pytest.raises(vm.VehiclemorError, match="table"):
         vm.export(vm.rom("double_wishbone"), "sympy")
-
-
-def test_missing_packages_are_named(monkeypatch):
+    # Missing packages are named.
     monkeypatch.setattr(packages, "find_spec", lambda _: None)
-    with pytest.raises(vm.VehiclemorError, match=r"pip install 'vehiclemor\[casadi\]'"):
+    with pytest.raises(vm.VehiclemorError, match=r"vehiclemor\[casadi\]"):
         vm.export(vm.rom(CAR), "casadi")
 
 
@@ -68,13 +65,13 @@ def test_nothing_is_replaced_unasked(tmp_path, monkeypatch, capsys):
 
 
 def test_what_is_not_ours_is_never_replaced(tmp_path):
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "letter.txt").write_text("dear")
-    with pytest.raises(vm.VehiclemorError, match="holds something else"):
-        vm.export(CAR, "c", tmp_path / "mine", overwrite=True)
-    with pytest.raises(vm.VehiclemorError, match="is a folder"):
-        vm.export(CAR, "fmu", tmp_path / "mine", overwrite=True)
-    assert (tmp_path / "mine" / "letter.txt").read_text() == "dear"
+    letter = tmp_path / "mine" / "letter.txt"
+    letter.parent.mkdir()
+    letter.write_text("dear")
+    for to in ("c", "fmu"):
+        with pytest.raises(vm.VehiclemorError, match="mine"):
+            vm.export(CAR, to, letter.parent, overwrite=True)
+    assert letter.read_text() == "dear"
 
 
 def test_a_failure_on_the_way_leaves_what_was_there(tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.oracles.high_fidelity_data import PARAMETERS as SPECIFIED
 from tests.oracles.high_fidelity_data import fiala
-from tests.oracles.vehicle_data import (
+from tests.oracles.vehicle_lagrange import (
     PARAMETERS,
     cornering_stiffness,
     magic_formula,

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
-from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.methods.full_order import FullOrderModel
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.trajectory import Trajectory
 
 
-def test_reach_is_that_of_the_specification_and_can_be_reached(model: AlgebraicModel) -> None:
+def test_reach_is_that_of_the_specification_and_can_be_reached(model):
     assert model.reach() == pytest.approx((-0.2145, 0.2965), abs=1e-3)
     for limit in model.reach():
         q = model.solve([limit, 0.0])
@@ -22,26 +19,22 @@ def test_reach_is_that_of_the_specification_and_can_be_reached(model: AlgebraicM
 
 
 @pytest.mark.parametrize("height", [-0.2147, 0.2967, -3.0, 1e9])
-def test_height_out_of_reach_names_both_limits(model: AlgebraicModel, height: float) -> None:
+def test_height_out_of_reach_names_both_limits(model, height):
     with pytest.raises(UnreachableError, match=r"-0\.2146 to 0\.2966 m") as error:
         model.solve([height, 0.0])
     assert f"{height:.5g} m" in str(error.value)
 
 
-def test_reach_depends_on_the_rack(model: AlgebraicModel) -> None:
+def test_reach_depends_on_the_rack(model):
     # At the lower limit it is the tie rod that stops the wheel.
     (straight, _), (steered, _) = model.reach(0.0), model.reach(-0.05)
     assert steered > straight + 1e-3
-    between = (steered + straight) / 2.0
-    model.solve([between, 0.0])
-    with pytest.raises(UnreachableError, match=r"rack at -0\.05 m"):
-        model.solve([between, -0.05])
-    with pytest.raises(UnreachableError):
-        model.solve([0.0, 0.5])
-
-
-def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: AlgebraicModel) -> None:
-    low = (model.reach(0.0)[0] + model.reach(-0.05)[0]) / 2.0
+    low = (steered + straight) / 2.0
+    model.solve([low, 0.0])
+    for beyond, named in (([low, -0.05], r"rack at -0\.05 m"), ([0.0, 0.5], "reach")):
+        with pytest.raises(UnreachableError, match=named):
+            model.solve(beyond)
+    # Each height of a path is compared with the limits at its own rack.
     times = np.linspace(0.0, 1.0, 201)
     heights = low * np.sin(np.pi * np.minimum(2.0 * times, 1.0))
     racks = -0.05 * np.maximum(2.0 * times - 1.0, 0.0)
@@ -49,7 +42,7 @@ def test_each_height_is_compared_with_the_limits_at_its_own_rack(model: Algebrai
 
 
 @pytest.mark.parametrize("solver", ["newton", "newton_lanes"])
-def test_sudden_jumps_of_the_input_stay_on_the_branch(model: AlgebraicModel, solver: str) -> None:
+def test_sudden_jumps_of_the_input_stay_on_the_branch(model, solver):
     low, high = model.reach()
     stops = 0.99 * np.array([high, low, high, 0.0])
     inputs = np.column_stack([stops, np.zeros(4)])
@@ -60,15 +53,7 @@ def test_sudden_jumps_of_the_input_stay_on_the_branch(model: AlgebraicModel, sol
         np.testing.assert_allclose(q, slow, rtol=0, atol=1e-9)
 
 
-def test_result_does_not_depend_on_the_sampling(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
-) -> None:
-    coarse = model.simulate(nominal, times=nominal.times[::50])
-    np.testing.assert_allclose(coarse.coordinates, full.coordinates[::50], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(coarse.outputs, full.outputs[::50], rtol=0, atol=1e-13)
-
-
-def test_newton_converges_quadratically(full: Trajectory) -> None:
+def test_newton_converges_quadratically(full):
     counts = full.counts
     # Three iterations a sample, the last of which only confirms.
     assert 2 * 1001 <= counts["iterations"] <= 3 * 1001 + 10
@@ -78,9 +63,7 @@ def test_newton_converges_quadratically(full: Trajectory) -> None:
 
 @pytest.mark.parametrize("samples", [1, 7, 8, 9, 15, 16, 1000, 1001])
 @pytest.mark.parametrize("name", ["travel_and_rack", "travel_and_rack_multisine"])
-def test_lanes_give_the_solution_of_newton_for_any_number_of_samples(
-    model: AlgebraicModel, name: str, samples: int
-) -> None:
+def test_lanes_give_the_solution_of_newton_for_any_number_of_samples(model, name, samples):
     maneuver = component("maneuver", name).perturbed(1.8, -1.1)
     few = replace(maneuver, samples=samples, duration=0.01 * samples)
     newton, lanes = model.simulate(few), model.simulate(few, solver="newton_lanes")
@@ -95,9 +78,7 @@ def test_lanes_give_the_solution_of_newton_for_any_number_of_samples(
         assert np.abs(loose.coordinates - newton.coordinates).max() < 1e-7
 
 
-def test_lanes_that_fail_are_solved_sample_by_sample(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_lanes_that_fail_are_solved_sample_by_sample(model, nominal):
     heights = np.random.default_rng(3).uniform(-0.2, 0.28, 100)
     jumps = np.column_stack([heights, np.zeros(100)])
     newton, lanes = (
@@ -117,9 +98,7 @@ def test_lanes_that_fail_are_solved_sample_by_sample(
 
 
 @pytest.mark.parametrize("solver", ["newton", "newton_lanes"])
-def test_a_run_that_diverges_tells_its_counts(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, solver: str
-) -> None:
+def test_a_run_that_diverges_tells_its_counts(model, nominal, full, solver):
     # No step gets as small as this tolerance.
     with pytest.raises(ConvergenceError, match="does not contract") as error:
         model.simulate(nominal, solver=solver, tolerance=1e-30)
@@ -131,67 +110,66 @@ def test_a_run_that_diverges_tells_its_counts(
     assert (diverged.status, diverged.counts) == (run.status, run.counts)
 
 
-def test_runs_are_bitwise_repeatable(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
-) -> None:
+def test_runs_are_bitwise_repeatable_and_do_not_depend_on_the_sampling(model, nominal, full):
     again = build("double_wishbone").simulate(nominal)
     np.testing.assert_array_equal(again.coordinates, full.coordinates)
     np.testing.assert_array_equal(again.outputs, full.outputs)
     assert again.counts == full.counts
+    coarse = model.simulate(nominal, times=nominal.times[::50])
+    np.testing.assert_allclose(coarse.coordinates, full.coordinates[::50], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(coarse.outputs, full.outputs[::50], rtol=0, atol=1e-13)
 
 
-def test_wrong_inputs_of_a_path_are_named(model: AlgebraicModel) -> None:
-    times = np.array([0.0, 0.5])
-    with pytest.raises(InputError, match=r"s0 .* t = 0\.5 s"):
-        model.solve_path(times, np.array([[0.0, 0.0], [0.1, np.nan]]))
-    for shape in ((2,), (2, 1), (2, 3), (5, 2), (0, 2)):
-        with pytest.raises(InputError, match="inputs"):
-            model.solve_path(times, np.zeros(shape))
-    for wrong in ([[0.0, 1.0]], [0.0, np.nan], "abc", None):
-        with pytest.raises(InputError, match="times"):
-            model.solve_path(wrong, np.zeros((2, 2)))
+TIMES = np.array([0.0, 0.5])
 
 
 @pytest.mark.parametrize(
-    ("q", "u", "named"),
+    ("call", "arguments", "named"),
     [
-        (np.zeros(7), np.zeros(2), r"\bq\b.*\(8,\)"),
-        (np.zeros(8), np.zeros(3), r"\bu\b.*\(2,\)"),
-        (np.full(8, np.inf), np.zeros(2), r"q\[0\]"),
-        (np.zeros(8), np.array([0.0, np.nan]), r"u\[1\]"),
+        ("solve_path", (TIMES, np.array([[0.0, 0.0], [0.1, np.nan]])), r"s0 .* t = 0\.5 s"),
+        *(
+            ("solve_path", (TIMES, np.zeros(shape)), "inputs")
+            for shape in ((2,), (2, 1), (2, 3), (5, 2), (0, 2))
+        ),
+        *(
+            ("solve_path", (wrong, np.zeros((2, 2))), "times")
+            for wrong in ([[0.0, 1.0]], [0.0, np.nan], "abc", None)
+        ),
+        *(
+            (call, arguments, named)
+            for call in ("residual", "jacobian", "newton_step")
+            for *arguments, named in (
+                (np.zeros(7), np.zeros(2), r"\bq\b.*\(8,\)"),
+                (np.zeros(8), np.zeros(3), r"\bu\b.*\(2,\)"),
+                (np.full(8, np.inf), np.zeros(2), r"q\[0\]"),
+                (np.zeros(8), np.array([0.0, np.nan]), r"u\[1\]"),
+            )
+        ),
     ],
 )
-def test_wrong_arguments_are_named(
-    model: AlgebraicModel, q: np.ndarray, u: np.ndarray, named: str
-) -> None:
-    for function in (model.residual, model.jacobian, model.newton_step):
-        with pytest.raises(InputError, match=named):
-            function(q, u)
+def test_wrong_arguments_are_named(model, call, arguments, named):
+    with pytest.raises(InputError, match=named):
+        getattr(model, call)(*arguments)
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf, "x"])
-def test_a_tolerance_that_means_nothing_is_refused(model, nominal, tolerance) -> None:
-    with pytest.raises(InputError, match="tolerance"):
-        model.simulate(nominal, tolerance=tolerance)
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        *(({"tolerance": t}, "tolerance") for t in (0.0, -1.0, np.nan, np.inf, "x")),
+        *(({"start": start}, "start") for start in (np.zeros(8), [0.0] * 8)),
+        ({"start": "dropped"}, "'dropped'"),
+        ({"solver": "newtno"}, "'newtno'"),
+        ({"maneuver": component("maneuver", "lane_change")}, "delta"),
+    ],
+)
+def test_what_is_of_no_mechanism_is_refused(model, nominal, wrong, named):
+    with pytest.raises(InputError, match=named):
+        model.simulate(**({"maneuver": nominal} | wrong))
 
 
-def test_strided_arguments_are_read_rightly(
-    model: AlgebraicModel, rng: np.random.Generator
-) -> None:
+def test_strided_arguments_are_read_rightly(model, rng):
     table, u = rng.uniform(-0.5, 0.5, (8, 3)), [0.05, 0.0]
     column = table[:, 1]
     assert not column.flags.c_contiguous
-    np.testing.assert_array_equal(model.residual(column, u), model.residual(column.copy(), u))
-    np.testing.assert_array_equal(model.residual(list(column), u), model.residual(column, u))
-
-
-def test_what_is_of_no_mechanism_is_refused(model: AlgebraicModel, nominal: Maneuver) -> None:
-    with pytest.raises(InputError, match="'newtno'"):
-        model.simulate(nominal, solver="newtno")
-    with pytest.raises(InputError, match="'dropped'"):
-        model.simulate(nominal, "dropped")
-    for start in (np.zeros(8), model.design, [0.0] * 8):
-        with pytest.raises(InputError, match="start"):
-            model.simulate(nominal, start=start)
-    with pytest.raises(InputError, match="delta"):
-        model.simulate(component("maneuver", "lane_change"))
+    for given in (column, list(column)):
+        np.testing.assert_array_equal(model.residual(given, u), model.residual(column.copy(), u))

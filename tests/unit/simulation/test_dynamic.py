@@ -1,4 +1,4 @@
-"""Models of equations of motion: what they compile, and what they refuse without it."""
+"""Models of equations of motion: what they compile and refuse, and runs in parts."""
 
 from dataclasses import replace
 
@@ -18,6 +18,7 @@ from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
+STRAIGHT = component("maneuver", "rack_straight_ahead")
 QUIET = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
 
 
@@ -40,30 +41,27 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.parametrize("solver", INTEGRATORS)
-def test_a_run_of_the_full_model_needs_its_solver_and_two_kernels(vehicle, compiled, solver):
-    straight = component("maneuver", "rack_straight_ahead")
-    vehicle.simulate(straight, times=np.array([0.1]), solver=solver, tolerance=1e-3)
+def test_all_models_run_in_the_same_loop_and_need_two_kernels(standard, vehicle, compiled, solver):
+    found = []
+    for model, given in ((standard(), QUIET), (vehicle, STRAIGHT)):
+        compiled.clear()
+        model.simulate(given, times=np.array([0.1]), solver=solver, tolerance=1e-3)
+        whole_steps = model.system.whole_steps(solver)
+        found.append(catalogue.time_loop(INTEGRATORS[solver], "full", whole_steps))
+    assert found[0] is found[1]
     # Neither the mass matrix nor the equations before elimination.
     needed = {"derivative", "outputs"}
     assert set(compiled) - {f"{solver}_step"} <= needed < set(vehicle.kernels.sources)
 
 
-def test_all_models_run_in_the_same_loop(standard, vehicle):
-    straight = component("maneuver", "rack_straight_ahead")
-    for solver, own in INTEGRATORS.items():
-        found = []
-        for model, man in ((vehicle, straight), (standard(), QUIET)):
-            model.simulate(man, times=np.array([0.1]), solver=solver, tolerance=1e-3)
-            found.append(catalogue.time_loop(own, "full", model.system.whole_steps(solver)))
-        assert found[0] is found[1]
-
-
-def test_a_start_that_cannot_be_written_is_integrated(standard):
+def test_a_start_may_be_any_sequence_and_one_that_cannot_be_written(standard):
     model = standard()
+    np.testing.assert_array_equal(model.start([0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3, 0.4])
+    with pytest.raises(InputError, match="start"):
+        model.start([1.0, 2.0])
     start = model.start()
     start.flags.writeable = False
-    run = model.simulate(QUIET, start, solver="dopri5", tolerance=1)
-    assert run.status == "ok"
+    assert model.simulate(QUIET, start, solver="dopri5", tolerance=1).status == "ok"
     np.testing.assert_array_equal(start, model.start())
 
 
@@ -72,13 +70,6 @@ def test_hash_of_a_dynamic_model_follows_its_loops(standard, monkeypatch):
     assert standard().kernel_hash == before
     monkeypatch.setattr(build, "loops_digest", lambda _: "changed")
     assert standard().kernel_hash != before
-
-
-def test_every_integrator_and_formulation_counts_in_the_hash():
-    for own in INTEGRATORS.values():
-        assert {f"simulation.integrators.{m}" for m in own.modules} <= set(catalogue.LOOP_SOURCES)
-    for name in ("full", "state", "coordinates", "inputs"):
-        assert f"simulation.formulations.{name}" in catalogue.LOOP_SOURCES
 
 
 @pytest.mark.parametrize("lacking", ["second_order", "speeds"])
@@ -109,23 +100,14 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
 @pytest.mark.parametrize("solver", INTEGRATORS)
 @pytest.mark.parametrize("end", [0.0, 1e-13, 1e-12, 1e-10, 1e-8])
 def test_a_run_that_ends_at_once_is_its_start(vehicle, solver, end):
-    straight = component("maneuver", "rack_straight_ahead")
-    found = vehicle.simulate(straight, times=np.array([end]), solver=solver, tolerance=1e-6)
+    found = vehicle.simulate(STRAIGHT, times=np.array([end]), solver=solver, tolerance=1e-6)
     np.testing.assert_allclose(found.states[0], vehicle.start(), atol=1e-6)
 
 
 @pytest.mark.parametrize("solver", INTEGRATORS)
 def test_a_start_with_rates_that_are_not_finite_says_so(vehicle, solver):
-    straight = component("maneuver", "rack_straight_ahead")
     with pytest.raises(ConvergenceError, match=r"a state is not finite at t = 0 s"):
-        vehicle.simulate(straight, np.full(52, 1e200), solver=solver)
-
-
-def test_a_start_may_be_any_sequence(standard):
-    model = standard()
-    np.testing.assert_array_equal(model.start([0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3, 0.4])
-    with pytest.raises(InputError, match="start"):
-        model.start([1.0, 2.0])
+        vehicle.simulate(STRAIGHT, np.full(52, 1e200), solver=solver)
 
 
 def test_the_system_refuses_what_its_machine_code_would_read_beyond(standard):
@@ -143,3 +125,44 @@ def test_a_kernel_that_is_not_there_is_never_called(standard):
         system.called("coordinates", "")
     with pytest.raises(InputError, match="no outputs"):
         system.along("outputs", np.zeros((1, 4)), np.zeros((1, 3)), 8)
+
+
+# Runs that begin in mid-maneuver: cut at any time and continued, a run is the uncut one
+
+
+CASES = (
+    ("independent_suspension_vehicle", "step_steer"),
+    ("high_fidelity_vehicle", "rack_step_steer"),
+)
+
+
+# The steering moves from 1 s to 1.2 s; its acceleration jumps in neither.
+@pytest.mark.parametrize(("name", "maneuver"), CASES)
+def test_a_cut_run_goes_on_as_the_uncut_one(name, maneuver):
+    model, maneuver = build.build(name), component("maneuver", maneuver)
+    whole = model.simulate(maneuver, "dropped", tolerance=1e-8)
+    scale = np.abs(whole.states).max(axis=0) + 1.0
+    for sample in (0, 17, 50, 55, 60, 181, 250):
+        begin = float(whole.time[sample])
+        later = model.simulate(maneuver, whole.states[sample], tolerance=1e-8, begin=begin)
+        np.testing.assert_array_equal(later.time, whole.time[sample:])
+        # Both runs are wrong by their tolerance a step, in hundreds of steps.
+        assert np.abs((later.states - whole.states[sample:]) / scale).max() < 3e-5
+
+
+def test_a_run_begins_within_its_maneuver_between_output_times_too():
+    model, maneuver = (
+        build.build("independent_suspension_vehicle"),
+        component("maneuver", "step_steer"),
+    )
+    whole, begin = model.simulate(maneuver), 1.0137
+    state = model.simulate(maneuver, times=[0.0, begin]).states[-1]
+    later = model.simulate(maneuver, state, begin=begin)
+    np.testing.assert_array_equal(later.time, whole.time[whole.time > begin])
+    np.testing.assert_allclose(later.states, whole.states[-len(later.time) :], atol=1e-5)
+    for wrong in (-0.1, 5.1, np.nan):
+        with pytest.raises(InputError, match="begin"):
+            model.simulate(maneuver, begin=wrong)
+    # No output time lies before.
+    with pytest.raises(InputError, match="1 to 5 s"):
+        model.simulate(maneuver, times=[0.5, 2.0], begin=1.0)

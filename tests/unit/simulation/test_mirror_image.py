@@ -24,8 +24,7 @@ def test_the_equations_are_their_own_mirror_image(name):
     # Steered, far from straight running: what the Jacobian does not tell must turn too.
     maneuver = component("maneuver", component("model", name).maneuver)
     run = model.simulate(maneuver, solver="ros34pw2", tolerance=1e-3)
-    states = np.hstack([run.coordinates, run.speeds])[::50]
-    inputs = run.inputs[::50]
+    states, inputs = run.states[::50], run.inputs[::50]
     assert np.abs(inputs).max() > 0.0
     rates = model.derivatives_at(states, inputs)
     image = model.derivatives_at(np.ascontiguousarray(sign * states[:, system.partners]), -inputs)

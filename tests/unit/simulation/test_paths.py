@@ -7,22 +7,19 @@ import pytest
 
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.model import Model
 
 MODELS = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
 @pytest.fixture(scope="module", params=MODELS)
-def each_model(request: pytest.FixtureRequest) -> Model:
+def each_model(request):
     return build(request.param)
 
 
 @pytest.mark.parametrize("function", ["outputs_at", "residual_at", "derivatives_at"])
-def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function) -> None:
+def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function):
     call = getattr(each_model, function, None)
     if call is None:
         assert (function == "residual_at") == (each_model.kind != "ae")
@@ -51,26 +48,35 @@ def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function) 
 
 
 @pytest.mark.parametrize(
-    "times",
-    [[], [0.0, 2.0, 1.0], [0.0, 1e3], [-1.0, 0.0], [0.0, np.nan], [[0.0, 1.0]], 1.0, "abc"],
+    ("argument", "wrong", "named"),
+    [
+        *(
+            ("times", times, "output times")
+            for times in (
+                [],
+                [0.0, 2.0, 1.0],
+                [0.0, 1e3],
+                [-1.0, 0.0],
+                [0.0, np.nan],
+                [[0, 1]],
+                1,
+                "a",
+            )
+        ),
+        *(
+            ("start", start, "start")
+            for start in (np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0)
+        ),
+    ],
 )
-def test_times_that_are_none_are_refused(each_model, times) -> None:
+def test_times_and_starts_that_are_none_are_refused(each_model, argument, wrong, named):
     maneuver = component("maneuver", each_model.definition.maneuver)
-    with pytest.raises(InputError, match="output times"):
-        each_model.simulate(maneuver, times=times)
-
-
-@pytest.mark.parametrize("start", [np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0])
-def test_a_start_that_is_none_is_refused(each_model, start) -> None:
-    maneuver = component("maneuver", each_model.definition.maneuver)
-    with pytest.raises(InputError, match="start"):
-        each_model.simulate(maneuver, start=start)
+    with pytest.raises(InputError, match=named):
+        each_model.simulate(maneuver, **{argument: wrong})
 
 
 @pytest.mark.parametrize("method", ["pod", "path_map", "full_order"])
-def test_reduced_mechanisms_check_their_inputs(
-    model: AlgebraicModel, nominal: Maneuver, method: str
-) -> None:
+def test_reduced_mechanisms_check_their_inputs(model, nominal, method):
     reduced = fitted(model, nominal, method)
     steering = component("maneuver", "lane_change")
     for maneuver in (steering, replace(nominal, signal=lambda t, *_: np.zeros((len(t), 1)))):
@@ -78,9 +84,7 @@ def test_reduced_mechanisms_check_their_inputs(
             reduced.simulate(maneuver, "equilibrium")
 
 
-def test_a_reduced_mechanism_that_diverges_tells_its_counts(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_a_reduced_mechanism_that_diverges_tells_its_counts(model, nominal):
     reduced = fitted(model, nominal, "pod", rank=3)
     run = reduced.simulate(nominal.perturbed(amplitude=4.0), "equilibrium")
     assert run.status == "diverged"

@@ -173,3 +173,15 @@ def test_a_point_mass_has_the_energy_of_its_turning(rng):
     )
     momentum = 1.3 * np.cross(lever, np.cross(turning, lever))
     np.testing.assert_allclose(tensor @ turning, momentum, rtol=0, atol=1e-14)
+
+
+def test_a_rotor_is_spun_by_its_moment_less_what_its_carrier_turns_it():
+    tape, torque, turned = Tape(), sp.Symbol("torque", real=True), [2, -3, 5]
+    frame = m.MovingFrame(g.vector(SPEEDS[:3]), g.vector(SPEEDS[3:6]), first=0)
+    tensor, own = tensor_of(TENSOR), m.Rotor(6, SPEEDS[7], exact(AXLE), sp.Float(ABOUT), torque)
+    rotation = m.with_inertia(tape, tensor, frame.turning(tape, STILL))
+    loads = m.ZERO, own, exact(turned)
+    body = m.Body(sp.Float(MASS), frame.origin(tape), m.ZERO, rotation, tensor, *loads)
+    _, force = m.kane(tape, 7, [body])
+    (found,) = function_of(tape, [*SPEEDS, torque], force[6:])(*[0.7] * 9)
+    assert found == pytest.approx(0.7 - ABOUT * AXLE @ turned, rel=1e-14)

@@ -5,7 +5,7 @@ section II.2; E. Hairer, G. Wanner, II (2nd ed., 1996), sections IV.7 and IV.15;
 L. Angermann, BIT Numer. Math. 45 (2005) 761-787.
 """
 
-import math
+from itertools import chain
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,153 +15,93 @@ from vehiclemor.simulation.integrators import dopri5 as pair
 from vehiclemor.simulation.integrators import ros34pw2, tableaus
 
 
-def unpacked() -> tuple[SimpleNamespace, SimpleNamespace]:
-    """Coefficients of RODAS and ROS34PW2 by the names of the literature."""
-    rows, gamma = tableaus.rodas4(), ros34pw2.GAMMA
-    first = SimpleNamespace(
-        a=rows[:6], c=rows[6:12], alpha=rows[12], d=rows[13], m=rows[14], e=rows[15], gamma=0.25
-    )
-    rows = tableaus.ros34pw2()
-    second = SimpleNamespace(
-        a=rows[:4], c=rows[4:8] / gamma, alpha=rows[8], m=rows[9], e=rows[10], gamma=gamma
-    )
-    return first, second
+def weighted(b: np.ndarray, conditions: list, tolerance: float) -> float:
+    """Largest defect of conditions (stage vector, value) that weights must fulfil."""
+    found = [b @ stage for stage, _ in conditions]
+    error = np.abs(np.subtract(found, [value for _, value in conditions])).max()
+    assert error < tolerance or tolerance == np.inf
+    return error
 
 
-RODAS4, ROS34PW2 = unpacked()
-
-
-def trees(order):
-    """Rooted trees of an order, as tuples of subtrees."""
-    if order == 1:
-        return [()]
-    found = set()
-    for smaller in trees(order - 1):
-        found |= set(with_leaf(smaller))
-    return sorted(found)
-
-
-def with_leaf(tree):
-    """Trees with one more leaf."""
-    yield tuple(sorted((*tree, ())))
-    for k, branch in enumerate(tree):
-        for grown in with_leaf(branch):
-            yield tuple(sorted((*tree[:k], grown, *tree[k + 1 :])))
-
-
-def size(tree):
-    return 1 + sum(size(branch) for branch in tree)
-
-
-def density(tree):
-    return size(tree) * math.prod(density(branch) for branch in tree)
-
-
-def weights(tree, a):
-    """Elementary weights of a tree at the stages (s,) of a Runge-Kutta matrix."""
-    product = np.ones(len(a))
-    for branch in tree:
-        product = product * (a @ weights(branch, a))
-    return product
-
-
-def dormand_prince():
-    """Matrix, weights, error weights and weights of the dense output's last term."""
-    a = np.zeros((7, 7))
-    for i in range(2, 7):
-        for j in range(1, i):
-            a[i - 1, j - 1] = getattr(pair, f"A{i}{j}")
-    b = np.array([pair.B1, 0.0, pair.B3, pair.B4, pair.B5, pair.B6, 0.0])
-    a[6] = b
-    error = np.array([pair.E1, 0.0, pair.E3, pair.E4, pair.E5, pair.E6, pair.E7])
-    dense = np.array([pair.D1, 0.0, pair.D3, pair.D4, pair.D5, pair.D6, pair.D7])
-    return a, b, error, dense
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
-def test_the_explicit_pair_has_orders_5_and_4_and_dense_output_of_order_4(order):
-    a, b, error, dense = dormand_prince()
-    assert len(trees(order)) == [1, 1, 2, 4, 9][order - 1]
-    unit = np.eye(7)
-    for tree in trees(order):
-        stage = weights(tree, a)
-        assert b @ stage == pytest.approx(1 / density(tree), abs=1e-15)
-        if order == 5:
-            continue
-        assert (b - error) @ stage == pytest.approx(1 / density(tree), abs=1e-15)
-        for z in (0.1, 0.37, 0.8):
-            bend, back = unit[0] - b, 2 * b - unit[0] - unit[6]
-            at = z * (b + (1 - z) * (bend + z * (back + (1 - z) * dense)))
-            assert at @ stage == pytest.approx(z**order / density(tree), abs=1e-14)
-    if order == 5:
-        stages = [weights(tree, a) for tree in trees(5)]
-        assert max(abs(error @ stage) for stage in stages) > 1e-4
-
-
-def rosenbrock(tableau: SimpleNamespace):
-    """alpha, Gamma, b and embedded b of the original form, from the transformed one."""
-    gamma = np.linalg.inv(np.eye(len(tableau.m)) / tableau.gamma - tableau.c)
-    embedded = tableau.m - tableau.e
-    return tableau.a @ gamma, gamma, tableau.m @ gamma, embedded @ gamma
-
-
-def stage_products(tableau: SimpleNamespace, order: int):
-    """Stage vectors that b must weight to zero, or to 1 / density, by the Rosenbrock conditions."""
-    alpha, gamma, _, _ = rosenbrock(tableau)
-    beta, one = alpha + gamma, np.ones(len(tableau.m))
-    at, image = alpha @ one, beta @ one
-    conditions = {
+def explicit_conditions(a: np.ndarray) -> dict[int, list]:
+    """Order -> conditions by rooted trees: elementary weights, and 1 / density."""
+    one = np.ones(len(a))
+    c = a @ one
+    ac, ac2, aac = a @ c, a @ c**2, a @ a @ c
+    return {
         1: [(one, 1)],
-        2: [(image, 1 / 2)],
-        3: [(at**2, 1 / 3), (beta @ image, 1 / 6)],
-        4: [
-            (at**3, 1 / 4),
-            (at * (alpha @ image), 1 / 8),
-            (beta @ at**2, 1 / 12),
-            (beta @ beta @ image, 1 / 24),
+        2: [(c, 1 / 2)],
+        3: [(c**2, 1 / 3), (ac, 1 / 6)],
+        4: [(c**3, 1 / 4), (c * ac, 1 / 8), (ac2, 1 / 12), (aac, 1 / 24)],
+        5: [
+            *((c**4, 1 / 5), (c**2 * ac, 1 / 10), (c * ac2, 1 / 15), (c * aac, 1 / 30)),
+            *((ac**2, 1 / 20), (a @ c**3, 1 / 20), (a @ (c * ac), 1 / 40), (a @ ac2, 1 / 60)),
+            (a @ aac, 1 / 120),
         ],
     }
-    return [condition for k in range(1, order + 1) for condition in conditions[k]]
+
+
+def test_the_explicit_pair_has_orders_5_and_4_and_dense_output_of_order_4():
+    a, unit = np.zeros((7, 7)), np.eye(7)
+    for i in range(2, 7):
+        a[i - 1, : i - 1] = [getattr(pair, f"A{i}{j}") for j in range(1, i)]
+    a[6] = b = np.array([pair.B1, 0.0, pair.B3, pair.B4, pair.B5, pair.B6, 0.0])
+    error = np.array([pair.E1, 0.0, pair.E3, pair.E4, pair.E5, pair.E6, pair.E7])
+    dense = np.array([pair.D1, 0.0, pair.D3, pair.D4, pair.D5, pair.D6, pair.D7])
+    by_order = explicit_conditions(a)
+    weighted(b, [*chain(*by_order.values())], 1e-15)
+    assert max(abs(error @ stage) for stage, _ in by_order.pop(5)) > 1e-4
+    weighted(b - error, [*chain(*by_order.values())], 1e-15)
+    for z in (0.1, 0.37, 0.8):
+        bend, back = unit[0] - b, 2 * b - unit[0] - unit[6]
+        at = z * (b + (1 - z) * (bend + z * (back + (1 - z) * dense)))
+        scaled = [(s, z**k * value) for k, part in by_order.items() for s, value in part]
+        weighted(at, scaled, 1e-14)
+
+
+def rosenbrock(a, c, m, e, gamma) -> SimpleNamespace:
+    """alpha, Gamma, b and embedded b of the original form, from the transformed one."""
+    matrix = np.linalg.inv(np.eye(len(m)) / gamma - c)
+    return SimpleNamespace(
+        alpha=a @ matrix, gamma=matrix, b=m @ matrix, embedded=(m - e) @ matrix, one=np.ones(len(m))
+    )
+
+
+ROWS, OTHER = tableaus.rodas4(), tableaus.ros34pw2()
+RODAS4 = rosenbrock(ROWS[:6], ROWS[6:12], ROWS[14], ROWS[15], 0.25)
+ROS34PW2 = rosenbrock(OTHER[:4], OTHER[4:8] / ros34pw2.GAMMA, OTHER[9], OTHER[10], ros34pw2.GAMMA)
 
 
 def test_rodas4_satisfies_the_conditions_of_orders_4_and_3():
-    _, gamma, b, embedded = rosenbrock(RODAS4)
-    for stage, value in stage_products(RODAS4, 4):
-        assert b @ stage == pytest.approx(value, abs=1e-13)
-    for stage, value in stage_products(RODAS4, 3):
-        assert embedded @ stage == pytest.approx(value, abs=1e-13)
-    assert max(abs(embedded @ s - value) for s, value in stage_products(RODAS4, 4)) > 1e-3
+    own, beta = RODAS4, RODAS4.alpha + RODAS4.gamma
+    at, image = own.alpha @ own.one, beta @ own.one
+    third = [(own.one, 1), (image, 1 / 2), (at**2, 1 / 3), (beta @ image, 1 / 6)]
+    fourth = [(at**3, 1 / 4), (at * (own.alpha @ image), 1 / 8)]
+    fourth += [(beta @ at**2, 1 / 12), (beta @ beta @ image, 1 / 24)]
+    weighted(own.b, third + fourth, 1e-13)
+    weighted(own.embedded, third, 1e-13)
+    assert weighted(own.embedded, fourth, np.inf) > 1e-3
     # Times of the stages and weights of the time derivative belong to the same matrices.
-    alpha = rosenbrock(RODAS4)[0]
-    np.testing.assert_allclose(alpha.sum(axis=1), RODAS4.alpha, atol=1e-13)
-    np.testing.assert_allclose(gamma.sum(axis=1), RODAS4.d, atol=1e-13)
-
-
-@pytest.mark.parametrize("tableau", [RODAS4, ROS34PW2], ids=["rodas4", "ros34pw2"])
-def test_rosenbrock_methods_are_l_stable(tableau):
-    alpha, gamma, b, _ = rosenbrock(tableau)
-    beta, one = alpha + gamma, np.ones(len(b))
-    assert 1.0 - b @ np.linalg.solve(beta, one) == pytest.approx(0.0, abs=1e-12)
-    imaginary = 1j * np.logspace(-2, 5, 400)
-    growth = [1 + z * b @ np.linalg.solve(np.eye(len(b)) - z * beta, one) for z in imaginary]
-    assert np.abs(growth).max() <= 1.0 + 1e-12
+    np.testing.assert_allclose(at, ROWS[12], atol=1e-13)
+    np.testing.assert_allclose(own.gamma.sum(axis=1), ROWS[13], atol=1e-13)
 
 
 def test_ros34pw2_has_order_3_and_2_with_any_matrix_in_place_of_the_jacobian():
-    alpha, gamma, b, embedded = rosenbrock(ROS34PW2)
-    one = np.ones(4)
-    at, turned = alpha @ one, gamma @ one
-    second = [(one, 1.0), (at, 1 / 2), (turned, 0.0)]
-    third = [
-        (at**2, 1 / 3),
-        (alpha @ at, 1 / 6),
-        (alpha @ turned, 0.0),
-        (gamma @ at, 0.0),
-        (gamma @ turned, 0.0),
-    ]
-    for stage, value in [*second, *third]:
-        assert b @ stage == pytest.approx(value, abs=1e-14)
-    for stage, value in second:
-        assert embedded @ stage == pytest.approx(value, abs=1e-14)
-    assert max(abs(embedded @ stage - value) for stage, value in third) > 1e-3
-    np.testing.assert_allclose(at, ROS34PW2.alpha, atol=1e-15)
+    own = ROS34PW2
+    at, turned = own.alpha @ own.one, own.gamma @ own.one
+    second = [(own.one, 1.0), (at, 1 / 2), (turned, 0.0)]
+    third = [(at**2, 1 / 3), (own.alpha @ at, 1 / 6), (own.alpha @ turned, 0.0)]
+    third += [(own.gamma @ at, 0.0), (own.gamma @ turned, 0.0)]
+    weighted(own.b, second + third, 1e-14)
+    weighted(own.embedded, second, 1e-14)
+    assert weighted(own.embedded, third, np.inf) > 1e-3
+    np.testing.assert_allclose(at, OTHER[8], atol=1e-15)
+
+
+@pytest.mark.parametrize("own", [RODAS4, ROS34PW2], ids=["rodas4", "ros34pw2"])
+def test_rosenbrock_methods_are_l_stable(own):
+    beta = own.alpha + own.gamma
+    assert 1.0 - own.b @ np.linalg.solve(beta, own.one) == pytest.approx(0.0, abs=1e-12)
+    for z in 1j * np.logspace(-2, 5, 400):
+        stages = np.linalg.solve(np.eye(len(own.b)) - z * beta, own.one)
+        assert abs(1 + z * own.b @ stages) <= 1.0 + 1e-12
