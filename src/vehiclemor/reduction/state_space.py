@@ -9,7 +9,6 @@ from typing import Protocol
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.kernel_derivatives import By
@@ -51,28 +50,6 @@ class StateSpace(Protocol):
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
         """What the model tells of states (samples, dim), if it judges itself."""
         ...
-
-
-class SolvedAnywhere(ShortRepr):
-    """A reduction of a mechanism whose equations are solved at any times."""
-
-    model: AlgebraicModel
-
-    def solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
-        """Solution at some times (samples,) in s, beginning at coordinates (n,)."""
-        raise NotImplementedError
-
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Solve the reduced equations at the maneuver's output times."""
-        times, inputs, _ = self.model.sampled(maneuver)
-        return self.solved(times, inputs, self.model.start(start))
-
-    @property
-    def state_space(self) -> KinematicStates:
-        """The coordinates; of a model with windows those of the one that the time is in."""
-        return KinematicStates(
-            self.model, lambda time, u, state: self.solved(np.array([time]), u, state)
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,16 +10,15 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.projection.dynamic import DynamicProjection
-from vehiclemor.reduction.projection.pod_settings import (
-    PRESETS,
-    AlgebraicPodSettings,
+from vehiclemor.reduction.projection.algebraic import AlgebraicPodSettings
+from vehiclemor.reduction.projection.bases import window_edges
+from vehiclemor.reduction.projection.dynamic import (
     ConstrainedPodSettings,
     DynamicPodSettings,
+    DynamicProjection,
+    RestartedProjection,
 )
-from vehiclemor.reduction.projection.restarted import RestartedProjection
-from vehiclemor.reduction.projection.subspaces import check_subspaces, fit_subspaces
-from vehiclemor.reduction.projection.windows import window_edges
+from vehiclemor.reduction.projection.subspaces import PRESETS, check_subspaces, fit_subspaces
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 

@@ -1,17 +1,39 @@
-"""Proper orthogonal decomposition of snapshots, and projection onto its subspace.
+"""Proper orthogonal decomposition of snapshots, and control periods with a subspace each.
 
 Masoudi, Uchida, McPhee (2015), section 3, steps 1 to 5.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from vehiclemor.errors import InputError
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.sizes import require, shaped
 
 MOST_SNAPSHOTS = 100_000
+Rank = Annotated[
+    int,
+    Field(
+        ge=1,
+        description="number of basis vectors in each window; by default no more than coordinates",
+    ),
+    AT_MOST_COORDINATES,
+]
+Snapshots = Annotated[int, Field(ge=2, description="snapshots in each window and training run")]
+RankTolerance = Annotated[
+    float,
+    Field(
+        ge=0.0,
+        lt=1.0,
+        description="modes with a singular value below it times the first are dropped; 0 keeps all",
+    ),
+]
 
 
 @dataclass(frozen=True)
@@ -86,3 +108,33 @@ def check_pod(rank: int, snapshots: int, states: int, whose: str) -> None:
         raise InputError(f"snapshots is {snapshots}; it must be at most {MOST_SNAPSHOTS}")
     if rank > snapshots:
         raise InputError(f"rank {rank} is above the number of snapshots {snapshots}")
+
+
+def window_edges(duration: float, control_period: float) -> np.ndarray:
+    """Edges (windows + 1,) in s of control periods that cover [0, duration].
+
+    The last window is shorter where the period does not divide the duration.
+    """
+    count = max(1, int(np.ceil(duration / control_period - 1e-9)))
+    edges = control_period * np.arange(count + 1)
+    edges[-1] = duration
+    return edges
+
+
+def first_samples(times: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Indices (windows + 1,): window k holds the samples from entry k up to entry k + 1.
+
+    A time on an edge belongs to the later window, the end of the run to the last one.
+    """
+    slack = 1e-9 * (edges[-1] - edges[0])
+    inner = np.searchsorted(times, edges[1:-1] - slack)
+    return np.concatenate([[0], inner, [len(times)]]).astype(np.int64)
+
+
+def by_window(
+    states: np.ndarray, edges: np.ndarray, project: Callable[[np.ndarray, int], np.ndarray]
+) -> np.ndarray:
+    """States (samples of equidistant times, n), those of each window by `project(states, k)`."""
+    first = first_samples(np.linspace(edges[0], edges[-1], len(states)), edges)
+    parts = [project(states[a:b], k) for k, (a, b) in enumerate(pairwise(first))]
+    return np.concatenate(parts)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.methods import pod
-from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from vehiclemor.reduction.projection.windows import first_samples, window_edges
 
 durations = st.floats(0.01, 1000.0)
