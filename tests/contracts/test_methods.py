@@ -16,8 +16,8 @@ from vehiclemor.errors import InputError
 from vehiclemor.exporting.exported import exported_system
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
+from vehiclemor.online.model_file import load
 from vehiclemor.online.rom import ReducedOrderModel
-from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.state_space import StateSpace

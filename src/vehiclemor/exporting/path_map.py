@@ -17,8 +17,7 @@ from vehiclemor.exporting.straight_line import (
 )
 from vehiclemor.exporting.system import SEED, TRUST, ExportedSystem
 from vehiclemor.exporting.trust import trust, trust_tangent
-from vehiclemor.reduction.methods.path_map import PathMapModel
-from vehiclemor.reduction.polynomials.kernels import map_kernel
+from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
 
 
 def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:

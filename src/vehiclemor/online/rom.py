@@ -301,18 +301,14 @@ class ReducedOrderModel(ShortRepr):
         VehiclemorError
             If the file can't be written; then there is none, or the old one.
         """
-        from vehiclemor.online.model_file import Saved, write
+        from vehiclemor.online.model_file import write
 
-        how = self.method, self.settings, self._content
-        return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
-
-    @property
-    def _content(self) -> tuple[Mapping[str, Any], ...]:
-        return tuple(run.content if isinstance(run, Scenario) else run for run in self.training)
+        return write(self, path, overwrite)
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy takes along: of the training what a file keeps, a maneuver may be local."""
-        return super().__getstate__() | {"training": self._content, "known": self.input_range}
+        training = tuple(run.content if isinstance(run, Scenario) else run for run in self.training)
+        return super().__getstate__() | {"training": training, "known": self.input_range}
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
@@ -20,11 +19,9 @@ from vehiclemor.simulation.kernel_derivatives import (
     INPUTS,
     PLACES,
     STATE,
-    Arrays,
     By,
     chosen,
     parameter_names,
-    partial,
 )
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows
@@ -207,11 +204,3 @@ class ReducedSystem(ShortRepr):
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:  # noqa: ARG002
         """There is no subspace."""
         return None
-
-
-def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the kernel `full_state` by state and inputs."""
-    by_state, by_inputs = (
-        partial(kernels, "full_state", arrays, size, place) for place in (STATE, INPUTS)
-    )
-    return by_state, by_inputs

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import AT_MOST_COORDINATES, OneOf, Settings
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.validation import validated
 
 
@@ -20,7 +20,7 @@ class Declared(Settings):
     period: float = Field(5.0, gt=0.0, description="how long")
     mode: Literal["fast", "slow"] = Field("fast", description="how")
     label: str = Field("", description="any text")
-    order: Annotated[str, OneOf(("up", "down"))] = "up"
+    order: Literal["up", "down"] = "up"
     share: float = Field(0.5, ge=0.0, le=1.0)
 
 

@@ -19,7 +19,7 @@ from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import checked_fit, checked_settings, fitted, validated
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel

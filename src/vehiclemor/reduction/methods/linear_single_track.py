@@ -26,7 +26,6 @@ import numpy as np
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
 from vehiclemor.reduction.vehicle.linear_vehicle import (
     CORNERING,
@@ -37,7 +36,7 @@ from vehiclemor.reduction.vehicle.linear_vehicle import (
     linearisation_cost,
 )
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel

@@ -20,10 +20,9 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.linear_vehicle import Lateral, lateral_modes, linear_vehicle
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 
 

@@ -26,19 +26,20 @@ from pydantic import Field
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import PLANAR
-from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.lifting_terms import fitted_lifting
-from vehiclemor.reduction.vehicle.pruning import pruned
-from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
+from vehiclemor.reduction.vehicle.reach_of_runs import after_landing, landed, training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import ridge_fit
-from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
+from vehiclemor.reduction.vehicle.shape import (
+    ShapeSamples,
+    VehicleShape,
+    no_steered_vehicle,
+    shape_samples,
+)
 from vehiclemor.reduction.vehicle.slow_features import (
     FeatureTable,
     feature_table,
+    fitted_lifting,
     ranges_of,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
@@ -46,6 +47,7 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     Target,
     finishes,
     improved,
+    pruned,
     spread,
     targets,
 )

@@ -18,9 +18,9 @@ from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
 from vehiclemor.reduction.vehicle.two_track_fit import (
     COORDINATES,

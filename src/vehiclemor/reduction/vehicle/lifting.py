@@ -13,12 +13,11 @@ from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.reduced_system import full_state_slopes
-from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
-from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, lifting_text
 from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.kernel_derivatives import INPUTS, STATE, partial
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.run_plans import Run
 from vehiclemor.simulation.trajectory import Trust
@@ -140,9 +139,12 @@ class Lifting(ShortRepr):
     def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of full states by reduced ones and inputs, without a transient."""
         kernels, constants = self._kernels(0)
-        size = self.layout.size + len(self.features.watched)
-        found = full_state_slopes(kernels, (state, inputs, constants), size)
-        return found[0][: self.layout.size], found[1][: self.layout.size]
+        size, arrays = self.layout.size, (state, inputs, constants)
+        by_state, by_inputs = (
+            partial(kernels, "full_state", arrays, size + len(self.features.watched), place)[:size]
+            for place in (STATE, INPUTS)
+        )
+        return by_state, by_inputs
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
         """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.

@@ -10,8 +10,13 @@ from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
-from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
-from vehiclemor.reduction.vehicle.features import PLANAR, Features, needed_parameters
+from vehiclemor.reduction.vehicle.features import (
+    PLANAR,
+    Features,
+    feature_columns,
+    feature_system,
+    needed_parameters,
+)
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach

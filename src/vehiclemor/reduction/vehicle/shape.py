@@ -16,12 +16,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.feature_kernels import Layout
+from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 STEP = 6e-6
 INPUT_STEP = 1e-5
+# Outputs in which the slow manifold has its nonlinear terms.
+SLIP_OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in WHEELS))
+
+
+def no_steered_vehicle(model: Model) -> str:
+    """Why a model is no vehicle whose inputs are the steering and its derivatives."""
+    if len(getattr(model, "planar", ())) != 3:
+        return f"{model.name} is no vehicle with a place and a heading on the road"
+    missing = [name for name in SLIP_OUTPUTS if name not in model.outputs]
+    if missing:
+        return f"{model.name} has no output {', '.join(missing)}"
+    first, *others = model.inputs
+    if others != [f"{first}_dot", f"{first}_ddot"][: len(others)]:
+        return f"the inputs of {model.name} are not a steering and its derivatives"
+    return ""
 
 
 @dataclass(frozen=True)

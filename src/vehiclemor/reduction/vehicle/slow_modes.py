@@ -65,17 +65,10 @@ class SlowModes:
         )
 
 
-def slow_modes(
-    shape: VehicleShape, fastest: float, symmetric: int = 0, lateral: int | None = None
-) -> SlowModes:
+def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
     """Slow modes with |lambda| up to `fastest` (1/s), and so many symmetric ones (or pairs).
 
     The inputs are the steering and its derivatives, as many as the model has.
-
-    Parameters
-    ----------
-    lateral
-        How many modes that steering moves are kept at most, a pair counting twice; all by default.
     """
     linear = shape.linearised
     values, vectors = np.linalg.eig(linear.a.T)
@@ -88,8 +81,6 @@ def slow_modes(
     moving = np.abs(values) >= STILL
     moving[still] = False
     wanted = steers & moving & (np.abs(values) <= fastest)
-    order = np.flatnonzero(wanted)[np.argsort(np.abs(values[wanted]))]
-    wanted[order[len(order) if lateral is None else lateral :]] = False
     w, v = real_modes(values, left, right, wanted)
     count = len(w)
     quiet = np.flatnonzero(

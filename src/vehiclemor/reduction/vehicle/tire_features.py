@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.vehicle.features import Features, monomials
+from vehiclemor.reduction.vehicle.features import Features, held, monomials
 
 # Reduced coordinates: lateral speed, yaw rate, roll angle, roll rate, deviation of the speed.
 STATES = 5
@@ -105,11 +105,6 @@ def arguments(speed: float, reach: np.ndarray, reversal: float) -> Text:
             text.let(held_names[i], held(f"raw{i}"))
     text.watched.append((f"{text.parameter(1.0 / reversal)} * u0 * u1", "reversal of the steering"))
     return text
-
-
-def held(name: str) -> str:
-    """A value held in [-1, 1]."""
-    return f"0.5 * (abs({name} + 1.0) - abs({name} - 1.0))"
 
 
 @dataclass(frozen=True)

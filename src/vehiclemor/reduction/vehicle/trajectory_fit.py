@@ -16,11 +16,11 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.reduction.training import Training, TrainingRun
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.regression import unit_diagonal
+from vehiclemor.reduction.vehicle.regression import surviving, unit_diagonal
 from vehiclemor.reduction.vehicle.sensitivity_loops import AlongRun
+from vehiclemor.reduction.vehicle.slow_features import FeatureTable
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
@@ -134,10 +134,32 @@ def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
     return bool(np.isfinite(_compared(reduced, goals)[1]))
 
 
-def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
-    """Normal matrix of the free coefficients, column by column; all runs must finish."""
+def pruned(
+    reduced: ReducedVehicle, table: FeatureTable, goals: Sequence[Target], kept: int
+) -> tuple[ReducedVehicle, FeatureTable]:
+    """A reduced vehicle of `kept` nonlinear terms; the lifting keeps its own.
+
+    Its coefficients are best near the goals, all of which it must finish.
+    """
     paths, _ = _compared(reduced, goals)
-    return normal_equations(reduced, goals, paths, free)[0]
+    normal, _ = normal_equations(reduced, goals, paths, table.free)
+    c = reduced.coefficients.copy()
+    rows, columns = np.array([(i, column) for terms, column in table.free for i in terms]).T
+    nonlinear = sorted([*table.odd_nonlinear, *table.even_nonlinear])
+    groups = [np.flatnonzero(rows == i).tolist() for i in nonlinear]
+    left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
+    linear = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
+    stay = sorted([*linear, *(nonlinear[i] for i in left)])
+    fewer = table.with_only(stay)
+    return (
+        replace(
+            reduced,
+            features=fewer.features,
+            coefficients=c[stay],
+            lifted_features=reduced.lifted_features or reduced.features,
+        ),
+        fewer,
+    )
 
 
 def changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:

@@ -11,15 +11,14 @@ from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import PLANAR
-from vehiclemor.reduction.vehicle.mirror import mirror
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import Free
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.trajectory import Trajectory
 
 # The states that are coordinates, and those of them whose rates are accelerations.
@@ -28,6 +27,10 @@ ACCELERATIONS = (0, 1, 3)
 # Symmetric states for which the lifting has terms of its own.
 SEEN = ("theta", "z_dot")
 RIDGE = 1e-12
+# States that move less than this part of their range count as not moved.
+STILL = 1e-6
+# How often steering is followed through the equations; relative singular values that are rounding.
+POWERS, RANK = 4, 1e-10
 
 
 class Sizes(NamedTuple):
@@ -209,6 +212,29 @@ def both_sides(
             for part, sign in zip(parts, (-1, 1), strict=True)
         ]
     )
+
+
+def mirror(shape: VehicleShape) -> np.ndarray:
+    """Signed permutation (n, n): the deviation of the shape in the vehicle's mirror image.
+
+    Names tell the partners.  Signs follow from what steering moves, which changes its sign in the
+    mirror: of a state without a partner, and against its partner's of any other.
+    """
+    # Not its modes: a symmetric one of the same frequency would be mixed with a lateral one.
+    linear = shape.linearised
+    parts = [np.linalg.lstsq(linear.a, linear.b[:, :1], rcond=RANK)[0], linear.b]
+    for _ in range(POWERS):
+        parts.append(linear.a @ parts[-1])
+    moved = np.hstack(parts)
+    moved /= largest(moved)
+    partner = partners(shape.names)
+    matrix = np.zeros((len(partner), len(partner)))
+    for i, j in enumerate(partner):
+        if i == j:
+            matrix[i, i] = -1.0 if np.abs(moved[i]).max() > STILL else 1.0
+        else:
+            matrix[i, j] = -1.0 if moved[i] @ moved[j] > 0.0 else 1.0
+    return matrix
 
 
 def free_coefficients(reduced: ReducedVehicle) -> Free:

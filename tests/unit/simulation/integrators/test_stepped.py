@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vehiclemor.reduction.vehicle.feature_system import feature_system
-from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.features import Features, feature_system
 from vehiclemor.registry import component
 from vehiclemor.simulation import build
 from vehiclemor.simulation.integrators import catalogue
