@@ -139,10 +139,8 @@ class ReducedSystem(ShortRepr):
             return self.stepper.derivatives(state, inputs, time, along)
         full, slopes = state, (np.eye(len(state)), np.zeros((len(state), len(inputs))))
         if self.slopes is not None:
-            full, slopes = (
-                self.full_states(state[None], inputs[None])[0],
-                self.slopes(state, inputs),
-            )
+            full = self.full_states(state[None], inputs[None])[0]
+            slopes = self.slopes(state, inputs)
         by_state = self.model.derivatives(function, full, inputs, "state")
         if along.place == STATE:
             return by_state @ slopes[STATE]

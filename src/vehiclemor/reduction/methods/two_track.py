@@ -12,11 +12,8 @@ to the accelerations of training runs, then to whole runs.
 import time
 from dataclasses import replace
 
-from pydantic import Field
-
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.reduction.interface import Method, offline_cost
-from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -24,7 +21,7 @@ from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
 from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
 from vehiclemor.reduction.vehicle.two_track_fit import (
     COORDINATES,
-    Sizes,
+    TwoTrackSettings,
     fitted_to,
     free_coefficients,
     lifted_anew,
@@ -32,39 +29,6 @@ from vehiclemor.reduction.vehicle.two_track_fit import (
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
-
-
-class TwoTrackSettings(OnlineSettings):
-    """Settings for a vehicle."""
-
-    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
-    even_terms: int = Field(16, ge=0, description="chosen products in those of the speed")
-    wheel_terms: int = Field(
-        9, ge=0, description="chosen products in the slip, and in the load, of an axle's wheels"
-    )
-    lifted_terms: int = Field(
-        20, ge=0, description="products chosen for pitch and heave, beside those of the equations"
-    )
-    sweeps: int = Field(
-        8, ge=0, description="Gauss-Newton steps on whole training runs, once and again"
-    )
-    hull: float = Field(
-        1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
-    )
-    reversal: float = Field(
-        0.5,
-        gt=0.0,
-        description="largest part of the training's product of steering and its rate that is "
-        "trusted",
-    )
-    saturation: float = Field(
-        1.2,
-        gt=0.0,
-        description="a run with a tire beyond this multiple of the slip at which all of its "
-        "contact slides is not trusted",
-    )
-    solver: Solver = "etdrk4"
-    tolerance: Tolerance = 1e-3
 
 
 def refusal(model: Model) -> str:
@@ -81,8 +45,7 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
     began = time.process_time()
     own = straight(model, training)
     runs = [run.recorded() for run in own]
-    sizes = Sizes(*(getattr(settings, name) for name in Sizes._fields))
-    reduced, samples = fitted_to(model, runs, sizes)
+    reduced, samples = fitted_to(model, runs, settings)
     if settings.sweeps:
         goals = targets(reduced, own, runs, stride=1)
         free = free_coefficients(reduced)

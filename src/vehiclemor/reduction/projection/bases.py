@@ -38,16 +38,9 @@ RankTolerance = Annotated[
 
 @dataclass(frozen=True)
 class Basis(ShortRepr):
-    """Affine subspace mean + span(vectors).
+    """Affine subspace mean (n,) + span of orthonormal columns (n, r).
 
-    Attributes
-    ----------
-    mean
-        Mean of the snapshots (n,).
-    vectors
-        Orthonormal columns (n, r).
-    singular_values
-        All singular values (min(n, m),) of the centred snapshots, decreasing.
+    Singular values (min(n, m),) are all of the centred snapshots', decreasing.
     """
 
     mean: np.ndarray
@@ -67,21 +60,10 @@ class Basis(ShortRepr):
 
 
 def pod_basis(snapshots: np.ndarray, rank: int, rank_tolerance: float = 0.0) -> Basis:
-    """POD basis of snapshots by singular value decomposition, mean subtracted.
+    """POD basis of snapshots (n, m) by singular value decomposition, mean subtracted.
 
-    Parameters
-    ----------
-    snapshots
-        One snapshot in each column (n, m).
-    rank
-        Number of left singular vectors r, at most min(n, m).
-    rank_tolerance
-        Vectors whose singular value is below it times the first are dropped; 0 keeps all r.
-
-    Returns
-    -------
-    Basis
-        The sign of each vector is fixed: its largest component is positive.
+    Of `rank` left singular vectors those are dropped whose singular value is below the tolerance
+    times the first; 0 keeps all.  Signs are fixed: the largest component of each is positive.
     """
     mean = snapshots.mean(axis=1)
     vectors, values, _ = np.linalg.svd(snapshots - mean[:, None], full_matrices=False)

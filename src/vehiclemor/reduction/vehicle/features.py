@@ -136,13 +136,7 @@ class Layout(NamedTuple):
 
 
 def rates_text(features: Features, parameters: int) -> str:
-    """Source of the right-hand side; constants are the features' parameters, then C.
-
-    Parameters
-    ----------
-    parameters
-        Number of parameters.
-    """
+    """Source of the right-hand side; constants are that many parameters, then C."""
     k, first = features.states, parameters
     lines = _coordinates(features)
     lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
@@ -235,18 +229,9 @@ def feature_system(
     error_scale: np.ndarray,
     reference: np.ndarray,
 ) -> System:
-    """The reduced vehicle as the compiled loops take it.
+    """The reduced vehicle as the compiled loops take it, see `ReducedVehicle`.
 
-    Parameters
-    ----------
-    parameters
-        Of the features.
-    coefficients
-        C (terms, states + 3): columns of z', then of psi', U and V.
-    error_scale
-        Magnitude of each state (states + 3,) below which errors count absolutely.
-    reference
-        Reduced coordinates (states,) at which the Jacobian is frozen.
+    The Jacobian is frozen at the reference (states,).
     """
     blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.blocks]
     for block, (terms, columns) in zip(blocks, features.blocks, strict=True):

@@ -41,14 +41,8 @@ def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more:
 
     S. Chen, S. A. Billings, W. Luo, Int. J. Control 50 (1989), 1873-1896.
 
-    Parameters
-    ----------
-    columns
-        Columns (samples, terms); the first `given` are chosen already.
-    values
-        Values (samples, targets), scaled so that their squares may be added.
-    more
-        How many are chosen beside the given ones.
+    The first `given` columns (samples, terms) are chosen already, `more` beside them; values
+    (samples, targets) are scaled so that their squares may be added.
     """
     scale = np.sqrt(np.mean(columns**2, axis=0))
     scale[scale == 0.0] = 1.0
@@ -86,21 +80,8 @@ def surviving(
     Second order derivatives for network pruning: optimal brain surgeon, NIPS 5 (1992), 164-171;
     here for groups, since a feature that one equation needs costs the others nothing).
 
-    Parameters
-    ----------
-    normal
-        Normal matrix (n, n) of all coefficients, also of those in no group, which stay.
-    coefficients
-        Their values (n,) at the minimum.
-    groups
-        Numbers of the coefficients of each feature that may go.
-    kept
-        How many groups are left.
-
-    Returns
-    -------
-    tuple
-        Numbers of the groups left, in order, and the coefficients (n,), zero where eliminated.
+    The normal matrix (n, n) and the values (n,) at the minimum are of all coefficients, also of
+    those in no group, which stay.  They come back zero where they are eliminated.
     """
     scaled, scale = unit_diagonal(normal)
     inverse = np.linalg.inv(scaled + REGULARISATION * np.eye(len(normal)))

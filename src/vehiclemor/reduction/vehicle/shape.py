@@ -43,16 +43,9 @@ def no_steered_vehicle(model: Model) -> str:
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Derivatives of shape, motion (psi', U, V) and outputs at straight running.
+    """Derivatives of the shape's rate, of motion (psi', U, V) and of outputs at straight running.
 
-    Attributes
-    ----------
-    a, b
-        Of the rate of the shape (n, n) and (n, inputs).
-    motion_a, motion_b
-        Of (psi', U, V): (3, n), (3, inputs).
-    output_a, output_b
-        Of the outputs.
+    By the shape (rows, n) and by the inputs (rows, inputs).
     """
 
     a: np.ndarray
@@ -65,13 +58,7 @@ class Linearisation:
 
 @dataclass(frozen=True, eq=False)
 class VehicleShape:
-    """Shape coordinates of one vehicle model.
-
-    Attributes
-    ----------
-    model
-        With positions on the road and a heading.
-    """
+    """Shape coordinates of one vehicle model."""
 
     model: DynamicModel
 
@@ -175,15 +162,7 @@ def turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray)
 
 
 class ShapeSamples(NamedTuple):
-    """Samples of all runs, one after the other.
-
-    Attributes
-    ----------
-    inputs, deviations
-        Inputs (samples, inputs), deviations of the shape from straight running (samples, n).
-    rates, motion
-        Rates of the shape (samples, n), and psi', U, V (samples, 3), by the full equations.
-    """
+    """Samples of all runs: deviations of the shape from straight running, its rates; psi', U, V."""
 
     inputs: np.ndarray
     deviations: np.ndarray

@@ -30,17 +30,7 @@ LIFTED = 8
 
 
 class Ranges(NamedTuple):
-    """Largest magnitudes in training runs.
-
-    Attributes
-    ----------
-    arguments
-        Of the arguments of the nonlinear terms (5,).
-    states, inputs
-        Of the slow coordinates (k,) and the inputs.
-    speed
-        Of the change of speed in m/s.
-    """
+    """Largest magnitudes in training runs: of the nonlinear terms' arguments (5,) and the rest."""
 
     arguments: np.ndarray
     states: np.ndarray

@@ -115,19 +115,10 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
 def real_modes(
     values: np.ndarray, left: np.ndarray, right: np.ndarray, chosen: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Modes in real form, slow ones first; blocks of two for conjugate pairs.
+    """Coordinates per state (k, n) and back (n, k) of modes in real form, slow ones first.
 
-    Parameters
-    ----------
-    values, left, right
-        Eigenvalues (n,) in 1/s, left eigenvectors by rows, and the inverse of that matrix.
-    chosen
-        Which modes (n,) are wanted, of a conjugate pair both or the upper one.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        Coordinates per state (k, n) and back (n, k).
+    Left eigenvectors stand by rows, `right` is the inverse of that matrix.  Of a conjugate pair
+    both modes or the upper one are chosen; it has a block of two.
     """
     rows, columns = [], []
     upper = np.flatnonzero(chosen & (np.imag(values) >= 0.0))

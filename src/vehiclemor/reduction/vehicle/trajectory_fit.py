@@ -43,16 +43,9 @@ Free = Sequence[tuple[Sequence[int], int]]
 
 @dataclass(frozen=True)
 class Target:
-    """One training run as a reduced run should be.
+    """One training run in reduced states (samples, states + 3), as a reduced run should be.
 
-    Attributes
-    ----------
-    times, inputs
-        Output times (samples,) in s, and inputs (samples, inputs) then.
-    states
-        Reduced states (samples, states + 3): coordinates, heading, place.
-    steps
-        Numbers of the output times that the variational equations step on.
+    `steps` are numbers of the output times that the variational equations step on.
     """
 
     run: TrainingRun

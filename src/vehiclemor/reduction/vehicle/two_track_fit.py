@@ -5,10 +5,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
@@ -33,32 +35,41 @@ STILL = 1e-6
 POWERS, RANK = 4, 1e-10
 
 
-class Sizes(NamedTuple):
-    """Settings of the fit, see `TwoTrackSettings`."""
+class TwoTrackSettings(OnlineSettings):
+    """Settings for a vehicle."""
 
-    terms: int
-    even_terms: int
-    wheel_terms: int
-    lifted_terms: int
-    hull: float
-    reversal: float
-    saturation: float
+    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
+    even_terms: int = Field(16, ge=0, description="chosen products in those of the speed")
+    wheel_terms: int = Field(
+        9, ge=0, description="chosen products in the slip, and in the load, of an axle's wheels"
+    )
+    lifted_terms: int = Field(
+        20, ge=0, description="products chosen for pitch and heave, beside those of the equations"
+    )
+    sweeps: int = Field(
+        8, ge=0, description="Gauss-Newton steps on whole training runs, once and again"
+    )
+    hull: float = Field(
+        1.1, gt=0.0, description="arguments are held beyond this multiple of their training range"
+    )
+    reversal: float = Field(
+        0.5,
+        gt=0.0,
+        description="largest part of the training's product of steering and its rate that is "
+        "trusted",
+    )
+    saturation: float = Field(
+        1.2,
+        gt=0.0,
+        description="a run with a tire beyond this multiple of the slip at which all of its "
+        "contact slides is not trusted",
+    )
+    solver: Solver = "etdrk4"
+    tolerance: Tolerance = 1e-3
 
 
 class Samples(NamedTuple):
-    """Samples of all training runs.
-
-    Attributes
-    ----------
-    z, inputs
-        Reduced coordinates (samples, 5), inputs (samples, inputs).
-    rates
-        Their rates (samples, 5).
-    shape
-        Of the vehicle's shape.
-    outputs
-        Of the vehicle (samples, outputs).
-    """
+    """Samples of all training runs: reduced coordinates z (samples, 5) and their rates first."""
 
     z: np.ndarray
     inputs: np.ndarray
@@ -68,27 +79,21 @@ class Samples(NamedTuple):
 
 
 def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
-    """Training runs that begin in straight running, at any speed.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Training runs that begin in straight running, at any speed; `InputError` if none does."""
     shape = VehicleShape(model)
     dropped = slow_modes(shape, np.inf).symmetric
-    found = []
-    for run in training:
-        deviation = shape.of(model.start(run.start)[None])[0] - shape.reference
-        if not len(dropped.amplitudes(deviation)):
-            found.append(run)
+
+    def deviation(run: TrainingRun) -> np.ndarray:
+        return shape.of(model.start(run.start)[None])[0] - shape.reference
+
+    found = [run for run in training if not len(dropped.amplitudes(deviation(run)))]
     if not found:
         raise InputError(f"no training run of {model.name} begins in straight running")
     return found
 
 
 def fitted_to(
-    model: DynamicModel, runs: Sequence[Trajectory], sizes: Sizes
+    model: DynamicModel, runs: Sequence[Trajectory], settings: TwoTrackSettings
 ) -> tuple[ReducedVehicle, Samples]:
     """Slips, loads, accelerations and the other states, fitted to runs."""
     shape = VehicleShape(model)
@@ -105,16 +110,16 @@ def fitted_to(
         of_shape,
         np.concatenate([run.outputs for run in runs]),
     )
-    text = tire_text(shape, samples, sizes)
-    return fitted_on_rates(shape, modes, encoding, text, samples, sizes), samples
+    text = tire_text(shape, samples, settings)
+    return fitted_on_rates(shape, modes, encoding, text, samples, settings), samples
 
 
-def tire_text(shape: VehicleShape, samples: Samples, sizes: Sizes) -> tf.Text:
+def tire_text(shape: VehicleShape, samples: Samples, settings: TwoTrackSettings) -> tf.Text:
     """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
     z, u = samples.z, samples.inputs
     model, inputs = shape.model, u.shape[1]
-    reach = sizes.hull * largest(tf.argument_values(shape.speed, z, u))
-    reversal = sizes.reversal * float(largest(u[:, :1] * u[:, 1:2])[0])
+    reach = settings.hull * largest(tf.argument_values(shape.speed, z, u))
+    reversal = settings.reversal * float(largest(u[:, :1] * u[:, 1:2])[0])
     text = tf.arguments(shape.speed, reach, reversal)
     linear = tf.linear_terms(inputs)
     odd = [*linear, *tf.CUBIC, *tf.FASTER]
@@ -135,11 +140,11 @@ def tire_text(shape: VehicleShape, samples: Samples, sizes: Sizes) -> tf.Text:
             mean, half = values @ [0.5, 0.5], values @ [0.5, -0.5]
             for end, target, parity in (("", mean, mean_parity), ("_half", half, 1 - mean_parity)):
                 terms, table, first = parities[parity]
-                chosen = forward_selection(table, target[:, None], first, sizes.wheel_terms)
+                chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
                 weights = ridge_fit(table[:, chosen], target, RIDGE)
                 text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights.tolist())
         parameters = {name: float(model.parameters[name]) for name in FIALA}
-        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), sizes.saturation))
+        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
     return text
 
 
@@ -149,7 +154,7 @@ def fitted_on_rates(
     encoding: np.ndarray,
     text: tf.Text,
     samples: Samples,
-    sizes: Sizes,
+    settings: TwoTrackSettings,
 ) -> ReducedVehicle:
     """Equations fitted to the accelerations of the training runs."""
     z, u, rates, of_shape, _ = samples
@@ -167,14 +172,14 @@ def fitted_on_rates(
         return [terms[i] for i in numbers]
 
     plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
-    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], sizes.terms)
+    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], settings.terms)
     forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
     symmetric = np.column_stack([rates[:, tf.SPEED], forward])
     candidates = tf.even_candidates(inputs)
-    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, sizes.even_terms)
+    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, settings.even_terms)
     terms = [*odd, "1.0", *even]
     seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
-    lifted = chosen(terms, candidates, seen, sizes.lifted_terms)
+    lifted = chosen(terms, candidates, seen, settings.lifted_terms)
     columns = columns_of(terms)
     k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
     lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
