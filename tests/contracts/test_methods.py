@@ -19,8 +19,8 @@ from vehiclemor.multibody.definition import KINDS
 from vehiclemor.online.model_file import load
 from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.reduced_system import StateSpace
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.signals import Signal

@@ -51,20 +51,7 @@ STEP = 0.01
 
 
 def write(rom: ReducedOrderModel, path: Any, overwrite: bool = False) -> Path:
-    """Write a reduced model into a new file.
-
-    Parameters
-    ----------
-    overwrite
-        Whether a file that is there is replaced.
-
-    Raises
-    ------
-    InputError
-        If the path is taken, or the model has a part that can't be written.
-    VehiclemorError
-        If the file can't be written; then there is none, or the old one.
-    """
+    """Write a reduced model into a file, see `ReducedOrderModel.save`."""
     import xarray as xr
 
     path = file_path("path", path)
@@ -136,17 +123,8 @@ def load(path: Any) -> ReducedOrderModel:
 def rom(model: str) -> ReducedOrderModel:
     """The reduced model of a car or a suspension that ships with the package.
 
-    It is the one that the model's protocol has chosen for unseen inputs, see `compare()`.
-
-    Parameters
-    ----------
-    model
-        Registered name.
-
-    Raises
-    ------
-    InputError
-        If none ships for a model of this name.
+    It is the one that the model's protocol has chosen for unseen inputs, see `compare()`;
+    `InputError` if none ships for a model of this name.
     """
     known = {path.stem: path for path in shipped_folder().glob("*.nc")}
     return load(known[choice("model with a reduced one that ships", model, known)])
@@ -201,13 +179,7 @@ def _model(name: str, parameters: Mapping[str, Any]) -> Model:
 
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a file that is whole and of this format.
-
-    Raises
-    ------
-    FileError
-        If there is none.
-    """
+    """Variables and attributes of a file that is whole and of this format, else `FileError`."""
     with opened(path, "saved model") as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:

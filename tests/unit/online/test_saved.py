@@ -310,7 +310,7 @@ def test_parts_that_would_do_harm_are_refused(saved, place, value):
 NAMES = [
     *("os:system", "builtins:eval", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
     *("vehiclemor.simulation.dynamic:DynamicModel", "vehiclemor.simulation.build:build"),
-    *("vehiclemor.simulation.system:System", f"{ROOM}.state_space:KinematicStates"),
+    *("vehiclemor.simulation.system:System", f"{ROOM}.reduced_system:KinematicStates"),
     *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",

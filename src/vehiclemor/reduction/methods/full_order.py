@@ -10,7 +10,7 @@ from pydantic import Field
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.reduced_system import KinematicStates, ReducedSystem, StateSpace
 from vehiclemor.reduction.settings import (
     AnyIntegrator,
     OnlineSettings,
@@ -18,7 +18,6 @@ from vehiclemor.reduction.settings import (
     StepTolerance,
     Tolerance,
 )
-from vehiclemor.reduction.state_space import KinematicStates, StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel

@@ -15,8 +15,8 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
+from vehiclemor.reduction.reduced_system import StateSpace
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
-from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import checked_fit, checked_settings, fitted, validated
 from vehiclemor.reduction.vehicle.shape import no_steered_vehicle

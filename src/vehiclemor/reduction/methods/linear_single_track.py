@@ -26,16 +26,17 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
-from vehiclemor.reduction.vehicle.linear_vehicle import (
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import (
     CORNERING,
     HEADING,
     MARGIN,
     PLACE,
     SPEED,
+    VehicleShape,
     linearisation_cost,
+    no_steered_vehicle,
 )
-from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.simulation.dynamic import DynamicModel
 

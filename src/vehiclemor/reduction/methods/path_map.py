@@ -27,8 +27,8 @@ from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
 from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
+from vehiclemor.reduction.reduced_system import KinematicStates
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.state_space import KinematicStates
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -65,12 +65,7 @@ def monomials(rank: int, degree: int) -> tuple[tuple[int, ...], ...]:
 def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> str:
     """Text of the kernel `polynomials`: each monomial is one of a degree less times a variable.
 
-    Parameters
-    ----------
-    moving
-        Numbers of the inputs that are variables.
-    columns
-        Column of the coefficients for each result; several may share one.
+    The variables are the moving inputs; several results may share a column of the coefficients.
     """
     every = monomials(len(moving), degree)
     places = {term: place for place, term in enumerate(every)}
@@ -107,18 +102,12 @@ class PathMapSettings(Settings):
 
 @dataclass(frozen=True)
 class PathMapModel(ShortRepr):
-    """Coordinates and outputs as polynomials of the inputs.
+    """Coordinates and outputs as polynomials, of that total degree, of the inputs that move.
 
     Attributes
     ----------
     ranges
         Lowest and highest value (inputs, 2) of each input in training, with the margins.
-    moving
-        Numbers of the inputs that move.
-    degree
-        Total degree of the polynomials.
-    cells
-        What the loop evaluates.
     columns
         Column of the coefficients for each coordinate and output; equal ones share one.
     stops
@@ -283,10 +272,7 @@ def check(model: Model, settings: PathMapSettings) -> None:
 def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) -> PathMapModel:
     """Interpolation of positions that are solved at the Chebyshev points of all cells.
 
-    Raises
-    ------
-    InputError
-        If no input moves in training, or not all of the box that they span can be reached.
+    `InputError` if no input moves in training, or not all of the box that they span is in reach.
     """
     every = np.concatenate([model.sampled(run.maneuver)[1] for run in training])
     low, high = every.min(axis=0), every.max(axis=0)

@@ -23,8 +23,8 @@ from vehiclemor.reduction.projection.bases import (
     pod_basis,
     project,
 )
+from vehiclemor.reduction.reduced_system import KinematicStates
 from vehiclemor.reduction.settings import Settings, StepTolerance
-from vehiclemor.reduction.state_space import KinematicStates
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel, new_counts
@@ -69,18 +69,10 @@ class AlgebraicPodSettings(Settings):
 
 @dataclass(frozen=True)
 class AlgebraicProjection(ShortRepr):
-    """Reduced model on affine subspaces, one in each window.
+    """Reduced model on affine subspaces, one in each window between edges (windows + 1,) in s.
 
-    Attributes
-    ----------
-    edges
-        Window edges (windows + 1,) in s.
-    bases
-        One subspace for each window.
-    tests
-        Test bases (n, r) of the windows; None for least squares.
-    tolerance
-        Largest step of the last iteration (reduced coordinates).
+    Test bases (n, r) of the windows are none for least squares; the tolerance is the largest step
+    of the last iteration in reduced coordinates.
     """
 
     model: AlgebraicModel

@@ -194,14 +194,9 @@ class RestartedProjection(DynamicProjection):
 def fit_windows(
     model: DynamicModel, training: Training, edges: np.ndarray, settings: DynamicPodSettings
 ) -> DynamicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) of all runs.
+    """POD subspaces, between edges (windows + 1,) in s, of equidistant snapshots of all runs.
 
-    Windows lie between edges (windows + 1,) in s.
-
-    Raises
-    ------
-    InputError
-        If the training runs differ in duration.
+    `InputError` if the training runs differ in duration.
     """
     durations = sorted({run.maneuver.duration for run in training})
     if len(durations) > 1:

@@ -34,12 +34,10 @@ MOST_STATES = 100
 
 @dataclass(frozen=True)
 class Features:
-    """Text of features.
+    """Text of features of so many reduced coordinates `z0, z1, ...` and inputs `u0, u1, ...`.
 
     Attributes
     ----------
-    states, inputs
-        Numbers of reduced coordinates `z0, z1, ...` and of inputs `u0, u1, ...`.
     lines
         Assignments `name = expression` of what the features share, in order; they may use
         parameters `p[i]`.
@@ -118,16 +116,7 @@ def held(text: str) -> str:
 
 
 class Layout(NamedTuple):
-    """Where the shape of a vehicle stands in its states.
-
-    Attributes
-    ----------
-    size
-        Number of states.
-    kept, planar, pairs
-        Numbers of the states that make the shape, of the place and the heading, and of pairs that
-        turn with the heading.
-    """
+    """Where the shape of a vehicle is kept in its states, place and heading, pairs that turn."""
 
     size: int
     kept: Sequence[int]

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -24,6 +25,11 @@ from vehiclemor.simulation.trajectory import Trajectory
 
 STEP = 6e-6
 INPUT_STEP = 1e-5
+# Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
+CORNERING = 4.0
+# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
+MARGIN = 3.0
+SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
 # Outputs in which the slow manifold has its nonlinear terms.
 SLIP_OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in WHEELS))
 
@@ -175,3 +181,8 @@ def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSampl
     inputs = np.concatenate([run.inputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])
     return ShapeSamples(inputs, shapes - shape.reference, *shape.motion(shapes, inputs))
+
+
+def linearisation_cost(shape: VehicleShape, began: float) -> Offline:
+    """Seconds since `began`; two evaluations for every state and input."""
+    return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))

@@ -28,12 +28,10 @@ class SlowModes:
     ----------
     lateral
         How many coordinates steering moves.
-    rates
-        Matrix (k, k), blocks of two for conjugate pairs.
+    rates, drive
+        Of z' the matrix (k, k), blocks of two for conjugate pairs, and the steering's column (k,).
     left, right
         z = left d (k, n), and d = right z for slow motion (n, k).
-    drive
-        Coefficient (k,) of the steering in z'.
     feedthrough
         What of the inputs (k, inputs) is subtracted, so that z' has no derivative of the steering.
     follow

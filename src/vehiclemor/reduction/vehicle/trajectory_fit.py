@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.loops import loops
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -243,11 +243,7 @@ def _sensitivities(
     scratch = np.empty((2 * dim + PLANAR) * m + 3 * k * k)
     run = AlongRun(times, columns[:samples], slopes, motion)
     pivots = np.empty(k, dtype=np.int64)
-    if not _loop()(run, terms, targets, COMPARED, weights, result, scratch, pivots):
+    loop = loops(LOOPS, ("sensitivities",))["sensitivities"]
+    if not loop(run, terms, targets, COMPARED, weights, result, scratch, pivots):
         raise np.linalg.LinAlgError("a step of the variational equations is singular")
     return result
-
-
-def _loop() -> Loop:
-    name = "sensitivities"
-    return loops(LOOPS, (name,))[name]
