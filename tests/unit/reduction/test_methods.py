@@ -1,30 +1,24 @@
-"""Reduced models meet the published bounds, stay near the floor, and are exact at full rank."""
+"""Methods for a mechanism near the floor and exact at full rank; training runs; what is told."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.reducing import figure_errors, fitted, floor_errors, two_way_travel
+from tests.reducing import figure_errors, fitted, floor_errors, training_runs, two_way_travel
 from vehiclemor.errors import InputError
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.projection.bases import Basis
+from vehiclemor.reduction.trust import trust_of
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Masoudi et al. (2015): RMS errors of spindle y (m) and second Euler angle (rad), r = 3.
 PUBLISHED = np.array([7.57e-5, 2.4e-5])
-
-
-@pytest.mark.parametrize("test_space", ["least_squares", "galerkin"])
-def test_three_coordinates_meet_the_published_errors(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, test_space: str
-) -> None:
-    reduced = fitted(model, nominal, "pod", rank=3, test_space=test_space)
-    run = reduced.simulate(nominal, model.starts[0])
-    assert reduced.effective_rank == 3
-    assert np.all(figure_errors(model, run.outputs, full) < PUBLISHED)
 
 
 def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(
@@ -67,19 +61,6 @@ def test_full_rank_equals_full_order(
     np.testing.assert_allclose(
         run.coordinates, model.simulate(maneuver).coordinates, rtol=0, atol=1e-11
     )
-
-
-def test_snapshots_are_hit_where_they_span_the_subspace(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
-    reduced = fitted(model, nominal, "pod", rank=4)
-    for k, basis in enumerate(reduced.bases):
-        times = np.linspace(5.0 * k, 5.0 * k + 5.0, 10)
-        exact = model.simulate(nominal, times=times).coordinates
-        at = basis.mean + (exact - basis.mean) @ basis.vectors @ basis.vectors.T
-        np.testing.assert_allclose(at, exact, rtol=0, atol=1e-14)
-        # Both ends of the window are snapshots.
-        assert basis.mean == pytest.approx(exact.mean(axis=0), abs=1e-15)
 
 
 def test_bases_of_the_nominal_run_fail_at_another_frequency(
@@ -161,3 +142,67 @@ def test_iteration_that_fails_is_a_result(model: AlgebraicModel, nominal: Maneuv
     assert "singular at t = 0 s" in run.message
     assert np.isnan(run.coordinates).all()
     assert np.isnan(run.outputs[:, 0]).all()
+
+
+def test_run_is_exact_at_any_times(
+    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
+) -> None:
+    [run] = training_runs(model, nominal)
+    some = np.array([3, 250, 250, 700, 1000])
+    history = run.at(nominal.times[some])
+    np.testing.assert_allclose(history.coordinates, full.coordinates[some], rtol=0, atol=1e-13)
+
+
+def test_a_run_has_the_histories_of_its_trajectory(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    [run] = training_runs(model, nominal)
+    recorded = run.recorded()
+    for name in ("time", "inputs", "states", "outputs"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
+    assert run.outputs is run.outputs
+    with pytest.raises(AttributeError, match="rank"):
+        _ = run.rank
+
+
+def test_snapshots_of_several_runs_are_put_side_by_side(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    method = component("method", "pod")
+    settings = validated(method, model.kind, {"rank": 3})
+    pairs = [(1.0, 1.0), (1.0, 0.5)]
+    together = method.fit(model, training_runs(model, nominal, "set", pairs), settings)
+    means = [
+        [basis.mean for basis in fitted(model, nominal.perturbed(*pair), "pod").bases]
+        for pair in pairs
+    ]
+    for k, basis in enumerate(together.bases):
+        assert basis.mean == pytest.approx((means[0][k] + means[1][k]) / 2.0, abs=1e-14)
+
+
+def test_replay_of_several_runs_takes_the_nearest_input(
+    model: AlgebraicModel, nominal: Maneuver
+) -> None:
+    method, start = component("method", "replay"), model.starts[0]
+    pairs = [(1.0, 1.0), (1.0, 0.5), (2.0, 1.0)]
+    replay = method.fit(model, training_runs(model, nominal, "set", pairs), {})
+    for pair, tested in zip(pairs, [(1.0, 0.9), (1.05, 0.4), (1.9, 1.1)], strict=True):
+        run = replay.simulate(nominal.perturbed(*tested), start)
+        expected = model.simulate(nominal.perturbed(*pair)).coordinates
+        np.testing.assert_array_equal(run.coordinates, expected)
+
+
+@given(size=st.floats(0.0, 3.0), sample=st.integers(0, 9), column=st.integers(0, 1))
+def test_the_first_range_that_is_left_is_named(size, sample, column):
+    used = np.zeros((10, 2))
+    used[sample:, column] = -size
+    found = trust_of(np.arange(10.0), used, ("roll", "speed"))
+    assert found.indicator == size
+    assert found.until == (sample if size > 1.0 else np.inf)
+    assert found.reason.startswith(("roll", "speed")[column] if size > 1.0 else "")
+    assert bool(found.reason) == (size > 1.0)
+
+
+def test_what_is_no_number_is_beyond():
+    found = trust_of(np.arange(3.0), np.array([[0.5], [np.nan], [0.1]]), ("roll",))
+    assert (found.indicator, found.until) == (0.5, 1.0)

@@ -70,20 +70,6 @@ def test_error_falls_with_the_cells_at_the_order_of_the_polynomials(
     assert np.log2(coarse / fine) == pytest.approx(degree + 1, abs=0.8)
 
 
-def test_interpolates_the_equations_at_the_nodes_to_rounding(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
-    reduced = mapped(model, nominal, cells=1, degree=14)
-    # Half a per cent of the range is added at either end.
-    nodes = 0.101 * np.cos(np.pi * (np.arange(15) + 0.5) / 15)
-    at_nodes = replace(travelling(lambda t: (nodes, 0.0 * t), nominal), samples=15)
-    run = reduced.simulate(at_nodes, START)
-    expected = np.array([model.solve([height, 0.0]) for height in nodes])
-    np.testing.assert_allclose(run.coordinates, expected, rtol=0, atol=1e-13)
-    exact = model.outputs_at(expected, run.inputs)
-    np.testing.assert_allclose(run.outputs, exact, rtol=0, atol=1e-13)
-
-
 def test_edges_and_corners_of_all_cells_are_as_exact_as_their_insides(
     model: AlgebraicModel, both: Maneuver
 ) -> None:

@@ -9,16 +9,13 @@ import pytest
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
-from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
-from vehiclemor.reduction.vehicle.features import linear_features
+from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system import Solver
 from vehiclemor.steering_maneuvers import lane_change, rack_lane_change, straight_ahead
 
 LANE_CHANGES = {
@@ -113,7 +110,7 @@ def test_kernels_are_the_features_that_are_fitted(reduced: ReducedVehicle) -> No
     rng, k = np.random.default_rng(1), reduced.features.states
     y = rng.normal(size=(20, k + 3)) * reduced.error_scale / 3.0
     u = rng.normal(size=(20, 1)) * 0.03
-    found = reduced.system.along("derivative", y, u, k + 3)
+    found = reduced.equations.system.along("derivative", y, u, k + 3)
     values = (
         feature_columns(reduced.features, y[:, :k], u, reduced.parameters) @ reduced.coefficients
     )
@@ -123,25 +120,6 @@ def test_kernels_are_the_features_that_are_fitted(reduced: ReducedVehicle) -> No
     expected[:, k + 1] = forward * cosine - sideward * sine
     expected[:, k + 2] = forward * sine + sideward * cosine
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-10)
-
-
-def _held(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-    del frequency, amplitude
-    return np.full((len(times), 1), 0.3)
-
-
-def test_a_linear_system_is_solved_exactly_in_the_limit() -> None:
-    # z' = -3 z + 2 u, psi' = z: the steady state of a held input is known.
-    features = linear_features(1, 1)
-    c = np.zeros((3, 4))
-    c[1, 0], c[2, 0], c[1, 1], c[0, 2] = -3.0, 2.0, 1.0, 10.0
-    system = feature_system(features, np.zeros(0), c, np.ones(4), np.zeros(1))
-    held = replace(straight_ahead, signal=_held, duration=5.0, samples=51)
-    run = system.run(held, np.zeros(4), whole_space(4), Solver("ros34pw2", 1e-8))
-    expected = 0.2 * (1.0 - np.exp(-3.0 * run.times))
-    np.testing.assert_allclose(run.path[:, 0], expected, atol=1e-6)
-    heading = 0.2 * run.times - 0.2 / 3.0 * (1.0 - np.exp(-3.0 * run.times))
-    np.testing.assert_allclose(run.path[:, 1], heading, atol=1e-6)
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "dropped"])
@@ -190,19 +168,6 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(
     held = [i for i, term in enumerate(terms) if not {"z", "u"} & set(term)]
     assert len(held) > 5
     assert np.abs(columns[:, held]).max() <= 1.0 + 1e-9
-
-
-def test_runs_beyond_what_was_learnt_say_so(vehicle: Any, reduced: ReducedVehicle) -> None:
-    inside = reduced.simulate(lane_change.perturbed(1.1, 1.0), "equilibrium")
-    assert inside.status == "ok"
-    assert inside.trust.indicator < 1.0
-    for beyond in (lane_change.perturbed(1.0, 2.0), lane_change.perturbed(3.0, 1.5)):
-        run = reduced.simulate(beyond, "equilibrium")
-        assert run.status == "untrusted"
-        assert 1.0 < run.trust.until < 5.0
-    equilibrium, dropped = vehicle.start("equilibrium"), vehicle.start("dropped")
-    assert reduced.simulate(lane_change, dropped).status == "ok"
-    assert "start" in reduced.simulate(lane_change, 3.0 * dropped - 2.0 * equilibrium).message
 
 
 def test_how_a_dropped_car_lands_is_learnt(vehicle: Any, reduced: ReducedVehicle) -> None:

@@ -101,14 +101,6 @@ def test_equation_seed_permutes_and_signs_the_equations(
     np.testing.assert_allclose(run.coordinates, other, rtol=0, atol=1e-10)
 
 
-def test_settings_of_galerkin_do_not_touch_least_squares(
-    model: AlgebraicModel, nominal: Maneuver, least_squares: AlgebraicProjection
-) -> None:
-    plain = least_squares.simulate(nominal, model.starts[0]).coordinates
-    other = fitted(model, nominal, "pod", rank=3, equation_seed=3, reversed_coordinates="theta_u")
-    np.testing.assert_array_equal(other.simulate(nominal, model.starts[0]).coordinates, plain)
-
-
 def test_reversed_coordinates_equal_a_model_in_these_coordinates(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory
 ) -> None:
@@ -136,18 +128,6 @@ def test_reversed_coordinates_equal_a_model_in_these_coordinates(
     np.testing.assert_allclose(run.coordinates, path @ signs, rtol=0, atol=1e-11)
 
 
-def test_the_wide_spread_of_galerkin(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
-) -> None:
-    angles = []
-    for seed in range(1, 13):
-        reduced = fitted(model, nominal, "pod", rank=3, test_space="galerkin", equation_seed=seed)
-        run = reduced.simulate(nominal, model.starts[0])
-        if run.status == "ok":
-            angles.append(figure_errors(model, run.outputs, full)[1])
-    assert max(angles) > 30.0 * min(angles)
-
-
 def test_each_window_starts_at_the_projection_of_the_last_sample(
     model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
 ) -> None:
@@ -158,26 +138,6 @@ def test_each_window_starts_at_the_projection_of_the_last_sample(
     np.testing.assert_allclose(coarse.coordinates, other, rtol=0, atol=1e-12)
     converged = least_squares.simulate(nominal, model.starts[0]).coordinates
     assert np.abs(coarse.coordinates - converged).max() > 1e-9
-
-
-def test_restart_in_the_same_subspace_changes_nothing(
-    model: AlgebraicModel, nominal: Maneuver, least_squares: AlgebraicProjection
-) -> None:
-    basis = least_squares.bases[0]
-    whole = replace(least_squares, edges=np.array([0.0, 10.0]), bases=(basis,))
-    parts = replace(least_squares, edges=np.linspace(0.0, 10.0, 8), bases=(basis,) * 7)
-    runs = [m.simulate(nominal, model.starts[0]) for m in (whole, parts)]
-    np.testing.assert_allclose(runs[0].coordinates, runs[1].coordinates, rtol=0, atol=1e-12)
-
-
-def test_least_squares_is_stationary(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, least_squares: AlgebraicProjection
-) -> None:
-    run = least_squares.simulate(nominal, model.starts[0]).coordinates
-    for (_, vectors), samples in zip(subspaces(least_squares), WINDOWS, strict=True):
-        for k in samples[::37]:
-            gradient = (model.jacobian(run[k], full.inputs[k]) @ vectors).T
-            assert np.abs(gradient @ model.residual(run[k], full.inputs[k])).max() < 1e-12
 
 
 def test_rounding_seed_changes_only_directions_that_rounding_chooses(

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from vehiclemor.reduction.projection.restarted import RestartedProjection
 
 import vehiclemor as vm
 from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.projection.dynamic import RestartedProjection
 from vehiclemor.registry import component
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.reducing import CARS
@@ -68,19 +68,6 @@ def test_what_lasts_longer_than_in_any_training_run_is_told(reduced):
     assert run.trust.indicator > 1.0
 
 
-def test_the_least_motion_lasts_no_longer_than_training_runs_and_none_for_ever(reduced):
-    longest = reduced.reach.lasted[0, 0]
-    little = held(reduced, 30.0).perturbed(1.0, 0.02)
-    run = reduced.simulate(little, "equilibrium")
-    assert run.status == "untrusted"
-    assert "longer" in run.message
-    # It is told at a step of the integration.
-    assert 1.0 < run.trust.until - longest < 3.5
-    for start in reduced.model.starts:
-        straight = reduced.simulate(little.perturbed(1.0, 0.0), start).trust
-        assert "sideways" not in straight.reason
-
-
 def test_training_runs_are_known(reduced):
     for factors in ((1.0, 1.0), (1.3, -0.7)):
         maneuver = CARS[reduced.model.name].perturbed(*factors)
@@ -142,23 +129,3 @@ def test_a_start_that_turns_is_told(reduced):
         assert run.status == "untrusted"
         assert run.trust.until == 0.0
         assert "start" in run.message
-
-
-@settings(max_examples=12)
-@given(frequency=st.floats(0.1, 1.5), amplitude=st.floats(-0.9, 0.9))
-def test_long_steering_is_right_or_told(reduced, frequency, amplitude):
-    model, known, w = reduced.model, CARS[reduced.model.name], 2.0 * np.pi * frequency
-    size, inputs = 0.5 * np.abs(known.at(known.times)[:, 0]).max(), known.inputs
-
-    def signal(times: np.ndarray, _: float, factor: float) -> np.ndarray:
-        t = w * (times - 1.0)
-        values = np.column_stack([1.0 - np.cos(t), w * np.sin(t), w**2 * np.cos(t)])
-        return factor * size * (times > 1.0)[:, None] * values[:, : len(inputs)]
-
-    maneuver = Maneuver("swaying", "", signal, inputs, 20.0, 1001, lambda _: (1.0,))
-    maneuver = maneuver.perturbed(1.0, amplitude)
-    run = reduced.simulate(maneuver, "equilibrium")
-    if run.status == "ok":
-        place = model.outputs.index("lateral_position")
-        true = model.simulate(maneuver, "equilibrium")
-        assert np.abs(run.outputs - true.outputs)[:, place].max() < 0.05
