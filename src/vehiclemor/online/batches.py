@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -117,7 +117,13 @@ def simulate_many(
         name: np.full(runs, first, dtype=object if isinstance(first, str) else float)
         for name, (first, _, _) in TOLD.items()
     }
-    model_of = _models(reduced)
+
+    @lru_cache(MOST_SETS)
+    def model_of(given: tuple) -> ReducedOrderModel | Failure:
+        try:
+            return reduced.for_parameters(dict(given))
+        except VehiclemorError as error:
+            return Failure("rejected", str(error))
 
     def result(run: int) -> Trajectory | Failure:
         car = reduced if sets is None else model_of(sets[run])
@@ -170,19 +176,6 @@ def _model_behind(model: Any) -> ReducedOrderModel:
     training = training_set(full, "full_order", "nominal")
     fitted = FullOrderModel(full, **settings)
     return ReducedOrderModel(full, "full_order", settings, training, fitted)
-
-
-def _models(reduced: ReducedOrderModel) -> Callable[[tuple], ReducedOrderModel | Failure]:
-    """What gives the model of a parameter set, or why there is none."""
-
-    @lru_cache(MOST_SETS)
-    def model_of(given: tuple) -> ReducedOrderModel | Failure:
-        try:
-            return reduced.for_parameters(dict(given))
-        except VehiclemorError as error:
-            return Failure("rejected", str(error))
-
-    return model_of
 
 
 def _cores() -> int:

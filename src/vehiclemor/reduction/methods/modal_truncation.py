@@ -80,44 +80,6 @@ def lateral_modes(shape: VehicleShape) -> Lateral:
     return Lateral(left @ linear.a @ right, left @ drive, left, right, follow, left @ follow)
 
 
-def linear_vehicle(
-    shape: VehicleShape, lateral: Lateral, settings: OnlineSettings, began: float
-) -> ReducedVehicle:
-    """A reduced vehicle of linear lateral dynamics at the speed of the start."""
-    linear, modes = shape.linearised, slow_modes(shape, np.inf)
-    k, inputs = len(lateral.a), linear.b.shape[1]
-    features = linear_features(k + 1, inputs)
-    odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
-    # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
-    features = replace(
-        features, groups=((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
-    )
-    lifting = np.zeros((len(features.terms), len(linear.a)))
-    lifting[odd] = np.vstack([lateral.right.T, lateral.follow.T])
-    lifting[k + 1] = modes.speed_right
-    c = np.zeros((len(features.terms), k + 4))
-    c[odd[: k + 1], :k] = np.vstack([lateral.a.T, lateral.b])
-    for column, row in ((k + 1, 0), (k + 3, 2)):
-        c[odd, column] = lifting[odd] @ linear.motion_a[row]
-        c[odd[k:], column] += linear.motion_b[row]
-    c[even, k + 2] = shape.speed, 1.0
-    return ReducedVehicle(
-        shape.model,
-        shape,
-        features,
-        np.zeros(0),
-        c,
-        lifting,
-        np.vstack([lateral.left, modes.speed_left]),
-        np.vstack([lateral.feedthrough, np.zeros(inputs)]),
-        np.concatenate([error_scale(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
-        linearisation_cost(shape, began),
-        settings.solver,
-        settings.tolerance,
-        modes.symmetric,
-    )
-
-
 def error_scale(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
     """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
     steady = -np.linalg.solve(lateral.a, lateral.b)
@@ -169,7 +131,38 @@ def fit(
     shape = VehicleShape(model)
     static = settings.static_correction == "yes"
     lateral = truncated(lateral_modes(shape), settings.fastest, static)
-    return linear_vehicle(shape, lateral, settings, began)
+    linear, modes = shape.linearised, slow_modes(shape, np.inf)
+    k, inputs = len(lateral.a), linear.b.shape[1]
+    features = linear_features(k + 1, inputs)
+    odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
+    # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
+    features = replace(
+        features, groups=((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
+    )
+    lifting = np.zeros((len(features.terms), len(linear.a)))
+    lifting[odd] = np.vstack([lateral.right.T, lateral.follow.T])
+    lifting[k + 1] = modes.speed_right
+    c = np.zeros((len(features.terms), k + 4))
+    c[odd[: k + 1], :k] = np.vstack([lateral.a.T, lateral.b])
+    for column, row in ((k + 1, 0), (k + 3, 2)):
+        c[odd, column] = lifting[odd] @ linear.motion_a[row]
+        c[odd[k:], column] += linear.motion_b[row]
+    c[even, k + 2] = shape.speed, 1.0
+    return ReducedVehicle(
+        shape.model,
+        shape,
+        features,
+        np.zeros(0),
+        c,
+        lifting,
+        np.vstack([lateral.left, modes.speed_left]),
+        np.vstack([lateral.feedthrough, np.zeros(inputs)]),
+        np.concatenate([error_scale(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
+        linearisation_cost(shape, began),
+        settings.solver,
+        settings.tolerance,
+        modes.symmetric,
+    )
 
 
 METHOD = Method(

@@ -48,7 +48,6 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     finishes,
     improved,
     pruned,
-    spread,
     targets,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -60,6 +59,7 @@ HEADING = 0.03
 # The part of the terms that is left by each round of elimination, and for how many of them all
 # training runs are looked at; with more terms it is fewer runs, but so many at least.
 SHRINKING, WANTED, FEW = 0.4, 60, 20
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 class SlowManifoldSettings(OnlineSettings):
@@ -174,7 +174,9 @@ def _fitted_on_runs(
         return reduced
     count = len(table.odd_nonlinear) + len(table.even_nonlinear)
     while settings.terms and count > settings.terms:
-        some = spread(goals, max(WANTED / count, FEW / len(goals)))
+        share = max(WANTED / count, FEW / len(goals))
+        # Spread without a period.
+        some = [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
         reduced = improved(reduced, some, table.free, 1)
         count = max(settings.terms, round(SHRINKING * count))
         fewer, table = pruned(reduced, table, some, count)

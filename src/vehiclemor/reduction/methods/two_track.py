@@ -34,11 +34,10 @@ from vehiclemor.reduction.vehicle.shape import (
     shape_samples,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import Free, improved, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
 
 # The states that are coordinates, and those of them whose rates are accelerations.
 COORDINATES = ("y_dot", "psi_dot", "phi", "phi_dot")
@@ -107,28 +106,6 @@ def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
     if not found:
         raise InputError(f"no training run of {model.name} begins in straight running")
     return found
-
-
-def fitted_to(
-    model: DynamicModel, runs: Sequence[Trajectory], settings: TwoTrackSettings
-) -> tuple[ReducedVehicle, Samples]:
-    """Slips, loads, accelerations and the other states, fitted to runs."""
-    shape = VehicleShape(model)
-    modes = slow_modes(shape, np.inf)
-    of_shape = shape_samples(shape, runs)
-    encoding = np.zeros((tf.STATES, len(shape.names)))
-    for i, name in enumerate(COORDINATES):
-        encoding[i, shape.names.index(name)] = 1.0
-    encoding[tf.SPEED] = modes.speed_left
-    samples = Samples(
-        of_shape.deviations @ encoding.T,
-        of_shape.inputs,
-        of_shape.rates @ encoding.T,
-        of_shape,
-        np.concatenate([run.outputs for run in runs]),
-    )
-    text = tire_text(shape, samples, settings)
-    return fitted_on_rates(shape, modes, encoding, text, samples, settings), samples
 
 
 def tire_text(shape: VehicleShape, samples: Samples, settings: TwoTrackSettings) -> tf.Text:
@@ -259,12 +236,6 @@ def mirror(shape: VehicleShape) -> np.ndarray:
     return matrix
 
 
-def free_coefficients(reduced: ReducedVehicle) -> Free:
-    """The coefficients that whole runs improve."""
-    (odd, _), (even, symmetric) = reduced.features.groups
-    return [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
-
-
 def lifted_anew(reduced: ReducedVehicle, training: Training, samples: Samples) -> ReducedVehicle:
     """The lifting fitted to where the reduced runs are, whose speed has become their own."""
     paths = [reduced.path(run.maneuver, run.start) for run in training]
@@ -293,10 +264,25 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
     began = time.process_time()
     own = straight(model, training)
     runs = [run.recorded() for run in own]
-    reduced, samples = fitted_to(model, runs, settings)
+    shape = VehicleShape(model)
+    modes, of_shape = slow_modes(shape, np.inf), shape_samples(shape, runs)
+    encoding = np.zeros((tf.STATES, len(shape.names)))
+    for i, name in enumerate(COORDINATES):
+        encoding[i, shape.names.index(name)] = 1.0
+    encoding[tf.SPEED] = modes.speed_left
+    samples = Samples(
+        of_shape.deviations @ encoding.T,
+        of_shape.inputs,
+        of_shape.rates @ encoding.T,
+        of_shape,
+        np.concatenate([run.outputs for run in runs]),
+    )
+    text = tire_text(shape, samples, settings)
+    reduced = fitted_on_rates(shape, modes, encoding, text, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, own, runs, stride=1)
-        free = free_coefficients(reduced)
+        (odd, _), (even, symmetric) = reduced.features.groups
+        free = [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
         reduced = improved(reduced, goals, free, settings.sweeps, power=1.0)
         reduced = improved(reduced, goals, free, settings.sweeps)
         reduced = lifted_anew(reduced, own, samples)

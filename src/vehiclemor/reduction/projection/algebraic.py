@@ -148,7 +148,9 @@ def fit_windows(
     for k in range(len(moments)):
         part = slice(k * count, (k + 1) * count)
         snapshots = np.concatenate([history.coordinates[part] for history in histories]).T
-        snapshots = _rounded(snapshots, settings.rounding_seed)
+        if seed := settings.rounding_seed:
+            noise = np.random.default_rng(seed).standard_normal(snapshots.shape)
+            snapshots = snapshots * (1.0 + np.finfo(float).eps * noise)
         bases.append(pod_basis(snapshots, rank, settings.rank_tolerance))
     tests = None
     if settings.test_space == "galerkin":
@@ -192,10 +194,3 @@ def _pairing(model: AlgebraicModel, settings: AlgebraicPodSettings) -> np.ndarra
     for index in _reversed(model, settings):
         pairing[:, index] *= -1.0
     return pairing
-
-
-def _rounded(snapshots: np.ndarray, seed: int) -> np.ndarray:
-    if seed == 0:
-        return snapshots
-    noise = np.random.default_rng(seed).standard_normal(snapshots.shape)
-    return snapshots * (1.0 + np.finfo(float).eps * noise)

@@ -127,12 +127,10 @@ class DynamicProjection(ReducedSystem):
         for k in np.flatnonzero(spaces.ranks).tolist():
             y = np.zeros(spaces.ranks[k])
             if spaces.formulation == "coordinates":
-                # Rates are coordinates of their own.
+                # Rates are coordinates of their own, and the test basis has nothing of speeds.
                 rank, no_input = spaces.ranks[k] // 2, np.zeros((1, len(model.inputs)))
-                of_mean = np.zeros(2 * len(model.coordinates))
-                of_mean[: len(model.coordinates)] = model.derivatives_at(
-                    spaces.means[k : k + 1], no_input
-                )[0, : len(model.coordinates)]
+                (of_mean,) = model.derivatives_at(spaces.means[k : k + 1], no_input)
+                of_mean[len(model.coordinates) :] = 0.0
                 y[rank:] = spaces.test_basis[k, :rank, :] @ of_mean
             jacobian = linearisation.reduced_jacobian(model, spaces, k, y)
             rates[k] = np.linalg.eigvals(jacobian).real.max()
@@ -212,20 +210,16 @@ def fit_windows(
     weight = _weight(model, settings, states.reshape(-1, states.shape[-1]), edges)
     windows = [slice(k * count, (k + 1) * count) for k in range(len(edges) - 1)]
     snapshots = [states[:, window].reshape(-1, states.shape[-1]) for window in windows]
-    bases = [_basis(part[:, : len(weight)], weight, settings) for part in snapshots]
+    root, bases = np.linalg.cholesky(weight), []
+    for part in (part[:, : len(weight)] for part in snapshots):
+        scaled = pod_basis((part @ root).T, settings.rank, settings.rank_tolerance)
+        vectors = np.linalg.solve(root.T, scaled.vectors)
+        bases.append(Basis(part.mean(axis=0), vectors, scaled.singular_values))
     means = np.array([part.mean(axis=0) for part in snapshots])
     spaces = _spaces(model, edges, means, bases, (weight, settings.formulation))
     rank, offline = max(basis.rank for basis in bases), offline_cost(began, model, histories)
     how = settings.solver, settings.tolerance
     return DynamicProjection(model, model.system, spaces, rank, offline, *how, bases=tuple(bases))
-
-
-def _basis(snapshots: np.ndarray, weight: np.ndarray, settings: DynamicPodSettings) -> Basis:
-    """POD basis of snapshots (samples, m), orthonormal by the weight (m, m), and their mean."""
-    root = np.linalg.cholesky(weight)
-    scaled = pod_basis((snapshots @ root).T, settings.rank, settings.rank_tolerance)
-    vectors = np.linalg.solve(root.T, scaled.vectors)
-    return Basis(snapshots.mean(axis=0), vectors, scaled.singular_values)
 
 
 def _spaces(

@@ -34,7 +34,6 @@ DIFFERENCE = 1e-6
 LOOPS = ("simulation.integrators.dense_solves", "reduction.vehicle.sensitivity_loops")
 # Least sum of squares that a weight is made of.
 NOTHING = 1e-12
-GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
 # (numbers of features, column) of the coefficients that may change.
@@ -115,11 +114,6 @@ def improved(
                 break
             damping *= 10.0
     return moved
-
-
-def spread(goals: Sequence[Target], share: float) -> list[Target]:
-    """A share of the goals, spread without a period: multiples of the golden ratio."""
-    return [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
 
 
 def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
