@@ -15,7 +15,7 @@ stays that of the start, and the dynamics are those of the model's own speed.  N
 """
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -25,7 +25,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.features import linear_features
+from vehiclemor.reduction.vehicle.features import Features
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     CORNERING,
@@ -133,12 +133,11 @@ def fit(
     lateral = truncated(lateral_modes(shape), settings.fastest, static)
     linear, modes = shape.linearised, slow_modes(shape, np.inf)
     k, inputs = len(lateral.a), linear.b.shape[1]
-    features = linear_features(k + 1, inputs)
+    terms = ("1.0", *(f"z{i}" for i in range(k + 1)), *(f"u{i}" for i in range(inputs)))
     odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
     # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
-    features = replace(
-        features, groups=((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
-    )
+    groups = ((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
+    features = Features(k + 1, inputs, (), terms, groups)
     lifting = np.zeros((len(features.terms), len(linear.a)))
     lifting[odd] = np.vstack([lateral.right.T, lateral.follow.T])
     lifting[k + 1] = modes.speed_right

@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
@@ -52,8 +52,6 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 
-# Accuracy of the reduced runs that are compared with training runs.
-REFIT_TOLERANCE = 1e-6
 # Heading (rad) below which its error counts absolutely.
 HEADING = 0.03
 # The part of the terms that is left by each round of elimination, and for how many of them all
@@ -109,9 +107,9 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
         reduced = _fitted_on_runs(reduced, table, goals, settings)
-    reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,
+        reach=training_reach(reduced, training, runs),
         offline=offline_cost(began, model, runs, len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
@@ -155,11 +153,8 @@ def _fitted_on_rates(
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
         np.concatenate([3.0 * table.ranges.states, [10.0, HEADING, 10.0, 10.0]]),
-        Offline(),
-        "dopri5",
-        REFIT_TOLERANCE,
-        modes.symmetric,
-        lifted,
+        transient=modes.symmetric,
+        lifted_features=lifted,
     )
 
 

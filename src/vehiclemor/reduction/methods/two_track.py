@@ -19,7 +19,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.multibody.components.tire_coefficients import FIALA
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
@@ -191,11 +191,8 @@ def fitted_on_rates(
         encoding,
         np.zeros((tf.STATES, inputs)),
         np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
-        Offline(),
-        "dopri5",
-        1e-6,
-        modes.symmetric,
-        text.features(inputs, lifted),
+        transient=modes.symmetric,
+        lifted_features=text.features(inputs, lifted),
     )
 
 

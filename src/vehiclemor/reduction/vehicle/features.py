@@ -104,12 +104,6 @@ def monomials(names: Sequence[str], degree: int) -> tuple[str, ...]:
     return tuple(" * ".join(part) for part in combinations_with_replacement(names, degree))
 
 
-def linear_features(states: int, inputs: int) -> Features:
-    """1, z and u."""
-    terms = ("1.0", *(f"z{i}" for i in range(states)), *(f"u{i}" for i in range(inputs)))
-    return Features(states, inputs, (), terms)
-
-
 def held(text: str) -> str:
     """Text of a value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
     return f"0.5 * (abs({text} + 1.0) - abs({text} - 1.0))"

@@ -32,6 +32,7 @@ from vehiclemor.sizes import require, shaped
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
 NOTHING_EXCITED = np.empty((2, 0, 2))
+NO_COST = Offline()
 
 
 class KnownStart(NamedTuple):
@@ -71,6 +72,8 @@ class ReducedVehicle(ShortRepr):
         Features of the lifting, with the same parameters, if not those of the equations.
     reach
         What the training runs have shown of durations and starts.
+
+    Integrator and tolerance are by default those of runs that are compared with training runs.
     """
 
     model: DynamicModel
@@ -82,9 +85,9 @@ class ReducedVehicle(ShortRepr):
     encoding: np.ndarray
     feedthrough: np.ndarray
     error_scale: np.ndarray
-    offline: Offline
-    solver: str
-    tolerance: float
+    offline: Offline = NO_COST
+    solver: str = "dopri5"
+    tolerance: float = 1e-6
     transient: Transient = NO_TRANSIENT
     lifted_features: Features | None = None
     reach: TrainingReach = NOTHING_KNOWN

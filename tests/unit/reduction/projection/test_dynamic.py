@@ -159,6 +159,12 @@ def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     assert reduced.spectral_abscissa == reduced.spectral_abscissas.max()
 
 
+def test_a_tighter_rank_tolerance_drops_modes_of_noise(model):
+    kept, cut = (fitted(model, rank=8, rank_tolerance=tolerance) for tolerance in (0.0, 1e-6))
+    # Before steering begins the car runs straight: one direction, the rest is rounding.
+    assert (kept.bases[0].rank, cut.bases[0].rank) == (8, 1)
+
+
 def test_divergence_is_recorded_with_its_time(model):
     reduced = fitted(model, "dropped", formulation="paired", inner_product="range")
     run = reduced.simulate(lane_change, "dropped")
