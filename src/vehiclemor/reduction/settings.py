@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
 from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
 
@@ -35,11 +35,18 @@ class Settings(BaseModel):
         return value
 
 
-# How a reduced system is integrated: the same two settings of all methods that have one.
+def _integrator(name: str) -> str:
+    """An integrator by its name or alias."""
+    name = ALIASES.get(name, name)
+    if name not in INTEGRATORS:
+        raise ValueError(f"is {name!r}; allowed: {', '.join(INTEGRATORS)}")
+    return name
+
+
 AnyIntegrator = Annotated[
-    Literal[tuple(INTEGRATORS)],  # type: ignore[valid-type]
-    BeforeValidator(lambda name: ALIASES.get(name, name) if isinstance(name, str) else name),
+    str, AfterValidator(_integrator), WithJsonSchema({"type": "string", "enum": list(INTEGRATORS)})
 ]
+# How a reduced system is integrated: the same two settings of all methods that have one.
 Solver = Annotated[
     AnyIntegrator,
     Field(description="as of full_order; all but dopri5 and rodas4 freeze the Jacobian"),

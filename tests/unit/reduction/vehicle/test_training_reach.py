@@ -68,6 +68,19 @@ def test_what_lasts_longer_than_in_any_training_run_is_told(reduced):
     assert run.trust.indicator > 1.0
 
 
+def test_the_least_motion_lasts_no_longer_than_training_runs_and_none_for_ever(reduced):
+    longest = reduced.reach.lasted[0, 0]
+    little = held(reduced, 30.0).perturbed(1.0, 0.02)
+    run = reduced.simulate(little, "equilibrium")
+    assert run.status == "untrusted"
+    assert "longer" in run.message
+    # It is told at a step of the integration.
+    assert 1.0 < run.trust.until - longest < 3.5
+    for start in reduced.model.starts:
+        straight = reduced.simulate(little.perturbed(1.0, 0.0), start).trust
+        assert "sideways" not in straight.reason
+
+
 def test_training_runs_are_known(reduced):
     for factors in ((1.0, 1.0), (1.3, -0.7)):
         maneuver = CARS[reduced.model.name].perturbed(*factors)
