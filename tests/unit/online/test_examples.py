@@ -12,7 +12,7 @@ from tests.texts.markdown import ROOT
 CARS = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
-def example(name: str) -> SimpleNamespace:
+def example(name):
     return SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / f"{name}.py")))
 
 
@@ -54,7 +54,7 @@ def test_a_coupling_has_order_two():
 
 
 @pytest.fixture(scope="module")
-def control() -> SimpleNamespace:
+def control():
     return SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "predictive_control.py")))
 
 

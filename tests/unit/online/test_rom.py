@@ -11,7 +11,6 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.maneuver import Maneuver, smooth
-from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.registry import component
 from vehiclemor.simulation.integrators.catalogue import MOST_CALLS
 from vehiclemor.study.scenario import Scenario
@@ -20,17 +19,17 @@ CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
 
 
 @pytest.fixture(scope="module")
-def full() -> ReducedOrderModel:
+def full():
     return vm.reduce(CAR, "full_order")
 
 
 @pytest.fixture(scope="module")
-def linear(full) -> ReducedOrderModel:
+def linear(full):
     return vm.reduce(full.model, "linear_single_track", training="nominal")
 
 
 @pytest.fixture(scope="module")
-def wishbone() -> ReducedOrderModel:
+def wishbone():
     return vm.reduce(WISHBONE, "path_map", cells=8, degree=2)
 
 
@@ -127,7 +126,7 @@ def test_inputs_that_a_run_refuses_are_not_trusted(full, delta):
         full.simulate(vm.Signal.from_samples([0.0, 1.0], [0.0, delta]))
 
 
-def answers(rom: ReducedOrderModel) -> list[np.ndarray]:
+def answers(rom):
     """What it gives to all kinds of questions, which fills all that it keeps."""
     x, u = rom.state(), np.zeros(len(rom.inputs))
     signal = vm.Signal.from_samples([0.0, 0.5, 1.0], np.outer([0.0, 0.01, 0.0], u + 1.0))
@@ -148,8 +147,8 @@ def test_a_copy_of_a_used_model_is_the_same(request, name):
         assert copied.input_range.longest == rom.input_range.longest
 
 
-def lifted_wheel() -> Maneuver:
-    def signal(times: np.ndarray, _: float, __: float) -> np.ndarray:
+def lifted_wheel():
+    def signal(times, _, __):
         return np.stack([0.1 * times, 0.0 * times], axis=1)
 
     return Maneuver("lift", "", signal, ("z", "s0"), 1.0, 11, smooth)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from vehiclemor.reduction.projection.bases import first_samples, pod_basis, project, window_edges
 
 
-def snapshots_of(seed: int, n: int = 8, m: int = 12, decay: float = 0.3) -> np.ndarray:
+def snapshots_of(seed, n=8, m=12, decay=0.3):
     """Snapshots (n, m) with a mean and decreasing singular values."""
     rng = np.random.default_rng(seed)
     left, right = (np.linalg.qr(rng.standard_normal((k, min(n, m))))[0] for k in (n, m))
@@ -18,9 +18,7 @@ def snapshots_of(seed: int, n: int = 8, m: int = 12, decay: float = 0.3) -> np.n
 
 
 @given(seed=st.integers(0, 10**6), n=st.integers(2, 10), m=st.integers(2, 14), data=st.data())
-def test_basis_is_orthonormal_and_projection_idempotent(
-    seed: int, n: int, m: int, data: st.DataObject
-) -> None:
+def test_basis_is_orthonormal_and_projection_idempotent(seed, n, m, data):
     rank = data.draw(st.integers(1, min(n, m)))
     basis = pod_basis(snapshots_of(seed, n, m), rank)
     assert basis.rank == rank
@@ -34,7 +32,7 @@ def test_basis_is_orthonormal_and_projection_idempotent(
 
 
 @given(seed=st.integers(0, 10**6), rank=st.integers(1, 8))
-def test_error_of_the_snapshots_is_the_tail_of_the_singular_values(seed: int, rank: int) -> None:
+def test_error_of_the_snapshots_is_the_tail_of_the_singular_values(seed, rank):
     snapshots = snapshots_of(seed)
     basis = pod_basis(snapshots, rank)
     error = np.sum((project(snapshots.T, basis).T - snapshots) ** 2)
@@ -42,7 +40,7 @@ def test_error_of_the_snapshots_is_the_tail_of_the_singular_values(seed: int, ra
 
 
 @given(seed=st.integers(0, 10**6))
-def test_signs_of_the_columns_are_fixed(seed: int) -> None:
+def test_signs_of_the_columns_are_fixed(seed):
     snapshots = snapshots_of(seed)
     vectors = pod_basis(snapshots, 5).vectors
     largest = np.abs(vectors).argmax(axis=0)
@@ -54,7 +52,7 @@ def test_signs_of_the_columns_are_fixed(seed: int) -> None:
 @pytest.mark.parametrize(
     ("tolerance", "kept"), [(0.0, 6), (1e-8, 6), (2e-3, 3), (0.05, 2), (0.5, 1)]
 )
-def test_rank_tolerance_drops_small_modes(tolerance: float, kept: int) -> None:
+def test_rank_tolerance_drops_small_modes(tolerance, kept):
     rng = np.random.default_rng(0)
     left, right = (np.linalg.qr(rng.standard_normal((k, 6)))[0] for k in (8, 12))
     right -= right.mean(axis=0)
@@ -67,7 +65,7 @@ def test_rank_tolerance_drops_small_modes(tolerance: float, kept: int) -> None:
     assert pod_basis(1e-3 * snapshots, 6, tolerance).rank == kept
 
 
-def test_snapshots_that_do_not_move_have_no_mode_above_a_tolerance() -> None:
+def test_snapshots_that_do_not_move_have_no_mode_above_a_tolerance():
     snapshots = np.outer(np.arange(1.0, 9.0), np.ones(10))
     basis = pod_basis(snapshots, 3, 1e-10)
     assert basis.rank == 0
@@ -79,7 +77,7 @@ shares = st.floats(0.002, 3.0)
 
 
 @given(duration=durations, share=shares)
-def test_edges_cover_the_run(duration: float, share: float) -> None:
+def test_edges_cover_the_run(duration, share):
     period = share * duration
     edges = window_edges(duration, period)
     assert (edges[0], edges[-1]) == (0.0, duration)
@@ -90,7 +88,7 @@ def test_edges_cover_the_run(duration: float, share: float) -> None:
 
 
 @given(duration=durations, share=shares, samples=st.integers(2, 400))
-def test_every_sample_is_in_exactly_one_window(duration: float, share: float, samples: int) -> None:
+def test_every_sample_is_in_exactly_one_window(duration, share, samples):
     times, edges = np.linspace(0.0, duration, samples), window_edges(duration, share * duration)
     first = first_samples(times, edges)
     assert len(first) == len(edges)
@@ -105,7 +103,7 @@ def test_every_sample_is_in_exactly_one_window(duration: float, share: float, sa
 
 
 @given(windows=st.integers(1, 60), per_window=st.integers(1, 40))
-def test_period_that_divides_the_run_gives_equal_windows(windows: int, per_window: int) -> None:
+def test_period_that_divides_the_run_gives_equal_windows(windows, per_window):
     # Not representable in binary, so that edges and times are rounded each in its own way.
     period = 0.1
     edges = window_edges(period * windows, period)

@@ -27,7 +27,7 @@ def maneuver():
     )
 
 
-def errors(car, maneuver, restart: str, **settings: object) -> np.ndarray:
+def errors(car, maneuver, restart, **settings):
     """Distances (samples,) of the place and heading from the full model's, in their scales."""
     rom = vm.reduce(car, "pod", restart=restart, **settings)
     run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)

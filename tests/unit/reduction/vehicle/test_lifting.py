@@ -8,12 +8,11 @@ import pytest
 from tests.reducing import CARS
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.vehicle.features import feature_columns
-from vehiclemor.reduction.vehicle.reduced_vehicle import KnownStart, ReducedVehicle
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN
 from vehiclemor.simulation.build import build
 
 
-def lifted(reduced: ReducedVehicle, maneuver, start: str) -> np.ndarray:
+def lifted(reduced, maneuver, start):
     """States (samples, 2 n) by the formulas, in NumPy."""
     path = reduced.path(maneuver, start)
     k, shape, decay = reduced.features.states, reduced.shape, reduced.transient
@@ -84,12 +83,12 @@ def test_a_run_tells_how_far_it_has_gone(reduced):
     assert run.message.startswith(f"from t = {run.trust.until:.4g} s on ")
 
 
-def known(reduced: ReducedVehicle, start) -> KnownStart:
+def known(reduced, start):
     """What is known of a start without steering."""
     return reduced.known(start, np.zeros(len(reduced.model.inputs)))
 
 
-def at_speed(reduced: ReducedVehicle, start: str, speed: float) -> np.ndarray:
+def at_speed(reduced, start, speed):
     """State (2 n,) of a start at another speed."""
     return build(reduced.model.name, overrides={"initial_speed": speed}).start(start)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from vehiclemor.reduction.vehicle.regression import forward_selection, surviving
 
 
-def left_over(columns: np.ndarray, values: np.ndarray, chosen: list[int]) -> float:
+def left_over(columns, values, chosen):
     part = columns[:, chosen]
     return float(np.sum((values - part @ np.linalg.lstsq(part, values, rcond=None)[0]) ** 2))
 
@@ -38,7 +38,7 @@ def test_a_sum_of_chosen_terms_comes_last():
     assert forward_selection(both, columns[:, :2], 2, 1) == [0, 1, 3]
 
 
-def problem(seed: int, features: int = 6, targets: int = 2, samples: int = 40):
+def problem(seed, features=6, targets=2, samples=40):
     """Columns and targets of a regression with coefficients of very different weight."""
     random = np.random.default_rng(seed)
     columns = random.normal(size=(samples, features)) @ random.normal(size=(features, features))
@@ -46,12 +46,12 @@ def problem(seed: int, features: int = 6, targets: int = 2, samples: int = 40):
     return columns, columns @ weights + 0.01 * random.normal(size=(samples, targets))
 
 
-def fitted(columns: np.ndarray, goals: np.ndarray) -> tuple[np.ndarray, float]:
+def fitted(columns, goals):
     c = np.linalg.lstsq(columns, goals, rcond=None)[0]
     return c, float(np.sum((columns @ c - goals) ** 2))
 
 
-def eliminated(columns: np.ndarray, goals: np.ndarray, kept: int):
+def eliminated(columns, goals, kept):
     n, targets = columns.shape[1], goals.shape[1]
     normal = np.kron(np.eye(targets), columns.T @ columns)
     c = fitted(columns, goals)[0].T.ravel()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.reducing import CARS
 from vehiclemor.maneuver import Maneuver
 from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
-from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
+from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations
 
 
@@ -39,12 +39,12 @@ def test_durations_of_the_compiled_loop_are_those_of_numpy(reduced):
             assert "longer" in trust.reason
 
 
-def held(reduced: ReducedVehicle, seconds: float, begin: float = 1.0) -> Maneuver:
+def held(reduced, seconds, begin=1.0):
     """A third of the lane change's steering, held for so long from a time on."""
     known = CARS[reduced.model.name]
     size = np.abs(known.at(known.times)[:, 0]).max() / 3.0
 
-    def signal(times: np.ndarray, _: float, amplitude: float) -> np.ndarray:
+    def signal(times, _, amplitude):
         s = np.clip((times - begin) / 0.5, 0.0, 1.0) - np.clip(
             (times - begin - seconds) / 0.5, 0.0, 1.0
         )
