@@ -15,7 +15,6 @@ from vehiclemor.reduction.projection.bases import window_edges
 from vehiclemor.reduction.projection.dynamic import (
     ConstrainedPodSettings,
     DynamicPodSettings,
-    DynamicProjection,
     RestartedProjection,
 )
 from vehiclemor.reduction.projection.subspaces import PRESETS, check_subspaces, fit_subspaces
@@ -72,10 +71,9 @@ def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel
     """One POD subspace for each control period of the training runs."""
     edges = window_edges(training[0].maneuver.duration, settings.control_period)
     reduced = fit_subspaces(model, training, edges, settings)
-    restart = getattr(settings, "restart", "own")
-    if isinstance(reduced, DynamicProjection) and restart != "own":
-        return RestartedProjection(**vars(reduced), moved=restart == "full_model")
-    return reduced
+    if isinstance(settings, AlgebraicSettings) or settings.restart == "own":
+        return reduced
+    return RestartedProjection(**vars(reduced), moved=settings.restart == "full_model")
 
 
 METHOD = Method(

@@ -43,8 +43,7 @@ class FeatureTable:
     """Features with the numbers of those that are odd and even in the lateral quantities.
 
     The first odd ones, `linear_count` of them, are lateral coordinates and the inputs, the first
-    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.  Of `hull`
-    and `trusted` see the settings of the slow manifold.
+    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.
     """
 
     features: Features
@@ -54,8 +53,6 @@ class FeatureTable:
     linear_count: int
     straight_count: int
     ranges: Ranges
-    hull: float
-    trusted: float
 
     def set_linear(self, c: np.ndarray, shape: VehicleShape, modes: SlowModes) -> None:
         """Write what is exact at straight running into coefficients (terms, states + 3)."""
@@ -171,8 +168,7 @@ def feature_table(
     terms = (*odd, *even)
     features = Features(n + 1, inputs, tuple(lines), terms, groups, tuple(watched), len(MEANINGS))
     counts = k + inputs, 2 + n - k
-    known = *counts, ranges, hull, trusted
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), *known)
+    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
 
 
 def fitted_lifting(

@@ -38,13 +38,10 @@ FASTER_SQUARE = tuple(f"m * {pair}" for pair in SQUARE)
 
 @dataclass
 class Text:
-    """Lines of features under construction, with the parameters that they name.
-
-    The first parameter multiplies all that is watched.
-    """
+    """Lines of features under construction, with the parameters that they name."""
 
     lines: list[tuple[str, str]] = field(default_factory=list)
-    values: list[float] = field(default_factory=lambda: [1.0])
+    values: list[float] = field(default_factory=list)
     watched: list[tuple[str, str]] = field(default_factory=list)
 
     def parameter(self, value: float) -> str:
@@ -67,8 +64,7 @@ class Text:
         numbers = tuple(range(len(terms)))
         groups = ((numbers[:odd], LATERAL), (numbers[odd:], SYMMETRIC)) if odd else ()
         # The change of speed comes last: alone it moves without steering.
-        watched = [(f"p[0] * {text}", name) for text, name in self.watched]
-        watched.sort(key=lambda of: of[1] == OF_SPEED)
+        watched = sorted(self.watched, key=lambda of: of[1] == OF_SPEED)
         lines, lateral = tuple(self.lines), max(len(watched) - 1, 0)
         return Features(STATES, inputs, lines, tuple(terms), groups, tuple(watched), lateral)
 
