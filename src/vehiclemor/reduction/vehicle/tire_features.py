@@ -38,10 +38,13 @@ FASTER_SQUARE = tuple(f"m * {pair}" for pair in SQUARE)
 
 @dataclass
 class Text:
-    """Lines of features under construction, with the parameters that they name."""
+    """Lines of features under construction, with the parameters that they name.
+
+    The first parameter multiplies all that is watched.
+    """
 
     lines: list[tuple[str, str]] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
+    values: list[float] = field(default_factory=lambda: [1.0])
     watched: list[tuple[str, str]] = field(default_factory=list)
 
     def parameter(self, value: float) -> str:
@@ -64,7 +67,8 @@ class Text:
         numbers = tuple(range(len(terms)))
         groups = ((numbers[:odd], LATERAL), (numbers[odd:], SYMMETRIC)) if odd else ()
         # The change of speed comes last: alone it moves without steering.
-        watched = sorted(self.watched, key=lambda of: of[1] == OF_SPEED)
+        watched = [(f"p[0] * {text}", name) for text, name in self.watched]
+        watched.sort(key=lambda of: of[1] == OF_SPEED)
         lines, lateral = tuple(self.lines), max(len(watched) - 1, 0)
         return Features(STATES, inputs, lines, tuple(terms), groups, tuple(watched), lateral)
 
