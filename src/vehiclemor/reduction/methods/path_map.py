@@ -151,6 +151,10 @@ class PathMapModel(ShortRepr):
         return map_loop(len(self.ranges), self.moving, self.degree, self.columns)
 
     @cached_property
+    def _counts(self) -> dict[str, int]:
+        return dict.fromkeys(self.model.counts, 0)
+
+    @cached_property
     def _spare(self) -> SpareSpaces[Prepared]:
         return SpareSpaces()
 
@@ -221,7 +225,7 @@ class PathMapModel(ShortRepr):
             coordinates=table[:, :n],
             speeds=table[:, :0],
             outputs=table[:, n:],
-            counts=dict.fromkeys(model.counts, 0),
+            counts=self._counts.copy(),
             seconds=seconds,
             status=status,
             message=message,
