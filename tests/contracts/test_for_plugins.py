@@ -14,7 +14,6 @@ from tests.plugin.installation import installed
 from vehiclemor import contracts
 from vehiclemor.errors import InputError
 from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, names
 from vehiclemor.study.experiment import complete_settings
 
@@ -32,13 +31,13 @@ KINEMATIC = [name for name in names("model") if component("model", name).kind ==
 @pytest.mark.usefixtures("plug_in_package")
 @pytest.mark.parametrize("model", [*KINEMATIC, "quarter_car"])
 @pytest.mark.parametrize("name", names("method"))
-def test_registered_methods_pass_also_on_a_small_model(model: str, name: str) -> None:
+def test_registered_methods_pass_also_on_a_small_model(model, name):
     contracts.check_method(name, model)
 
 
 @pytest.mark.usefixtures("plug_in_package")
 @pytest.mark.parametrize("method", ["pod", "fixed_basis"])
-def test_a_preset_lowers_its_rank_to_the_number_of_coordinates(method: str) -> None:
+def test_a_preset_lowers_its_rank_to_the_number_of_coordinates(method):
     car = vm.model("quarter_car")
     for preset in component("method", method).presets_of("ode"):
         assert complete_settings(car, method, {}, preset)["rank"] == len(car.coordinates) == 2
@@ -48,7 +47,7 @@ def test_a_preset_lowers_its_rank_to_the_number_of_coordinates(method: str) -> N
     assert complete_settings(vm.model("double_wishbone"), method, {})["rank"] == 3
 
 
-def test_the_method_that_the_handbook_shows_works_as_it_stands(tmp_path: Path) -> None:
+def test_the_method_that_the_handbook_shows_works_as_it_stands(tmp_path):
     method, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
     (tmp_path / "handbook_method.py").write_text(method)
     (tmp_path / "pyproject.toml").write_text(PROJECT)
@@ -61,10 +60,10 @@ def test_the_method_that_the_handbook_shows_works_as_it_stands(tmp_path: Path) -
 
 
 @pytest.fixture
-def instead(monkeypatch: pytest.MonkeyPatch):
+def instead(monkeypatch):
     """Let the contracts find this component in the place of any other of its kind."""
 
-    def found(kind: str, this: object) -> None:
+    def found(kind, this):
         monkeypatch.setattr(
             contracts, "component", lambda k, n: this if k == kind else component(k, n)
         )
@@ -72,14 +71,14 @@ def instead(monkeypatch: pytest.MonkeyPatch):
     return found
 
 
-def altered(alter) -> Method:
+def altered(alter):
     """The method `replay` whose trajectories are altered, each in another way."""
     method, runs = component("method", "replay"), count(1)
 
-    def fit(*arguments: object) -> SimpleNamespace:
+    def fit(*arguments):
         reduced = method.fit(*arguments)
 
-        def simulate(*arguments: object):
+        def simulate(*arguments):
             return alter(reduced.simulate(*arguments), next(runs))
 
         return SimpleNamespace(simulate=simulate, effective_rank=0, offline=reduced.offline)
@@ -98,7 +97,7 @@ def altered(alter) -> Method:
         (lambda run, _: replace(run, status="fine"), "status 'fine'"),
     ],
 )
-def test_broken_method_is_named(instead, alter, message: str) -> None:
+def test_broken_method_is_named(instead, alter, message):
     instead("method", altered(alter))
     with pytest.raises(AssertionError, match=message):
         contracts.check_method("replay", KINEMATIC[0])
@@ -112,7 +111,7 @@ def test_broken_method_is_named(instead, alter, message: str) -> None:
         ({"maneuver": "lane_change"}, "its maneuver gives other inputs"),
     ],
 )
-def test_broken_declaration_is_named(instead, change, message: str) -> None:
+def test_broken_declaration_is_named(instead, change, message):
     instead("model", replace(component("model", KINEMATIC[0]), **change))
     with pytest.raises(AssertionError, match=message):
         contracts.check_model(KINEMATIC[0])

@@ -3,7 +3,6 @@
 import copy
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,23 +16,22 @@ from vehiclemor.exporting.exported import exported_system
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import KINDS
+from vehiclemor.online.model_file import load
 from vehiclemor.online.rom import ReducedOrderModel
-from vehiclemor.online.saved import load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import STATUSES, Trajectory
+from vehiclemor.simulation.trajectory import STATUSES
 from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 from vehiclemor.study.scenario import Scenario
 
 METHODS = names("method")
 
 
-def _declares(method: str, model: str) -> bool:
+def _declares(method, model):
     """Whether the method has settings for models of that kind."""
     return component("model", model).kind in component("method", method).settings
 
@@ -59,19 +57,19 @@ SETTINGS: dict[str, dict[str, object]] = {
 class Pair:
     """A method on a model: fits and runs it."""
 
-    def __init__(self, model: str, method: str) -> None:
+    def __init__(self, model, method):
         self.model: Model = build(model)
         self.name, self.method = method, component("method", method)
         self.maneuver: Maneuver = component("maneuver", component("model", model).maneuver)
         self._fitted: dict[str, ReducedModel] = {}
 
-    def fit(self, preset: str = "recommended") -> ReducedModel:
+    def fit(self, preset="recommended"):
         # Some fits take seconds; a fit does not change once it is made.
         if preset not in self._fitted:
             self._fitted[preset] = self.fresh_fit(preset)
         return self._fitted[preset]
 
-    def fresh_fit(self, preset: str = "recommended") -> ReducedModel:
+    def fresh_fit(self, preset="recommended"):
         chosen = SETTINGS.get(self.name, {})
         settings = validated(self.method, self.model.kind, chosen, preset)
         self.method.check(self.model, settings)
@@ -83,18 +81,18 @@ class Pair:
         assert settings == before
         return reduced
 
-    def space(self) -> StateSpace:
+    def space(self):
         """How it is stepped; a test is skipped if it is not."""
         if not hasattr(self.fit(), "state_space"):
             pytest.skip(f"{self.name} gives whole runs alone")
         return self.fit().state_space
 
-    def run(self, reduced: ReducedModel, maneuver: Maneuver | None = None) -> Trajectory:
+    def run(self, reduced, maneuver=None):
         return reduced.simulate(maneuver or self.maneuver, self.model.starts[0])
 
 
 @pytest.fixture(scope="module", params=PAIRS, ids="-".join)
-def pair(request: pytest.FixtureRequest) -> Pair:
+def pair(request):
     pair = Pair(*request.param)
     accepted, reason = pair.method.accepts(pair.model)
     if not accepted:
@@ -105,7 +103,7 @@ def pair(request: pytest.FixtureRequest) -> Pair:
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_method_describes_itself_and_its_settings(name: str) -> None:
+def test_a_method_describes_itself_and_its_settings(name):
     method: Method = component("method", name)
     assert (method.name, bool(method.summary)) == (name, True)
     assert method.settings
@@ -135,7 +133,7 @@ def test_a_method_describes_itself_and_its_settings(name: str) -> None:
             assert {key: complete[key] for key in values} == values
 
 
-def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
+def test_every_preset_simulates_the_nominal_maneuver(pair):
     full = pair.model.simulate(pair.maneuver)
     for preset in pair.method.presets_of(pair.model.kind):
         run = pair.run(pair.fit(preset))
@@ -161,7 +159,7 @@ def test_every_preset_simulates_the_nominal_maneuver(pair: Pair) -> None:
         assert run.seconds >= 0.0
 
 
-def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
+def test_matched_training_comes_near_the_full_order(pair):
     if pair.model.kind != "ae" and pair.name in ROUGH:
         pytest.skip("not near a lane change: a finding, no defect")
     run, full = pair.run(pair.fit()), pair.model.simulate(pair.maneuver)
@@ -180,7 +178,7 @@ def test_matched_training_comes_near_the_full_order(pair: Pair) -> None:
     assert np.all(error[chosen] < bound * size[chosen])
 
 
-def test_it_is_exported_or_refused_and_its_runs_are_labelled(pair: Pair) -> None:
+def test_it_is_exported_or_refused_and_its_runs_are_labelled(pair):
     fitted, model = pair.fit(), pair.model
     with suppress(InputError):
         assert exported_system(fitted, "car").name == "car"
@@ -191,7 +189,7 @@ def test_it_is_exported_or_refused_and_its_runs_are_labelled(pair: Pair) -> None
         fitted.simulate(pair.maneuver, "upside_down")
 
 
-def test_results_are_deterministic(pair: Pair) -> None:
+def test_results_are_deterministic(pair):
     reduced = pair.fit()
     other = pair.maneuver.perturbed(0.9, 0.8)
     first, _, again = (pair.run(reduced, maneuver) for maneuver in (None, other, None))
@@ -201,7 +199,7 @@ def test_results_are_deterministic(pair: Pair) -> None:
         assert (run.counts, run.status, run.message) == (first.counts, first.status, first.message)
 
 
-def test_untrained_inputs_give_a_result_or_say_why_not(pair: Pair) -> None:
+def test_untrained_inputs_give_a_result_or_say_why_not(pair):
     for factors in ((1.2, 1.0), (1.0, 1.2), (2.0, 0.5)):
         perturbed = pair.maneuver.perturbed(*factors)
         run = pair.run(pair.fit(), perturbed)
@@ -211,7 +209,7 @@ def test_untrained_inputs_give_a_result_or_say_why_not(pair: Pair) -> None:
         np.testing.assert_allclose(run.inputs, perturbed.at(perturbed.times), rtol=1e-15)
 
 
-def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
+def test_reduced_model_tells_its_size_cost_and_floor(pair):
     reduced, full = pair.fit(), pair.model.simulate(pair.maneuver)
     states = len(pair.model.coordinates) + len(pair.model.speeds)
     assert 0 <= reduced.effective_rank <= states
@@ -226,7 +224,7 @@ def test_reduced_model_tells_its_size_cost_and_floor(pair: Pair) -> None:
 
 
 @pytest.mark.parametrize("zero", [True, False], ids=["held", "linear"])
-def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
+def test_steps_are_the_run(pair, zero):
     pair.space()
     # So that what is left is no error of the integration.
     tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
@@ -257,7 +255,7 @@ def test_steps_are_the_run(pair: Pair, zero: bool) -> None:
         np.testing.assert_allclose(found / scale, run.states[sample] / scale, rtol=1e-6, atol=1e-6)
 
 
-def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
+def test_a_state_is_what_a_run_begins_with(pair):
     fit, _ = pair.fit(), pair.space()
     rom, run = ReducedOrderModel(pair.model, pair.name, {}, (), fit), pair.run(fit)
     for start in pair.model.starts[::-1]:
@@ -272,7 +270,7 @@ def test_a_state_is_what_a_run_begins_with(pair: Pair) -> None:
     np.testing.assert_allclose(found, run.outputs[0], rtol=1e-6, atol=1e-6)
 
 
-def test_rates_are_those_of_the_steps(pair: Pair) -> None:
+def test_rates_are_those_of_the_steps(pair):
     pair.space()
     if pair.model.kind == "ae":
         pytest.skip("there are no rates")
@@ -291,9 +289,7 @@ LONG_TO_COMPILE = ("fixed_basis", "pod")
 
 
 @pytest.mark.parametrize("by", ["state", "inputs"])
-def test_jacobians_are_the_slopes_of_rates_and_outputs(
-    pair: Pair, by: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_jacobians_are_the_slopes_of_rates_and_outputs(pair, by, monkeypatch):
     if pair.model.kind == "dae" and pair.name in LONG_TO_COMPILE:
         monkeypatch.setattr(Tangent, "_products", run_as_text)
     space = pair.space()
@@ -334,7 +330,7 @@ def test_jacobians_are_the_slopes_of_rates_and_outputs(
         assert right.all(), of
 
 
-def test_a_saved_model_is_the_same_to_the_bit(pair: Pair, tmp_path: Path) -> None:
+def test_a_saved_model_is_the_same_to_the_bit(pair, tmp_path):
     settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {})).model_dump()
     training = (Scenario(pair.maneuver, pair.model.starts[0]),)
     made = ReducedOrderModel(pair.model, pair.name, settings, training, pair.fit())

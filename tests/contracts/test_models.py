@@ -5,7 +5,6 @@ import pytest
 
 from vehiclemor.contracts import check_model
 from vehiclemor.registry import component, names
-from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 
 OF_FORCES = {"N", "N m", "N/m", "N/rad", "N s/m", "kg", "kg m^2"}
@@ -14,7 +13,7 @@ KINEMATIC = [name for name in names("model") if component("model", name).kind ==
 
 
 @pytest.mark.parametrize("name", names("model"))
-def test_a_model_keeps_its_contract_and_names_units_and_sources(name: str) -> None:
+def test_a_model_keeps_its_contract_and_names_units_and_sources(name):
     check_model(name)
     definition, entries = component("model", name), build(name).parameters.entries
     for text in (definition.summary, *(entry.description for entry in entries.values())):
@@ -33,11 +32,11 @@ def test_a_model_keeps_its_contract_and_names_units_and_sources(name: str) -> No
 
 
 @pytest.fixture(scope="module", params=KINEMATIC)
-def any_model(request: pytest.FixtureRequest) -> AlgebraicModel:
+def any_model(request):
     return build(request.param)
 
 
-def test_design_position_solves_the_equations_within_reach(any_model: AlgebraicModel) -> None:
+def test_design_position_solves_the_equations_within_reach(any_model):
     nothing = np.zeros(len(any_model.inputs))
     assert np.abs(any_model.residual(any_model.design, nothing)).max() < 1e-12
     np.testing.assert_allclose(any_model.solve(nothing), any_model.design, rtol=0, atol=1e-11)
@@ -45,7 +44,7 @@ def test_design_position_solves_the_equations_within_reach(any_model: AlgebraicM
     assert low < 0.0 < high
 
 
-def test_newton_steps_solve_with_the_jacobian(any_model: AlgebraicModel) -> None:
+def test_newton_steps_solve_with_the_jacobian(any_model):
     rng, u = np.random.default_rng(0), np.zeros(len(any_model.inputs))
     for _ in range(3):
         q = any_model.design + rng.normal(0.0, 0.05, len(any_model.coordinates))
@@ -53,9 +52,7 @@ def test_newton_steps_solve_with_the_jacobian(any_model: AlgebraicModel) -> None
         np.testing.assert_allclose(any_model.newton_step(q, u), dense, rtol=0, atol=1e-11)
 
 
-def test_building_again_gives_the_same_kernels_whose_operations_are_counted(
-    any_model: AlgebraicModel,
-) -> None:
+def test_building_again_gives_the_same_kernels_whose_operations_are_counted(any_model):
     again, counts = build(any_model.name), any_model.operation_counts
     assert again.kernel_hash == any_model.kernel_hash
     np.testing.assert_array_equal(again.constants, any_model.constants)

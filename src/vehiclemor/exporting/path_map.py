@@ -8,8 +8,7 @@ from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import SEED, TRUST, ExportedSystem
-from vehiclemor.reduction.methods.path_map import PathMapModel
-from vehiclemor.reduction.polynomials.kernels import map_kernel
+from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
 
 
 def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:

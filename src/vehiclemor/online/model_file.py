@@ -12,21 +12,23 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
 from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.online.parts import Reader, Writer
+from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.validation import checked_fit, checked_settings
-from vehiclemor.registry import component
+from vehiclemor.registry import choice, component
+from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.sizes import require
-from vehiclemor.study.experiment import Settings, for_method
+from vehiclemor.study.experiment import for_method
 from vehiclemor.study.input_range import InputRange
 from vehiclemor.study.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.study.provenance import attributes, code_digest
@@ -48,73 +50,49 @@ SAME, ROUNDING = 1e-8, 1e-12
 STEP = 0.01
 
 
-class Saved(NamedTuple):
-    """What a file holds, in the order of the fields of a `ReducedOrderModel`."""
-
-    model: Model
-    method: str
-    settings: Settings
-    training: tuple[Mapping[str, Any], ...]
-    reduced: Any
-    known: InputRange
-
-
-def write(saved: Saved, path: Any, overwrite: bool = False) -> Path:
-    """Write a reduced model into a new file.
-
-    Parameters
-    ----------
-    overwrite
-        Whether a file that is there is replaced.
-
-    Raises
-    ------
-    InputError
-        If the path is taken, or the model has a part that can't be written.
-    VehiclemorError
-        If the file can't be written; then there is none, or the old one.
-    """
+def write(rom: ReducedOrderModel, path: Any, overwrite: bool = False) -> Path:
+    """Write a reduced model into a file, see `ReducedOrderModel.save`."""
     import xarray as xr
 
     path = file_path("path", path)
     if path.is_dir() or (path.exists() and not overwrite):
         raise InputError(f"{path} is there already; overwrite=True replaces a file")
-    model, writer = saved.model, Writer(saved.model)
+    model, state, writer = rom.model, rom.__getstate__(), Writer(rom.model)
     try:
-        parts = {name: writer.part(getattr(saved, name), name) for name in PARTS}
+        parts = {name: writer.part(state[name], name) for name in PARTS}
     except InputError as error:
-        raise InputError(f"{saved.method} of {model.name}: {error}") from None
+        raise InputError(f"{rom.method} of {model.name}: {error}") from None
     if sum(array.nbytes for array in writer.arrays.values()) > MOST_BYTES:
-        raise InputError(f"{saved.method} of {model.name}: more than {MOST_BYTES} bytes to save")
-    texts = parts, dict(saved.settings), list(saved.training), parameters_of(model)
+        raise InputError(f"{rom.method} of {model.name}: more than {MOST_BYTES} bytes to save")
+    texts = parts, dict(rom.settings), list(state["training"]), parameters_of(model)
     variables: dict[str, Any] = {
         name: ((), json.dumps(text)) for name, text in zip(TEXTS, texts, strict=True)
     }
-    prints = {"fingerprint": fingerprint(model), "response": response(model, saved.reduced)}
+    prints = {"fingerprint": fingerprint(model), "response": response(model, rom.reduced)}
     for name, array in (writer.arrays | prints).items():
         dimensions = [f"{name}_{axis}" for axis in range(array.ndim)]
         variables[name] = dimensions, array, {}, {"zlib": True, "_FillValue": None}
     described = attributes(
-        f"{saved.method} of {model.name}",
+        f"{rom.method} of {model.name}",
         model.kernel_hash,
         saved_model=SCHEMA,
         model=model.name,
-        method=saved.method,
+        method=rom.method,
         vehiclemor=version("vehiclemor"),
-        code=code_digest(model.name, saved.method, saved.settings),
+        code=code_digest(model.name, rom.method, rom.settings),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     write_dataset(xr.Dataset(variables, attrs=described), path)
     return path
 
 
-def read(path: Any) -> Saved:
-    """The reduced model of a file, with its model.
+def load(path: Any) -> ReducedOrderModel:
+    """A reduced model from the file that its `save` has written; nothing is fitted.
 
     Raises
     ------
     FileError
-        If the file is missing, damaged, something else, or of another version or another model.
+        If the file is missing, damaged or something else, or does not fit what is installed.
     """
     path = file_path("path", path)
     stored, attrs = content(path)
@@ -135,11 +113,26 @@ def read(path: Any) -> Saved:
         require(made["known"].largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
-        return Saved(model, method, settings, tuple(training), **made)
+        return ReducedOrderModel(model, method, settings, tuple(training), **made)
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
         raise _unfit(path, " ".join(str(error).split())) from None
+
+
+def rom(model: str) -> ReducedOrderModel:
+    """The reduced model of a car or a suspension that ships with the package.
+
+    It is the one that the model's protocol has chosen for unseen inputs, see `compare()`;
+    `InputError` if none ships for a model of this name.
+    """
+    known = {path.stem: path for path in shipped_folder().glob("*.nc")}
+    return load(known[choice("model with a reduced one that ships", model, known)])
+
+
+def shipped_folder() -> Path:
+    """Folder of the models that ship, each under the name of the full model."""
+    return data_folder() / "reduced"
 
 
 def _parsed(text: str) -> Any:
@@ -186,13 +179,7 @@ def _model(name: str, parameters: Mapping[str, Any]) -> Model:
 
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a file that is whole and of this format.
-
-    Raises
-    ------
-    FileError
-        If there is none.
-    """
+    """Variables and attributes of a file that is whole and of this format, else `FileError`."""
     with opened(path, "saved model") as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:

@@ -35,13 +35,7 @@ STORED = {"float64": "f8", "int64": "i8", "bool": "i1", "complex128": "f8"}
 
 
 class Writer:
-    """Takes a reduced model of a full-order one apart.
-
-    Attributes
-    ----------
-    arrays
-        Place -> array, of floats or whole numbers.
-    """
+    """Takes a reduced model of a full-order one apart; `arrays` are by place."""
 
     def __init__(self, model: Model) -> None:
         self.arrays: dict[str, np.ndarray] = {}
@@ -50,13 +44,7 @@ class Writer:
             self._known[id(system)] = system, {"model": "system"}
 
     def part(self, value: Any, place: str) -> Any:
-        """A value as JSON has it; its arrays apart.
-
-        Raises
-        ------
-        InputError
-            If it is nothing that can be written, or in it there is such a thing.
-        """
+        """A value as JSON has it, its arrays apart; `InputError` if it can't be written."""
         if value is None or isinstance(value, bool | int | float | str):
             return value
         if isinstance(value, np.bool_ | np.integer | np.floating):
@@ -94,15 +82,7 @@ class Writer:
 
 
 class Reader:
-    """Makes a reduced model of its parts.
-
-    Parameters
-    ----------
-    model
-        The full-order model that it refers to.
-    arrays
-        As the writer has left them.
-    """
+    """Makes a reduced model of its parts, and of the full-order model that these refer to."""
 
     def __init__(self, model: Model, arrays: Mapping[str, np.ndarray]) -> None:
         self._model, self._arrays = model, arrays
@@ -111,13 +91,7 @@ class Reader:
         self._count = 0
 
     def value(self, part: Any, place: str) -> Any:
-        """What a part stands for.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError, AttributeError
-            If it stands for nothing, or does not fit the rest.
-        """
+        """What a part stands for; it raises various errors if that is nothing, or does not fit."""
         before = self._count
         self._count += 1
         if not isinstance(part, dict):
@@ -166,10 +140,7 @@ class Reader:
 def named(name: str) -> Any:
     """The dataclass or named tuple `module:name` that checks its sizes, or is of a plug-in.
 
-    Raises
-    ------
-    ValueError
-        If it is anything else.
+    `ValueError` if it is anything else.
     """
     module, _, own = name.partition(":")
     # Of plug-ins only what is in use already: reading a file imports nothing of theirs.

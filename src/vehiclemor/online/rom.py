@@ -14,7 +14,7 @@ from vehiclemor.arguments import number
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.state_space import StateSpace
+from vehiclemor.reduction.reduced_system import StateSpace
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
@@ -36,12 +36,8 @@ class ReducedOrderModel(ShortRepr):
 
     Attributes
     ----------
-    model
-        The full model.
-    method
-        Registered name of the method.
-    settings
-        All of its settings.
+    model, method, settings
+        The full model, the registered name of the method and all of its settings.
     training
         What it has been trained on; of a loaded model the content of each scenario.
     reduced
@@ -61,13 +57,7 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def state_space(self) -> StateSpace:
-        """The state and its steps.
-
-        Raises
-        ------
-        InputError
-            If the method gives none.
-        """
+        """The state and its steps; `InputError` if the method gives none."""
         found = getattr(self.reduced, "state_space", None)
         if found is None:
             raise InputError(f"{self.method} has no state: it gives whole runs alone")
@@ -220,7 +210,7 @@ class ReducedOrderModel(ShortRepr):
         of: str = "rhs",
         time: float = 0.0,
     ) -> np.ndarray:
-        """Analytic derivatives (results, columns) at a state and inputs.
+        """Analytic derivatives (results, columns) at a state, inputs and time.
 
         Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
 
@@ -231,8 +221,6 @@ class ReducedOrderModel(ShortRepr):
             column; a reduced model has them only where it holds the model's own equations.
         of
             `rhs` or `outputs`; of a kinematic model `outputs` or `coordinates`.
-        time
-            In s: models with control periods have another basis in each.
 
         Raises
         ------
@@ -289,30 +277,22 @@ class ReducedOrderModel(ShortRepr):
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write it into one netCDF file, which `load` reads.
 
-        Parameters
-        ----------
-        overwrite
-            Whether a file that is there is replaced.
-
         Raises
         ------
         InputError
-            If the path is taken, or the method makes something that can't be written.
+            If the path is taken and not to be overwritten, or the method makes something that can't
+            be written.
         VehiclemorError
             If the file can't be written; then there is none, or the old one.
         """
-        from vehiclemor.online.model_file import Saved, write
+        from vehiclemor.online.model_file import write
 
-        how = self.method, self.settings, self._content
-        return write(Saved(self.model, *how, self.reduced, self.input_range), path, overwrite)
-
-    @property
-    def _content(self) -> tuple[Mapping[str, Any], ...]:
-        return tuple(run.content if isinstance(run, Scenario) else run for run in self.training)
+        return write(self, path, overwrite)
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy takes along: of the training what a file keeps, a maneuver may be local."""
-        return super().__getstate__() | {"training": self._content, "known": self.input_range}
+        training = tuple(run.content if isinstance(run, Scenario) else run for run in self.training)
+        return super().__getstate__() | {"training": training, "known": self.input_range}
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""

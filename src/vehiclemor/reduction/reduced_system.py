@@ -1,18 +1,19 @@
-"""A dynamic model in other states than its own: encode, integrate, lift."""
+"""What is stepped: a state, and what follows from it; full states of a model in other states."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.errors import InputError
+from vehiclemor.errors import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.kernel_derivatives import (
@@ -20,11 +21,9 @@ from vehiclemor.simulation.kernel_derivatives import (
     INPUTS,
     PLACES,
     STATE,
-    Arrays,
     By,
     chosen,
     parameter_names,
-    partial,
 )
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import ProjectionWindows
@@ -34,6 +33,104 @@ from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run, Solver
 from vehiclemor.sizes import require
+
+
+class StateSpace(Protocol):
+    """A state (dim,) with its steps; what `fit` gives may have one as `state_space`."""
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        ...
+
+    def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """State of a start at inputs (inputs,)."""
+        ...
+
+    def step(
+        self, state: np.ndarray, inputs: np.ndarray, ends: np.ndarray | None, dt: float, time: float
+    ) -> np.ndarray:
+        """State at time + dt s; inputs are held, or go straight to their ends."""
+        ...
+
+    def rates(self, state: np.ndarray, inputs: np.ndarray, time: float) -> np.ndarray:
+        """Time derivative of a state."""
+        ...
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
+    ) -> np.ndarray:
+        """Analytic derivatives of rates or outputs, see `ReducedOrderModel.jacobian`."""
+        ...
+
+    def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """States (samples, n) of the full model."""
+        ...
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
+        """What the model tells of states (samples, dim), if it judges itself."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class KinematicStates(ShortRepr):
+    """A mechanism: its coordinates follow from the inputs at the time.
+
+    `solved` makes of a time in s, inputs (1, inputs) and coordinates (n,) to begin at the solution
+    at that time, `slopes` of coordinates, inputs, what by and what of analytic derivatives.
+    """
+
+    model: AlgebraicModel
+    solved: Callable[[float, np.ndarray, np.ndarray], Trajectory]
+    slopes: Callable[[np.ndarray, np.ndarray, By, str], np.ndarray] | None = None
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return self.model.coordinates
+
+    def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """Coordinates at the inputs."""
+        return self._coordinates(0.0, inputs, self.model.start(start))
+
+    def step(
+        self, state: np.ndarray, inputs: np.ndarray, ends: np.ndarray | None, dt: float, time: float
+    ) -> np.ndarray:
+        """Coordinates at the end of the step."""
+        return self._coordinates(time + dt, inputs if ends is None else ends, state)
+
+    def _coordinates(self, time: float, inputs: np.ndarray, state: np.ndarray) -> np.ndarray:
+        found = self.solved(time, inputs[None], state)
+        if found.status == "diverged":
+            raise ConvergenceError(f"{self.model.name}: {found.message}", found)
+        return found.coordinates[0].copy()
+
+    def rates(self, state: np.ndarray, inputs: np.ndarray, time: float) -> np.ndarray:
+        """There are none."""
+        del state, inputs, time
+        raise InputError(f"{self.model.name} is kinematic: its equations have no rates")
+
+    def derivatives(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
+    ) -> np.ndarray:
+        """Those of `coordinates` or `outputs`; there are no rates."""
+        if of == "rhs":
+            self.rates(state, inputs, time)
+        if self.slopes is None:
+            raise InputError(f"this reduction of {self.model.name} has no analytic derivatives")
+        return self.slopes(state, inputs, by, of)
+
+    def full_states(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """The coordinates themselves."""
+        del inputs
+        return states
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
+        """What the model tells of the inputs, if it judges itself."""
+        found = [self.solved(0.0, u[None], q).trust for q, u in zip(states, inputs, strict=True)]
+        known = [trust for trust in found if trust is not None]
+        return max(known, key=lambda trust: trust.indicator, default=None)
+
 
 # Encoded starts that are kept.
 MOST_STARTS = 64
@@ -46,20 +143,14 @@ def _given(states: np.ndarray) -> Run:
 
 @dataclass(frozen=True, eq=False)
 class ReducedSystem(ShortRepr):
-    """Equations in reduced states, with the ways there and back.
+    """Equations in reduced states of a full-order model, with the ways there and back.
 
     Attributes
     ----------
-    model
-        The full-order model.
-    system
-        The equations that are integrated.
-    spaces
-        Their form, and their subspaces if they are projected.
+    system, spaces
+        The equations that are integrated; their form, and their subspaces if they are projected.
     effective_rank
         Number of coordinates or modes that stand for the model's.
-    solver, tolerance
-        Integrator and its tolerance.
     encode
         (full state (2 n,), inputs) -> state (dim,) of the system; the same if there is none.
     lift
@@ -142,10 +233,8 @@ class ReducedSystem(ShortRepr):
             return self.stepper.derivatives(state, inputs, time, along)
         full, slopes = state, (np.eye(len(state)), np.zeros((len(state), len(inputs))))
         if self.slopes is not None:
-            full, slopes = (
-                self.full_states(state[None], inputs[None])[0],
-                self.slopes(state, inputs),
-            )
+            full = self.full_states(state[None], inputs[None])[0]
+            slopes = self.slopes(state, inputs)
         by_state = self.model.derivatives(function, full, inputs, "state")
         if along.place == STATE:
             return by_state @ slopes[STATE]
@@ -207,11 +296,3 @@ class ReducedSystem(ShortRepr):
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:  # noqa: ARG002
         """There is no subspace."""
         return None
-
-
-def full_state_slopes(kernels: Kernels, arrays: Arrays, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the kernel `full_state` by state and inputs."""
-    by_state, by_inputs = (
-        partial(kernels, "full_state", arrays, size, place) for place in (STATE, INPUTS)
-    )
-    return by_state, by_inputs

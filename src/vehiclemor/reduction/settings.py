@@ -1,11 +1,9 @@
 """What the settings of all methods share: one pydantic class by method and kind of model."""
 
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator
-from pydantic_core.core_schema import no_info_after_validator_function
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
 from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
 
@@ -37,36 +35,25 @@ class Settings(BaseModel):
         return value
 
 
-@dataclass(frozen=True)
-class OneOf:
-    """Validator of a text that is one of the choices, where these stand in another place."""
-
-    choices: tuple[str, ...]
-
-    def check(self, value: str) -> str:
-        """The choice that a text or its alias names."""
-        value = ALIASES.get(value, value)
-        if value not in self.choices:
-            raise ValueError(f"is {value!r}; allowed: {', '.join(self.choices)}")
-        return value
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        return no_info_after_validator_function(self.check, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> Any:
-        return handler(schema) | {"enum": list(self.choices)}
+def _integrator(name: str) -> str:
+    """An integrator by its name or alias."""
+    name = ALIASES.get(name, name)
+    if name not in INTEGRATORS:
+        raise ValueError(f"is {name!r}; allowed: {', '.join(INTEGRATORS)}")
+    return name
 
 
+AnyIntegrator = Annotated[
+    str, AfterValidator(_integrator), WithJsonSchema({"type": "string", "enum": list(INTEGRATORS)})
+]
 # How a reduced system is integrated: the same two settings of all methods that have one.
 Solver = Annotated[
-    str,
-    OneOf(tuple(INTEGRATORS)),
+    AnyIntegrator,
     Field(description="as of full_order; all but dopri5 and rodas4 freeze the Jacobian"),
 ]
 # Projected systems have no Jacobian to freeze.
 ProjectedSolver = Annotated[
-    str,
-    OneOf(("dopri5", "rodas4")),
+    Literal["dopri5", "rodas4"],
     Field(description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4"),
 ]
 # Of an iteration.

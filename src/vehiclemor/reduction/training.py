@@ -46,10 +46,6 @@ class TrainingRun(ShortRepr):
         """Full-order trajectory at the maneuver's output times."""
         return self.at(self.maneuver.times)
 
-    def snapshots(self, count: int) -> Trajectory:
-        """Full-order trajectory at so many equidistant times, both ends included."""
-        return self.at(np.linspace(0.0, self.maneuver.duration, count))
-
 
 Training = Sequence[TrainingRun]
 

@@ -15,16 +15,9 @@ NOTHING = 1e-12
 
 
 def trust_of(times: np.ndarray, used: np.ndarray, names: Sequence[str]) -> Trust:
-    """Trust of a run, from how much it uses of the ranges that its model knows.
+    """Trust of a run, from how much it uses (samples, ranges) of the named ranges; 1 is the edge.
 
-    Parameters
-    ----------
-    times
-        Output times (samples,) in s.
-    used
-        Sizes (samples, ranges), 1 at the edge of what is known; what is no number is beyond it.
-    names
-        Of the ranges.
+    What is no number is beyond it.
     """
     used = np.abs(used)
     largest = np.fmax.reduce(used, axis=0, initial=0.0)

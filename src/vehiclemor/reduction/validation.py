@@ -29,20 +29,8 @@ def validated(
 ) -> Any:
     """All settings of a method: those given, else those of the preset, else the defaults.
 
-    Parameters
-    ----------
-    coordinates
-        Number of the model's coordinates, see `AT_MOST_COORDINATES`.
-
-    Returns
-    -------
-    Settings
-        An instance of `method.settings[kind]`.
-
-    Raises
-    ------
-    InputError
-        If a name is not declared, or a value has the wrong kind or is out of bounds.
+    Of the number of the model's coordinates see `AT_MOST_COORDINATES`.  `InputError` if a name is
+    not declared, or a value has the wrong kind or is out of bounds.
     """
     presets = method.presets_of(kind)
     choice(f"preset of {method.name}", preset, presets)
@@ -73,10 +61,7 @@ def fitted(
 ) -> ReducedModel:
     """What a method's `fit` gives, checked.
 
-    Raises
-    ------
-    InputError
-        If it learns from runs and one of the training is of another model, or `fit` refuses.
+    `InputError` if it learns from runs and one of these is of another model, or `fit` refuses.
     """
     for run in training if method.learns_from == "runs" else ():
         if name := difference(model, run.model):
@@ -90,13 +75,7 @@ def fitted(
 
 
 def for_model(method: Method, reduced: ReducedModel, model: Model, settings: Any) -> ReducedModel:
-    """What a method that learns from no run gives of a model with other parameters.
-
-    Raises
-    ------
-    InputError
-        If the method learns from runs.
-    """
+    """What a method gives of a model with other parameters; `InputError` if it learns from runs."""
     if method.learns_from != "inputs":
         raise InputError(
             f"{method.name} is trained on runs of one model: reduce that with the other parameters"

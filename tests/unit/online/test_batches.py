@@ -29,7 +29,7 @@ def full(reduced):
     return vm.reduce(reduced.model, "full_order", solver="ros34pw2", tolerance=2e-3)
 
 
-def steering(runs: int, size: float = 0.02) -> np.ndarray:
+def steering(runs, size=0.02):
     """Steering angles (runs, samples) in rad that set in at different times."""
     rng = np.random.default_rng(1)
     past = np.maximum(TIMES - rng.uniform(0.2, 1.5, (runs, 1)), 0.0)
@@ -37,7 +37,7 @@ def steering(runs: int, size: float = 0.02) -> np.ndarray:
     return size * height * np.sin(rate * past) * np.tanh(past)
 
 
-def check_alone(model, signals, found: xr.Dataset, starts=None) -> None:
+def check_alone(model, signals, found, starts=None):
     """Each run of a batch is the run alone, to the bit."""
     assert found.run.values.tolist() == [*range(len(signals))]
     for run, signal in enumerate(signals):

@@ -5,9 +5,7 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 from contextlib import ExitStack, chdir
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest import mock
@@ -22,9 +20,8 @@ import vehiclemor as vm
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.online import parts
+from vehiclemor.online.model_file import shipped_folder
 from vehiclemor.online.parts import Reader, Writer
-from vehiclemor.online.rom import ReducedOrderModel
-from vehiclemor.online.saved import shipped_folder
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.build import build
 from vehiclemor.study import netcdf_file
@@ -46,18 +43,18 @@ class Pair(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def car() -> ReducedOrderModel:
+def car():
     """A car whose equations are features in a text."""
     return vm.reduce(CAR, "linear_single_track", training="nominal")
 
 
 @pytest.fixture
-def saved(car: ReducedOrderModel, tmp_path: Path) -> Path:
+def saved(car, tmp_path):
     return car.save(tmp_path / "car.nc")
 
 
 @pytest.fixture(scope="module")
-def contents(car: ReducedOrderModel, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def contents(car, tmp_path_factory):
     """Files of all kinds of reduced models."""
     made = {
         "bicycle": car,
@@ -74,7 +71,7 @@ def contents(car: ReducedOrderModel, tmp_path_factory: pytest.TempPathFactory) -
     return {name: path.read_bytes() for name, path in paths.items()}
 
 
-def rewritten(path: Path, change: Callable[[xr.Dataset, dict[str, Any]], None]) -> Path:
+def rewritten(path, change):
     """A file with other content that is whole, as its author would write it."""
     with xr.open_dataset(path, decode_cf=False) as file:
         dataset = file.load()
@@ -86,10 +83,10 @@ def rewritten(path: Path, change: Callable[[xr.Dataset, dict[str, Any]], None]) 
     return path
 
 
-def replaced(changes: dict[str, Any]) -> Callable[[xr.Dataset, dict[str, Any]], None]:
+def replaced(changes):
     """Puts values, or functions of what is there, at places `a.b.c` in the parts of a model."""
 
-    def change(dataset: xr.Dataset, found: dict[str, Any]) -> None:
+    def change(dataset, found):
         arrays = {str(name): variable.values for name, variable in dataset.items()}
         writer = Writer(NOTHING)
         for number, (places, value) in enumerate(changes.items()):
@@ -109,7 +106,7 @@ def replaced(changes: dict[str, Any]) -> Callable[[xr.Dataset, dict[str, Any]], 
     return change
 
 
-def refusal(path: Path) -> str:
+def refusal(path):
     with pytest.raises(FileError) as caught:
         vm.load(path)
     line = str(caught.value)
@@ -118,7 +115,7 @@ def refusal(path: Path) -> str:
     return line
 
 
-def refused_untouched(path: Path) -> str:
+def refused_untouched(path):
     """Why a file is refused of which nothing is compiled, run or left in its folder."""
     before = [*path.parent.iterdir()]
     places = "codegen.kernels.fetched", "codegen.loops.fetched", "online.model_file.response"
@@ -151,7 +148,7 @@ def test_another_process_gets_the_same_to_the_bit_and_derives_nothing(car, tmp_p
     assert not {"sympy", "numba", "xarray"} & set(modules)
 
 
-def parted(value: Any) -> tuple[Any, dict[str, np.ndarray]]:
+def parted(value):
     """A value, written and read again; arrays as they were written."""
     writer = Writer(NOTHING)
     written = json.loads(json.dumps(writer.part(value, "value")))
@@ -310,7 +307,7 @@ def test_parts_that_would_do_harm_are_refused(saved, place, value):
 NAMES = [
     *("os:system", "builtins:eval", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
     *("vehiclemor.simulation.dynamic:DynamicModel", "vehiclemor.simulation.build:build"),
-    *("vehiclemor.simulation.system:System", f"{ROOM}.state_space:KinematicStates"),
+    *("vehiclemor.simulation.system:System", f"{ROOM}.reduced_system:KinematicStates"),
     *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",
@@ -387,12 +384,12 @@ CASES += [
 ]
 
 
-def grouped(*parts: list[int]) -> dict[str, Any]:
+def grouped(*parts):
     lists = [{"tuple": part} for part in parts]
     return {"tuple": [{"tuple": [*pair]} for pair in zip(lists[::2], lists[1::2], strict=True)]}
 
 
-def changed(text: str) -> dict[str, Any]:
+def changed(text):
     """Changes `place=expression|place=expression`."""
     names = vars(np) | {"g": grouped, "OFFLINE": OFFLINE}
     pairs = [pair.split("=") for pair in text.split("|")]

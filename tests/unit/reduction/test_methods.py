@@ -1,35 +1,24 @@
-"""Reduced models meet the published bounds, stay near the floor, and are exact at full rank."""
+"""Methods for a mechanism near the floor and exact at full rank; training runs; what is told."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.reducing import figure_errors, fitted, floor_errors, two_way_travel
+from tests.reducing import figure_errors, fitted, floor_errors, training_runs, two_way_travel
 from vehiclemor.errors import InputError
-from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.projection.bases import Basis
+from vehiclemor.reduction.trust import trust_of
+from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.trajectory import Trajectory
 
 # Masoudi et al. (2015): RMS errors of spindle y (m) and second Euler angle (rad), r = 3.
 PUBLISHED = np.array([7.57e-5, 2.4e-5])
 
 
-@pytest.mark.parametrize("test_space", ["least_squares", "galerkin"])
-def test_three_coordinates_meet_the_published_errors(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory, test_space: str
-) -> None:
-    reduced = fitted(model, nominal, "pod", rank=3, test_space=test_space)
-    run = reduced.simulate(nominal, model.starts[0])
-    assert reduced.effective_rank == 3
-    assert np.all(figure_errors(model, run.outputs, full) < PUBLISHED)
-
-
-def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
-) -> None:
+def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(model, nominal, full):
     errors = []
     for rank in (1, 2, 3, 4):
         reduced = fitted(model, nominal, "pod", rank=rank)
@@ -42,9 +31,7 @@ def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(
     assert np.all(np.array(errors[1:]) < 0.2 * np.array(errors[:-1]))
 
 
-def test_singular_values_beyond_the_fourth_are_rounding(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_singular_values_beyond_the_fourth_are_rounding(model, nominal):
     for basis in fitted(model, nominal, "pod").bases:
         assert basis.singular_values[3] > 1e-6
         assert np.all(basis.singular_values[4:] < 1e-14)
@@ -54,9 +41,7 @@ def test_singular_values_beyond_the_fourth_are_rounding(
 
 
 @pytest.mark.parametrize("galerkin", [False, True])
-def test_full_rank_equals_full_order(
-    model: AlgebraicModel, rng: np.random.Generator, galerkin: bool
-) -> None:
+def test_full_rank_equals_full_order(model, rng, galerkin):
     maneuver = two_way_travel()
     turned, _ = np.linalg.qr(rng.standard_normal((8, 8)))
     basis = Basis(model.design + 0.05 * rng.standard_normal(8), turned, np.ones(8))
@@ -69,26 +54,11 @@ def test_full_rank_equals_full_order(
     )
 
 
-def test_snapshots_are_hit_where_they_span_the_subspace(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
-    reduced = fitted(model, nominal, "pod", rank=4)
-    for k, basis in enumerate(reduced.bases):
-        times = np.linspace(5.0 * k, 5.0 * k + 5.0, 10)
-        exact = model.simulate(nominal, times=times).coordinates
-        at = basis.mean + (exact - basis.mean) @ basis.vectors @ basis.vectors.T
-        np.testing.assert_allclose(at, exact, rtol=0, atol=1e-14)
-        # Both ends of the window are snapshots.
-        assert basis.mean == pytest.approx(exact.mean(axis=0), abs=1e-15)
-
-
-def test_bases_of_the_nominal_run_fail_at_another_frequency(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_bases_of_the_nominal_run_fail_at_another_frequency(model, nominal):
     faster = nominal.perturbed(frequency=2.0)
     reference = model.simulate(faster)
 
-    def errors(policy: str, rank: int) -> np.ndarray:
+    def errors(policy, rank):
         reduced = fitted(model, faster, "pod", policy, rank=rank)
         return figure_errors(model, reduced.simulate(faster, model.starts[0]).outputs, reference)
 
@@ -99,9 +69,7 @@ def test_bases_of_the_nominal_run_fail_at_another_frequency(
     assert np.all(errors("matched", 3) < 0.1 * errors("nominal", 3))
 
 
-def test_fixed_basis_is_pod_with_one_control_period(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_fixed_basis_is_pod_with_one_control_period(model, nominal):
     one = fitted(model, nominal, "fixed_basis", snapshots=20, rank=3)
     same = fitted(model, nominal, "pod", snapshots=20, rank=3, control_period=10.0)
     assert len(one.bases) == len(same.bases) == 1
@@ -109,9 +77,7 @@ def test_fixed_basis_is_pod_with_one_control_period(
     np.testing.assert_array_equal(runs[0].coordinates, runs[1].coordinates)
 
 
-def test_replay_returns_its_training_run(
-    model: AlgebraicModel, nominal: Maneuver, full: Trajectory
-) -> None:
+def test_replay_returns_its_training_run(model, nominal, full):
     replay = fitted(model, nominal, "replay", "nominal")
     for maneuver in (nominal, nominal.perturbed(2.0, 0.5), component("maneuver", "chirp_travel")):
         run = replay.simulate(maneuver, model.starts[0])
@@ -124,9 +90,7 @@ def test_replay_returns_its_training_run(
     assert replay.best_approximation(full.states) is None
 
 
-def test_offline_cost_counts_the_training_simulations(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_offline_cost_counts_the_training_simulations(model, nominal):
     few, many = (fitted(model, nominal, "pod", snapshots=n).offline.evaluations for n in (5, 50))
     # Every snapshot but the two at the design position takes at least two Newton iterations.
     assert 2 * 8 <= few < many
@@ -146,14 +110,12 @@ def test_offline_cost_counts_the_training_simulations(
         ("pod", {"ranks": 3}, "'ranks'"),
     ],
 )
-def test_wrong_settings_are_named(
-    model: AlgebraicModel, nominal: Maneuver, method: str, settings: dict, words: str
-) -> None:
+def test_wrong_settings_are_named(model, nominal, method, settings, words):
     with pytest.raises(InputError, match=words):
         fitted(model, nominal, method, **settings)
 
 
-def test_iteration_that_fails_is_a_result(model: AlgebraicModel, nominal: Maneuver) -> None:
+def test_iteration_that_fails_is_a_result(model, nominal):
     reduced = fitted(model, nominal, "pod", "nominal", rank=3, test_space="galerkin")
     broken = tuple(np.zeros_like(test) for test in reduced.tests)
     run = replace(reduced, tests=broken).simulate(nominal, model.starts[0])
@@ -161,3 +123,59 @@ def test_iteration_that_fails_is_a_result(model: AlgebraicModel, nominal: Maneuv
     assert "singular at t = 0 s" in run.message
     assert np.isnan(run.coordinates).all()
     assert np.isnan(run.outputs[:, 0]).all()
+
+
+def test_run_is_exact_at_any_times(model, nominal, full):
+    [run] = training_runs(model, nominal)
+    some = np.array([3, 250, 250, 700, 1000])
+    history = run.at(nominal.times[some])
+    np.testing.assert_allclose(history.coordinates, full.coordinates[some], rtol=0, atol=1e-13)
+
+
+def test_a_run_has_the_histories_of_its_trajectory(model, nominal):
+    [run] = training_runs(model, nominal)
+    recorded = run.recorded()
+    for name in ("time", "inputs", "states", "outputs"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
+    assert run.outputs is run.outputs
+    with pytest.raises(AttributeError, match="rank"):
+        _ = run.rank
+
+
+def test_snapshots_of_several_runs_are_put_side_by_side(model, nominal):
+    method = component("method", "pod")
+    settings = validated(method, model.kind, {"rank": 3})
+    pairs = [(1.0, 1.0), (1.0, 0.5)]
+    together = method.fit(model, training_runs(model, nominal, "set", pairs), settings)
+    means = [
+        [basis.mean for basis in fitted(model, nominal.perturbed(*pair), "pod").bases]
+        for pair in pairs
+    ]
+    for k, basis in enumerate(together.bases):
+        assert basis.mean == pytest.approx((means[0][k] + means[1][k]) / 2.0, abs=1e-14)
+
+
+def test_replay_of_several_runs_takes_the_nearest_input(model, nominal):
+    method, start = component("method", "replay"), model.starts[0]
+    pairs = [(1.0, 1.0), (1.0, 0.5), (2.0, 1.0)]
+    replay = method.fit(model, training_runs(model, nominal, "set", pairs), {})
+    for pair, tested in zip(pairs, [(1.0, 0.9), (1.05, 0.4), (1.9, 1.1)], strict=True):
+        run = replay.simulate(nominal.perturbed(*tested), start)
+        expected = model.simulate(nominal.perturbed(*pair)).coordinates
+        np.testing.assert_array_equal(run.coordinates, expected)
+
+
+@given(size=st.floats(0.0, 3.0), sample=st.integers(0, 9), column=st.integers(0, 1))
+def test_the_first_range_that_is_left_is_named(size, sample, column):
+    used = np.zeros((10, 2))
+    used[sample:, column] = -size
+    found = trust_of(np.arange(10.0), used, ("roll", "speed"))
+    assert found.indicator == size
+    assert found.until == (sample if size > 1.0 else np.inf)
+    assert found.reason.startswith(("roll", "speed")[column] if size > 1.0 else "")
+    assert bool(found.reason) == (size > 1.0)
+
+
+def test_what_is_no_number_is_beyond():
+    found = trust_of(np.arange(3.0), np.array([[0.5], [np.nan], [0.1]]), ("roll",))
+    assert (found.indicator, found.until) == (0.5, 1.0)

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.settings import AT_MOST_COORDINATES, OneOf, Settings
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.validation import validated
 
 
@@ -20,15 +20,15 @@ class Declared(Settings):
     period: float = Field(5.0, gt=0.0, description="how long")
     mode: Literal["fast", "slow"] = Field("fast", description="how")
     label: str = Field("", description="any text")
-    order: Annotated[str, OneOf(("up", "down"))] = "up"
+    order: Literal["up", "down"] = "up"
     share: float = Field(0.5, ge=0.0, le=1.0)
 
 
-def declared(**presets: dict) -> Method:
+def declared(**presets):
     return Method("m", "", {"ode": Declared}, fit=lambda *_: None, presets={"ode": presets})
 
 
-def test_defaults_then_preset_then_given() -> None:
+def test_defaults_then_preset_then_given():
     others = {"label": "", "order": "up", "share": 0.5}
     plain = validated(declared(), "ode", {}).model_dump()
     assert plain == {"rank": 3, "period": 5.0, "mode": "fast", **others}
@@ -41,7 +41,7 @@ class Bounded(Declared):
     modes: Annotated[int, AT_MOST_COORDINATES] = Field(3, ge=1, description="how many at most")
 
 
-def test_a_default_is_at_most_the_number_of_coordinates_where_it_says_so() -> None:
+def test_a_default_is_at_most_the_number_of_coordinates_where_it_says_so():
     method = replace(declared(), presets={"ode": {"mine": {"modes": 4}}}, settings={"ode": Bounded})
     for preset in ("recommended", "mine"):
         settings = validated(method, "ode", {}, preset, coordinates=2)
@@ -71,12 +71,12 @@ def test_a_default_is_at_most_the_number_of_coordinates_where_it_says_so() -> No
         ("rang", 3, "'rang'.*did you mean rank"),
     ],
 )
-def test_wrong_setting_is_named_with_what_is_allowed(name: str, value: object, words: str) -> None:
+def test_wrong_setting_is_named_with_what_is_allowed(name, value, words):
     with pytest.raises(InputError, match=words):
         validated(declared(), "ode", {name: value})
 
 
-def test_wrong_preset_is_caught_too() -> None:
+def test_wrong_preset_is_caught_too():
     with pytest.raises(InputError, match="rank is 0"):
         validated(declared(mine={"rank": 0}), "ode", {}, "mine")
     with pytest.raises(InputError, match="'mime'; did you mean mine"):
@@ -84,7 +84,7 @@ def test_wrong_preset_is_caught_too() -> None:
 
 
 @given(rank=st.integers(1, 10**9), period=st.floats(1e-9, 1e9))
-def test_allowed_numbers_pass_with_their_declared_type(rank: int, period: float) -> None:
+def test_allowed_numbers_pass_with_their_declared_type(rank, period):
     settings = validated(declared(), "ode", {"rank": float(rank), "period": period})
     assert settings.rank == rank
     assert type(settings.rank) is int

@@ -9,8 +9,7 @@ from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import kernels as codegen_kernels
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.errors import ConvergenceError, InputError
-from vehiclemor.reduction.projection.dynamic import check_subspace
-from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
+from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, check_subspace
 from vehiclemor.registry import component
 from vehiclemor.simulation import build
 from vehiclemor.simulation.dynamic import DynamicModel

@@ -6,14 +6,10 @@ L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Ma
 import numpy as np
 
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.projection.pod_settings import (
-    PRESETS,
-    AlgebraicPodSettings,
-    ConstrainedPodSettings,
-    DynamicPodSettings,
-    Snapshots,
-)
-from vehiclemor.reduction.projection.subspaces import check_subspaces, fit_subspaces
+from vehiclemor.reduction.projection.algebraic import AlgebraicPodSettings
+from vehiclemor.reduction.projection.bases import Snapshots
+from vehiclemor.reduction.projection.dynamic import ConstrainedPodSettings, DynamicPodSettings
+from vehiclemor.reduction.projection.subspaces import PRESETS, check_subspaces, fit_subspaces
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -10,14 +10,18 @@ from pydantic import Field
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.reduced_system import ReducedSystem
-from vehiclemor.reduction.settings import OneOf, OnlineSettings, Settings, StepTolerance, Tolerance
-from vehiclemor.reduction.state_space import KinematicStates, StateSpace
+from vehiclemor.reduction.reduced_system import KinematicStates, ReducedSystem, StateSpace
+from vehiclemor.reduction.settings import (
+    AnyIntegrator,
+    OnlineSettings,
+    Settings,
+    StepTolerance,
+    Tolerance,
+)
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -36,7 +40,7 @@ class AlgebraicSettings(Settings):
 class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
-    solver: Annotated[str, OneOf(tuple(INTEGRATORS))] = Field(
+    solver: AnyIntegrator = Field(
         "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
         "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "

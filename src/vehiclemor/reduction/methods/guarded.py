@@ -15,11 +15,11 @@ from pydantic import Field
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
+from vehiclemor.reduction.reduced_system import StateSpace
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
-from vehiclemor.reduction.state_space import StateSpace
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import checked_fit, checked_settings, fitted, validated
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -44,13 +44,7 @@ class GuardedSettings(OnlineSettings):
 
 @dataclass(frozen=True, eq=False)
 class GuardedModel(ShortRepr):
-    """Both models.
-
-    Attributes
-    ----------
-    solver, tolerance
-        Of the fast model, if it has them.
-    """
+    """Both models; solver and tolerance are the fast model's, if it has them."""
 
     fast: ReducedModel
     safe: ReducedModel
@@ -111,18 +105,12 @@ def fit(
     others: FitOther | None = None,
 ) -> GuardedModel:
     """Fit both, by `others` if it is given."""
-
-    def anew(name: str, given: Any) -> ReducedModel:
-        return fitted(component("method", name), model, training, given)
-
-    fast = (others or anew)(settings.fast, _of_fast(model, settings))
-    safe = (others or anew)(SAFE, _of_safe(model, settings))
-    return GuardedModel(fast, safe, _both(fast, safe), settings.solver, settings.tolerance)
-
-
-def _both(*models: ReducedModel) -> Offline:
-    parts = [model.offline for model in models]
-    return Offline(sum(o.seconds for o in parts), sum(o.evaluations for o in parts))
+    made = others or (lambda name, own: fitted(component("method", name), model, training, own))
+    fast = made(settings.fast, _of_fast(model, settings))
+    safe = made(SAFE, _of_safe(model, settings))
+    first, second = fast.offline, safe.offline
+    cost = Offline(first.seconds + second.seconds, first.evaluations + second.evaluations)
+    return GuardedModel(fast, safe, cost, settings.solver, settings.tolerance)
 
 
 def check(model: DynamicModel, settings: GuardedSettings) -> None:

@@ -19,92 +19,58 @@ single-track car.
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
 from vehiclemor.reduction.vehicle.features import PLANAR, Features
-from vehiclemor.reduction.vehicle.linear_vehicle import (
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import (
     CORNERING,
     HEADING,
     MARGIN,
     PLACE,
     SPEED,
+    VehicleShape,
     linearisation_cost,
+    no_steered_vehicle,
 )
-from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 
 # Lateral speed (m/s) of a typical maneuver.
 SIDEWARD = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class SingleTrack(ShortRepr):
-    """Condensed linear dynamics of (V, r).
-
-    Attributes
-    ----------
-    a, b
-        Matrix (2, 2) and column (2,) of the steering, at the model's own speed.
-    tire
-        Part of `a` (2, 2) that comes from the tires and goes as one over the speed.
-    rows
-        V and r per deviation of the shape (2, n).
-    follow, steered
-        Deviation of the shape per (V, r), (n, 2), and per steering, (n,).
-    """
-
-    a: np.ndarray
-    b: np.ndarray
-    tire: np.ndarray
-    rows: np.ndarray
-    follow: np.ndarray
-    steered: np.ndarray
-
-
-def single_track(shape: VehicleShape) -> SingleTrack:
-    """Condense the linearised vehicle on lateral speed and yaw rate."""
-    linear = shape.linearised
-    kept = np.argmax(np.abs(linear.motion_a[[2, 0]]), axis=1)
-    rows = np.eye(len(linear.a))[kept]
-    rest = np.setdiff1d(np.arange(len(linear.a)), kept)
-    drive = np.column_stack([linear.a[np.ix_(rest, kept)], linear.b[rest, 0]])
-    # The speed's zero eigenvalue makes the matrix singular: the least-squares solution cuts it.
-    condensed = -np.linalg.lstsq(linear.a[np.ix_(rest, rest)], drive, rcond=1e-10)[0]
-    whole = np.zeros((len(linear.a), 3))
-    whole[rest] = condensed
-    whole[kept, [0, 1]] = 1.0
-    matrix = linear.a[kept] @ whole
-    matrix[:, 2] += linear.b[kept, 0]
-    a, b = matrix[:, :2], matrix[:, 2]
-    turning = np.array([[0.0, -shape.speed], [0.0, 0.0]])
-    return SingleTrack(a, b, a - turning, rows, whole[:, :2], whole[:, 2])
-
-
 def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> ReducedVehicle:
     """Linearise and condense; no training run is looked at."""
     began = time.process_time()
     shape = VehicleShape(model)
-    car, modes = single_track(shape), slow_modes(shape, np.inf)
-    inputs = len(model.inputs)
+    linear, modes, inputs = shape.linearised, slow_modes(shape, np.inf), len(model.inputs)
+    # States of the shape that are nearest to V and r; the others follow them and the steering.
+    kept = np.argmax(np.abs(linear.motion_a[[2, 0]]), axis=1)
+    rest = np.setdiff1d(np.arange(len(linear.a)), kept)
+    drive = np.column_stack([linear.a[np.ix_(rest, kept)], linear.b[rest, 0]])
+    follow = np.zeros((len(linear.a), 3))
+    # The speed's zero eigenvalue makes the matrix singular: the least-squares solution cuts it.
+    follow[rest] = -np.linalg.lstsq(linear.a[np.ix_(rest, rest)], drive, rcond=1e-10)[0]
+    follow[kept, [0, 1]] = 1.0
+    condensed = linear.a[kept] @ follow
+    condensed[:, 2] += linear.b[kept, 0]
+    # What comes from the tires goes as one over the speed.
+    tire = condensed[:, :2] - np.array([[0.0, -shape.speed], [0.0, 0.0]])
     # States V, r and the deviation of the speed.
     lines = (("part", "p[0] / (p[0] + z2)"),)
     terms = ("z0", "z1", "u0", "part * z0", "part * z1", "(p[0] + z2) * z1", "p[0] + z2", "z2")
     groups = (((0, 1, 2, 3, 4, 5), (0, 1, 3, 5)), ((6, 7), (4,)))
     features = Features(3, inputs, lines, terms, groups)
     c = np.zeros((len(terms), 3 + PLANAR))
-    c[[3, 4], :2], c[2, :2], c[5, 0] = car.tire.T, car.b, -1.0
+    c[[3, 4], :2], c[2, :2], c[5, 0] = tire.T, condensed[:, 2], -1.0
     c[1, 3], c[6, 4], c[0, 5] = 1.0, 1.0, 1.0
     lifting = np.zeros((len(terms), len(shape.reference)))
-    lifting[[0, 1]], lifting[2], lifting[7] = car.follow.T, car.steered, modes.speed_right
+    lifting[:3], lifting[7] = follow.T, modes.speed_right
     turn = CORNERING / shape.speed
     return ReducedVehicle(
         model,
@@ -113,7 +79,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         np.array([shape.speed]),
         c,
         lifting,
-        np.vstack([car.rows, modes.speed_left]),
+        np.vstack([np.eye(len(linear.a))[kept], modes.speed_left]),
         np.zeros((3, inputs)),
         np.array([MARGIN * SIDEWARD, MARGIN * turn, SPEED, HEADING, PLACE, PLACE]),
         linearisation_cost(shape, began),

@@ -10,7 +10,8 @@ runs only tell between which inputs: the equations are solved in all of that box
 import math
 import time
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import combinations_with_replacement
 from typing import Literal
 
 import numpy as np
@@ -19,16 +20,15 @@ from pydantic import Field
 
 from vehiclemor.codegen.foreign_texts import MOST_SIZE
 from vehiclemor.codegen.kernels import kernel_sources
-from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, ready
+from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
 from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.kernels import map_kernel, map_loop, monomials
 from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
+from vehiclemor.reduction.reduced_system import KinematicStates
 from vehiclemor.reduction.settings import Settings
-from vehiclemor.reduction.state_space import KinematicStates
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -53,6 +53,41 @@ RESTING = 1e-9
 SAME = 1e-15
 
 
+def monomials(rank: int, degree: int) -> tuple[tuple[int, ...], ...]:
+    """Monomials up to a total degree in `rank` variables, each as its variables in order.
+
+    The constant, (), comes first, then (0,), (1,) and so on, then (0, 0), (0, 1) and so on.
+    """
+    orders = range(degree + 1)
+    return tuple(c for n in orders for c in combinations_with_replacement(range(rank), n))
+
+
+def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> str:
+    """Text of the kernel `polynomials`: each monomial is one of a degree less times a variable.
+
+    The variables are the moving inputs; several results may share a column of the coefficients.
+    """
+    every = monomials(len(moving), degree)
+    places = {term: place for place, term in enumerate(every)}
+    lines = [f"x{j} = _x[{i}]" for j, i in enumerate(moving)]
+    lines.append("m0 = 1.0")
+    lines += [f"m{places[term]} = m{places[term[:-1]]} * x{term[-1]}" for term in every[1:]]
+    values = ", ".join(f"v{i}" for i in range(max(columns) + 1))
+    powers = ", ".join(f"m{place}" for place in range(len(every)))
+    lines.append(f"({values},) = weighted_sums(_coefficients, 0, ({powers},))")
+    lines += [f"_result[{i}] = v{column}" for i, column in enumerate(columns)]
+    return "\n    ".join(["def polynomials(_x, _coefficients, _result):", *lines]) + "\n"
+
+
+@cache
+def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
+    """Compiled loop of polynomials of that total degree in those of the inputs that move."""
+    sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
+    modules = "simulation.newton_loops", "reduction.polynomials.map_loops"
+    kernels = {"polynomials": map_kernel(moving, degree, columns)}
+    return loops(modules, ("map_path",), kernels, sizes)["map_path"]
+
+
 class PathMapSettings(Settings):
     """Settings for a kinematic model."""
 
@@ -67,18 +102,12 @@ class PathMapSettings(Settings):
 
 @dataclass(frozen=True)
 class PathMapModel(ShortRepr):
-    """Coordinates and outputs as polynomials of the inputs.
+    """Coordinates and outputs as polynomials, of that total degree, of the inputs that move.
 
     Attributes
     ----------
     ranges
         Lowest and highest value (inputs, 2) of each input in training, with the margins.
-    moving
-        Numbers of the inputs that move.
-    degree
-        Total degree of the polynomials.
-    cells
-        What the loop evaluates.
     columns
         Column of the coefficients for each coordinate and output; equal ones share one.
     stops
@@ -244,10 +273,7 @@ def check(model: Model, settings: PathMapSettings) -> None:
 def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) -> PathMapModel:
     """Interpolation of positions that are solved at the Chebyshev points of all cells.
 
-    Raises
-    ------
-    InputError
-        If no input moves in training, or not all of the box that they span can be reached.
+    `InputError` if no input moves in training, or not all of the box that they span is in reach.
     """
     every = np.concatenate([model.sampled(run.maneuver)[1] for run in training])
     low, high = every.min(axis=0), every.max(axis=0)

@@ -10,16 +10,14 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.projection.dynamic import DynamicProjection
-from vehiclemor.reduction.projection.pod_settings import (
-    PRESETS,
-    AlgebraicPodSettings,
+from vehiclemor.reduction.projection.algebraic import AlgebraicPodSettings
+from vehiclemor.reduction.projection.bases import window_edges
+from vehiclemor.reduction.projection.dynamic import (
     ConstrainedPodSettings,
     DynamicPodSettings,
+    RestartedProjection,
 )
-from vehiclemor.reduction.projection.restarted import RestartedProjection
-from vehiclemor.reduction.projection.subspaces import check_subspaces, fit_subspaces
-from vehiclemor.reduction.projection.windows import window_edges
+from vehiclemor.reduction.projection.subspaces import PRESETS, check_subspaces, fit_subspaces
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
@@ -73,10 +71,9 @@ def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel
     """One POD subspace for each control period of the training runs."""
     edges = window_edges(training[0].maneuver.duration, settings.control_period)
     reduced = fit_subspaces(model, training, edges, settings)
-    restart = getattr(settings, "restart", "own")
-    if isinstance(reduced, DynamicProjection) and restart != "own":
-        return RestartedProjection(**vars(reduced), moved=restart == "full_model")
-    return reduced
+    if isinstance(settings, AlgebraicSettings) or settings.restart == "own":
+        return reduced
+    return RestartedProjection(**vars(reduced), moved=settings.restart == "full_model")
 
 
 METHOD = Method(

@@ -23,22 +23,23 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import PLANAR
-from vehiclemor.reduction.vehicle.landing import after_landing, landed
-from vehiclemor.reduction.vehicle.lifting_terms import fitted_lifting
-from vehiclemor.reduction.vehicle.pruning import pruned
-from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
+from vehiclemor.reduction.vehicle.reach_of_runs import after_landing, landed, training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import ridge_fit
-from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape, shape_samples
+from vehiclemor.reduction.vehicle.shape import (
+    ShapeSamples,
+    VehicleShape,
+    no_steered_vehicle,
+    shape_samples,
+)
 from vehiclemor.reduction.vehicle.slow_features import (
     FeatureTable,
     feature_table,
+    fitted_lifting,
     ranges_of,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
@@ -46,18 +47,17 @@ from vehiclemor.reduction.vehicle.trajectory_fit import (
     Target,
     finishes,
     improved,
-    spread,
+    pruned,
     targets,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 
-# Accuracy of the reduced runs that are compared with training runs.
-REFIT_TOLERANCE = 1e-6
 # Heading (rad) below which its error counts absolutely.
 HEADING = 0.03
 # The part of the terms that is left by each round of elimination, and for how many of them all
 # training runs are looked at; with more terms it is fewer runs, but so many at least.
 SHRINKING, WANTED, FEW = 0.4, 60, 20
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 class SlowManifoldSettings(OnlineSettings):
@@ -107,9 +107,9 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         goals = targets(reduced, training, runs)
         reduced = landed(reduced, modes, runs)
         reduced = _fitted_on_runs(reduced, table, goals, settings)
-    reduced = replace(reduced, reach=training_reach(reduced, training, runs))
     return replace(
         reduced,
+        reach=training_reach(reduced, training, runs),
         offline=offline_cost(began, model, runs, len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
@@ -153,11 +153,8 @@ def _fitted_on_rates(
         np.vstack([modes.left, modes.speed_left]),
         np.vstack([modes.feedthrough, np.zeros(inputs)]),
         np.concatenate([3.0 * table.ranges.states, [10.0, HEADING, 10.0, 10.0]]),
-        Offline(),
-        "dopri5",
-        REFIT_TOLERANCE,
-        modes.symmetric,
-        lifted,
+        transient=modes.symmetric,
+        lifted_features=lifted,
     )
 
 
@@ -172,7 +169,9 @@ def _fitted_on_runs(
         return reduced
     count = len(table.odd_nonlinear) + len(table.even_nonlinear)
     while settings.terms and count > settings.terms:
-        some = spread(goals, max(WANTED / count, FEW / len(goals)))
+        share = max(WANTED / count, FEW / len(goals))
+        # Spread without a period.
+        some = [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
         reduced = improved(reduced, some, table.free, 1)
         count = max(settings.terms, round(SHRINKING * count))
         fewer, table = pruned(reduced, table, some, count)

@@ -10,28 +10,45 @@ to the accelerations of training runs, then to whole runs.
 """
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
+import numpy as np
 from pydantic import Field
 
+from vehiclemor.errors import InputError
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
-from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.acceptance import no_steered_vehicle
+from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.vehicle import tire_features as tf
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
-from vehiclemor.reduction.vehicle.two_track_fit import (
-    COORDINATES,
-    Sizes,
-    fitted_to,
-    free_coefficients,
-    lifted_anew,
-    straight,
+from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
+from vehiclemor.reduction.vehicle.shape import (
+    ShapeSamples,
+    VehicleShape,
+    no_steered_vehicle,
+    shape_samples,
 )
+from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
+
+# The states that are coordinates, and those of them whose rates are accelerations.
+COORDINATES = ("y_dot", "psi_dot", "phi", "phi_dot")
+ACCELERATIONS = (0, 1, 3)
+# Symmetric states for which the lifting has terms of its own.
+SEEN = ("theta", "z_dot")
+RIDGE = 1e-12
+# States that move less than this part of their range count as not moved.
+STILL = 1e-6
+# How often steering is followed through the equations; relative singular values that are rounding.
+POWERS, RANK = 4, 1e-10
 
 
 class TwoTrackSettings(OnlineSettings):
@@ -67,6 +84,169 @@ class TwoTrackSettings(OnlineSettings):
     tolerance: Tolerance = 1e-3
 
 
+class Samples(NamedTuple):
+    """Samples of all training runs: reduced coordinates z (samples, 5) and their rates first."""
+
+    z: np.ndarray
+    inputs: np.ndarray
+    rates: np.ndarray
+    shape: ShapeSamples
+    outputs: np.ndarray
+
+
+def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
+    """Training runs that begin in straight running, at any speed; `InputError` if none does."""
+    shape = VehicleShape(model)
+    dropped = slow_modes(shape, np.inf).symmetric
+
+    def deviation(run: TrainingRun) -> np.ndarray:
+        return shape.of(model.start(run.start)[None])[0] - shape.reference
+
+    found = [run for run in training if not len(dropped.amplitudes(deviation(run)))]
+    if not found:
+        raise InputError(f"no training run of {model.name} begins in straight running")
+    return found
+
+
+def tire_text(shape: VehicleShape, samples: Samples, settings: TwoTrackSettings) -> tf.Text:
+    """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
+    z, u = samples.z, samples.inputs
+    model, inputs = shape.model, u.shape[1]
+    reach = settings.hull * largest(tf.argument_values(shape.speed, z, u))
+    reversal = settings.reversal * float(largest(u[:, :1] * u[:, 1:2])[0])
+    text = tf.arguments(shape.speed, reach, reversal)
+    linear = tf.linear_terms(inputs)
+    odd = [*linear, *tf.CUBIC, *tf.FASTER]
+    even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]
+    given = text.features(inputs, [*odd, *even])
+    columns = feature_columns(given, z, u, np.array(text.values))
+    parities = (
+        (odd, columns[:, : len(odd)], len(linear)),
+        (even, columns[:, len(odd) :], 1),
+    )
+
+    def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
+        return samples.outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
+
+    for axle, wheels in enumerate(tf.AXLES):
+        slips, loads = np.tan(of_wheels("slip_angle", wheels)), of_wheels("Fz", wheels)
+        for name, values, mean_parity in (("slip", slips, 0), ("load", loads, 1)):
+            mean, half = values @ [0.5, 0.5], values @ [0.5, -0.5]
+            for end, target, parity in (("", mean, mean_parity), ("_half", half, 1 - mean_parity)):
+                terms, table, first = parities[parity]
+                chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
+                weights = ridge_fit(table[:, chosen], target, RIDGE)
+                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights.tolist())
+        parameters = {name: float(model.parameters[name]) for name in FIALA}
+        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
+    return text
+
+
+def fitted_on_rates(
+    shape: VehicleShape,
+    modes: SlowModes,
+    encoding: np.ndarray,
+    text: tf.Text,
+    samples: Samples,
+    settings: TwoTrackSettings,
+) -> ReducedVehicle:
+    """Equations fitted to the accelerations of the training runs."""
+    z, u, rates, of_shape, _ = samples
+    inputs, parameters = u.shape[1], np.array(text.values)
+
+    def columns_of(terms: Sequence[str]) -> np.ndarray:
+        return feature_columns(text.features(inputs, terms), z, u, parameters)
+
+    def chosen(
+        given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
+    ) -> list[str]:
+        terms = [*given, *(term for term in others if term not in given)]
+        scaled = values / np.sqrt(np.mean(values**2, axis=0))
+        numbers = forward_selection(columns_of(terms), scaled, len(given), more)
+        return [terms[i] for i in numbers]
+
+    plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
+    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], settings.terms)
+    forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
+    symmetric = np.column_stack([rates[:, tf.SPEED], forward])
+    candidates = tf.even_candidates(inputs)
+    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, settings.even_terms)
+    terms = [*odd, "1.0", *even]
+    seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
+    lifted = chosen(terms, candidates, seen, settings.lifted_terms)
+    columns = columns_of(terms)
+    k, c = len(odd), np.zeros((len(terms), tf.STATES + PLANAR))
+    lateral = np.column_stack([rates[:, :4], of_shape.motion[:, [0, 2]]])
+    c[:k, tf.LATERAL] = ridge_fit(columns[:, :k], lateral, RIDGE)
+    # Straight running at any speed is an equilibrium.
+    c[k, 6], c[k + 1, 6] = shape.speed, 1.0
+    c[k + 2 :, tf.SYMMETRIC] = ridge_fit(columns[:, k + 2 :], symmetric, RIDGE)
+    return ReducedVehicle(
+        shape.model,
+        shape,
+        text.features(inputs, terms, len(odd)),
+        parameters,
+        c,
+        both_sides(shape, columns_of(lifted), len(odd), of_shape.deviations),
+        encoding,
+        np.zeros((tf.STATES, inputs)),
+        np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
+        transient=modes.symmetric,
+        lifted_features=text.features(inputs, lifted),
+    )
+
+
+def both_sides(
+    shape: VehicleShape, columns: np.ndarray, odd: int, deviations: np.ndarray
+) -> np.ndarray:
+    """Coefficients (terms, n) of the shape: of its odd part by odd terms, which are the first."""
+    image = deviations @ mirror(shape).T
+    parts = np.split(columns, [odd], axis=1)
+    return np.vstack(
+        [
+            ridge_fit(part, 0.5 * (deviations + sign * image), RIDGE)
+            for part, sign in zip(parts, (-1, 1), strict=True)
+        ]
+    )
+
+
+def mirror(shape: VehicleShape) -> np.ndarray:
+    """Signed permutation (n, n): the deviation of the shape in the vehicle's mirror image.
+
+    Names tell the partners.  Signs follow from what steering moves, which changes its sign in the
+    mirror: of a state without a partner, and against its partner's of any other.
+    """
+    # Not its modes: a symmetric one of the same frequency would be mixed with a lateral one.
+    linear = shape.linearised
+    parts = [np.linalg.lstsq(linear.a, linear.b[:, :1], rcond=RANK)[0], linear.b]
+    for _ in range(POWERS):
+        parts.append(linear.a @ parts[-1])
+    moved = np.hstack(parts)
+    moved /= largest(moved)
+    partner = partners(shape.names)
+    matrix = np.zeros((len(partner), len(partner)))
+    for i, j in enumerate(partner):
+        if i == j:
+            matrix[i, i] = -1.0 if np.abs(moved[i]).max() > STILL else 1.0
+        else:
+            matrix[i, j] = -1.0 if moved[i] @ moved[j] > 0.0 else 1.0
+    return matrix
+
+
+def lifted_anew(reduced: ReducedVehicle, training: Training, samples: Samples) -> ReducedVehicle:
+    """The lifting fitted to where the reduced runs are, whose speed has become their own."""
+    paths = [reduced.path(run.maneuver, run.start) for run in training]
+    kept = [path for path in paths if path is not None]
+    if len(kept) < len(paths):
+        return reduced
+    assert reduced.lifted_features is not None
+    z = np.ascontiguousarray(np.concatenate(kept)[:, : tf.STATES])
+    columns = feature_columns(reduced.lifted_features, z, samples.inputs, reduced.parameters)
+    odd = len(reduced.features.groups[0][0])
+    lifting = both_sides(reduced.shape, columns, odd, samples.shape.deviations)
+    return replace(reduced, lifting=lifting)
+
+
 def refusal(model: Model) -> str:
     """Why a model has not the coordinates or the tires."""
     if reason := no_steered_vehicle(model):
@@ -81,11 +261,25 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
     began = time.process_time()
     own = straight(model, training)
     runs = [run.recorded() for run in own]
-    sizes = Sizes(*(getattr(settings, name) for name in Sizes._fields))
-    reduced, samples = fitted_to(model, runs, sizes)
+    shape = VehicleShape(model)
+    modes, of_shape = slow_modes(shape, np.inf), shape_samples(shape, runs)
+    encoding = np.zeros((tf.STATES, len(shape.names)))
+    for i, name in enumerate(COORDINATES):
+        encoding[i, shape.names.index(name)] = 1.0
+    encoding[tf.SPEED] = modes.speed_left
+    samples = Samples(
+        of_shape.deviations @ encoding.T,
+        of_shape.inputs,
+        of_shape.rates @ encoding.T,
+        of_shape,
+        np.concatenate([run.outputs for run in runs]),
+    )
+    text = tire_text(shape, samples, settings)
+    reduced = fitted_on_rates(shape, modes, encoding, text, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, own, runs, stride=1)
-        free = free_coefficients(reduced)
+        (odd, _), (even, symmetric) = reduced.features.groups
+        free = [*((odd, i) for i in ACCELERATIONS), *((even[2:], i) for i in symmetric)]
         reduced = improved(reduced, goals, free, settings.sweeps, power=1.0)
         reduced = improved(reduced, goals, free, settings.sweeps)
         reduced = lifted_anew(reduced, own, samples)

@@ -1,6 +1,6 @@
 """Coordinates and outputs of a mechanism as polynomials of its inputs in cells: a compiled loop.
 
-The polynomials are a kernel that `kernels.py` writes for their number and degree.
+The polynomials are a kernel that `methods/path_map.py` writes for their number and degree.
 """
 
 import math

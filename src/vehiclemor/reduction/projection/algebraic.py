@@ -3,41 +3,76 @@
 import time
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from vehiclemor.errors import InputError
+from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
-from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis, project
-from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings
-from vehiclemor.reduction.projection.windows import by_window, first_samples
-from vehiclemor.reduction.solved_path import solved_path
-from vehiclemor.reduction.state_space import SolvedAnywhere
+from vehiclemor.reduction.projection.bases import (
+    Basis,
+    Rank,
+    RankTolerance,
+    Snapshots,
+    by_window,
+    check_pod,
+    first_samples,
+    pod_basis,
+    project,
+)
+from vehiclemor.reduction.reduced_system import KinematicStates
+from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.algebraic import AlgebraicModel, new_counts
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton_loops import Iteration
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
+from vehiclemor.simulation.run_timer import timed
+from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require, shaped
 
 ITERATION_LIMIT = 50
 
 
-@dataclass(frozen=True)
-class AlgebraicProjection(SolvedAnywhere):
-    """Reduced model on affine subspaces, one in each window.
+class AlgebraicPodSettings(Settings):
+    """POD subspaces of algebraic equations.
 
-    Attributes
-    ----------
-    edges
-        Window edges (windows + 1,) in s.
-    bases
-        One subspace for each window.
-    tests
-        Test bases (n, r) of the windows; None for least squares.
-    tolerance
-        Largest step of the last iteration (reduced coordinates).
+    Least squares, the default, does not depend on the order and signs in which the equations are
+    written (Galerkin does, by orders of magnitude), and the rank cut keeps directions out that
+    rounding chooses.
+    """
+
+    rank: Rank = 3
+    snapshots: Snapshots = 10
+    rank_tolerance: RankTolerance = 1e-10
+    test_space: Literal["least_squares", "galerkin"] = Field(
+        "least_squares",
+        description="least_squares: Gauss-Newton on the residual; galerkin: U^T Phi = 0 "
+        "(paper, step 6)",
+    )
+    equation_seed: int = Field(
+        0,
+        ge=0,
+        description="galerkin: seed of a random order and signs of the equations; 0: natural",
+    )
+    reversed_coordinates: str = Field(
+        "", description="galerkin: coordinates counted the other way round, separated by commas"
+    )
+    tolerance: StepTolerance = 1e-12
+    rounding_seed: int = Field(
+        0, ge=0, description="seed of a relative noise of 2^-52 on the snapshots; 0: none"
+    )
+
+
+@dataclass(frozen=True)
+class AlgebraicProjection(ShortRepr):
+    """Reduced model on affine subspaces, one in each window between edges (windows + 1,) in s.
+
+    Test bases (n, r) of the windows are none for least squares; the tolerance is the largest step
+    of the last iteration in reduced coordinates.
     """
 
     model: AlgebraicModel
@@ -79,7 +114,22 @@ class AlgebraicProjection(SolvedAnywhere):
         given = (state, subspaces, least_squares, inputs, model.constants, iteration)
         loop = model.loop("projected_path", "reduction.projection.algebraic_loops")
         buffer = np.empty(4 * n + len(model.inputs) + n * n + 2 * n * (n + 1))
-        return solved_path(model, times, inputs, lambda to: loop.prepared(*given, to, buffer))[0]
+        path, counts = np.full((len(times), n), np.nan), new_counts()
+        status, seconds = timed(loop.prepared(*given, Solution(path, counts), buffer))
+        failure = (status, int(counts[SAMPLE])) if status else None
+        return model.trajectory(times, inputs, path, counts.tolist(), seconds, failure)
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Solve the reduced equations at the maneuver's output times."""
+        times, inputs, _ = self.model.sampled(maneuver)
+        return self.solved(times, inputs, self.model.start(start))
+
+    @property
+    def state_space(self) -> KinematicStates:
+        """The coordinates; those of the window that the time is in."""
+        return KinematicStates(
+            self.model, lambda time, u, state: self.solved(np.array([time]), u, state)
+        )
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""
@@ -98,7 +148,9 @@ def fit_windows(
     for k in range(len(moments)):
         part = slice(k * count, (k + 1) * count)
         snapshots = np.concatenate([history.coordinates[part] for history in histories]).T
-        snapshots = _rounded(snapshots, settings.rounding_seed)
+        if seed := settings.rounding_seed:
+            noise = np.random.default_rng(seed).standard_normal(snapshots.shape)
+            snapshots = snapshots * (1.0 + np.finfo(float).eps * noise)
         bases.append(pod_basis(snapshots, rank, settings.rank_tolerance))
     tests = None
     if settings.test_space == "galerkin":
@@ -142,10 +194,3 @@ def _pairing(model: AlgebraicModel, settings: AlgebraicPodSettings) -> np.ndarra
     for index in _reversed(model, settings):
         pairing[:, index] *= -1.0
     return pairing
-
-
-def _rounded(snapshots: np.ndarray, seed: int) -> np.ndarray:
-    if seed == 0:
-        return snapshots
-    noise = np.random.default_rng(seed).standard_normal(snapshots.shape)
-    return snapshots * (1.0 + np.finfo(float).eps * noise)

@@ -7,24 +7,77 @@ compared.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.interface import Offline, offline_cost
-from vehiclemor.reduction.projection.bases import Basis, check_pod, pod_basis
-from vehiclemor.reduction.projection.inner_products import coordinate_weight, state_weight
-from vehiclemor.reduction.projection.pod_settings import DynamicPodSettings
-from vehiclemor.reduction.projection.windows import by_window
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.reduction.interface import offline_cost
+from vehiclemor.reduction.projection.bases import (
+    Basis,
+    Rank,
+    RankTolerance,
+    Snapshots,
+    by_window,
+    check_pod,
+    pod_basis,
+)
 from vehiclemor.reduction.reduced_system import ReducedSystem
-from vehiclemor.reduction.settings import ProjectedSettings
+from vehiclemor.reduction.settings import ProjectedSettings, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.stepping import Stepper
+from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.workspaces import Solver
+
+# A state whose range is below this share of the largest one is noise, not motion.
+SMALLEST_RANGE = 1e-6
+
+
+class DynamicPodSettings(ProjectedSettings):
+    """POD subspaces of equations of motion.
+
+    The defaults are chosen by measurement, on the nominal runs that are then compared with the
+    paper: they keep the published errors from both starts, as states weighed by energy do too, and
+    the projected equations keep the model's energy.
+    """
+
+    rank: Rank = 3
+    snapshots: Snapshots = 10
+    rank_tolerance: RankTolerance = 1e-6
+    formulation: Literal["coordinates", "state", "paired"] = Field(
+        "coordinates",
+        description="coordinates: V^T M V qh'' = V^T F; state: all states in one basis (the "
+        "paper's words); paired: first order, the coordinates' basis for speeds too",
+    )
+    inner_product: Literal["euclidean", "energy", "range"] = Field(
+        "energy",
+        description="of the snapshots: euclidean, energy (mass matrix), range (each state by its "
+        "range)",
+    )
+    tolerance: Tolerance = 1e-6
+
+
+class ConstrainedPodSettings(DynamicPodSettings):
+    """POD subspaces of equations of motion with constraints: the paper's rank and snapshots.
+
+    One mode of the states holds position and speed together, so that one coordinate can follow a
+    maneuver; weighed by energy it keeps the published errors from both starts, and no rank makes
+    the reduced equations unstable.
+    """
+
+    rank: Rank = 1
+    snapshots: Snapshots = 5
+    formulation: Literal["coordinates", "state", "paired"] = Field(
+        "state", description="as for a model without constraints"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,25 +125,15 @@ class DynamicProjection(ReducedSystem):
         model, spaces = self.model, self.spaces
         rates = np.full(len(self.bases), np.nan)
         for k in np.flatnonzero(spaces.ranks).tolist():
-            y = self._at_mean(k)[: spaces.ranks[k]]
+            y = np.zeros(spaces.ranks[k])
+            if spaces.formulation == "coordinates":
+                # Rates are coordinates of their own, and the test basis has nothing of speeds.
+                rank, no_input = spaces.ranks[k] // 2, np.zeros((1, len(model.inputs)))
+                (of_mean,) = model.derivatives_at(spaces.means[k : k + 1], no_input)
+                of_mean[len(model.coordinates) :] = 0.0
+                y[rank:] = spaces.test_basis[k, :rank, :] @ of_mean
             jacobian = linearisation.reduced_jacobian(model, spaces, k, y)
             rates[k] = np.linalg.eigvals(jacobian).real.max()
-        return rates
-
-    def _at_mean(self, window: int) -> np.ndarray:
-        """Reduced coordinates of the mean; rates too, where these are coordinates of their own."""
-        y = np.zeros(self.spaces.ranks.max())
-        if self.spaces.formulation == "coordinates":
-            rank = self.spaces.ranks[window] // 2
-            y[rank : 2 * rank] = self.spaces.test_basis[window, :rank, :] @ self._mean_rates[window]
-        return y
-
-    @cached_property
-    def _mean_rates(self) -> np.ndarray:
-        n = len(self.model.coordinates)
-        inputs = np.zeros((len(self.bases), len(self.model.inputs)))
-        rates = np.zeros_like(self.spaces.means)
-        rates[:, :n] = self.model.derivatives_at(self.spaces.means, inputs)[:, :n]
         return rates
 
     @property
@@ -99,17 +142,59 @@ class DynamicProjection(ReducedSystem):
         return float(np.fmax.reduce(self.spectral_abscissas))
 
 
+@dataclass(frozen=True, eq=False)
+class RestartedProjection(DynamicProjection):
+    """The same subspaces; the state at the beginning of each window is the full model's.
+
+    So onboard model-predictive controllers, which the paper's control periods resemble (section
+    3.1), update at regular intervals, and errors grow within a window alone.  But projected onto
+    the subspace of the training run (step 6) the state becomes one of that run again, wherever the
+    car is: where it is `moved`, only the change within the window is in the span of the training's.
+
+    Attributes
+    ----------
+    moved
+        Whether this state is the origin of the window's subspace, and not the training's mean.
+    """
+
+    moved: bool = True
+
+    @cached_property
+    def stepper(self) -> Stepper:
+        """Steps from any state that is given, as at the beginning of a window."""
+        return Stepper(self.system, self.spaces, self.solver, self.tolerance, self.moved)
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """Run the full model, then each window from its state: counts and seconds are of both.
+
+        A sample at the edge of two windows is the end of the first one.
+        """
+        model, times = self.model, maneuver.times
+        edges = np.array([0.0, *self.spaces.edges[1:-1], times[-1]])
+        edges = np.unique(edges[edges <= times[-1]])
+        full = model.simulate(maneuver, start, edges, self.solver, self.tolerance)
+        counts = np.array([full.counts[name] for name in DYNAMIC_COUNTS])
+        states = np.full((len(times), full.states.shape[1]), np.nan)
+        first, seconds, failure, spaces = 0, full.seconds, "", self.spaces
+        for (left, right), state in zip(pairwise(edges), full.states, strict=False):
+            end = int(np.searchsorted(times, right + 1e-9 * (right - left)))
+            if end == first or failure:
+                continue
+            if self.moved:
+                spaces = replace(spaces, means=np.tile(state, (len(spaces.means), 1)))
+            how = Solver(self.solver, self.tolerance, times[first:end], begin=left)
+            run = self.system.run(maneuver, state, spaces, how)
+            states[first:end], failure = run.whole, run.failure
+            counts, seconds, first = counts + run.counts, seconds + run.seconds, end
+        return model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
+
+
 def fit_windows(
     model: DynamicModel, training: Training, edges: np.ndarray, settings: DynamicPodSettings
 ) -> DynamicProjection:
-    """POD subspaces of equidistant snapshots (both ends included) of all runs.
+    """POD subspaces, between edges (windows + 1,) in s, of equidistant snapshots of all runs.
 
-    Windows lie between edges (windows + 1,) in s.
-
-    Raises
-    ------
-    InputError
-        If the training runs differ in duration.
+    `InputError` if the training runs differ in duration.
     """
     durations = sorted({run.maneuver.duration for run in training})
     if len(durations) > 1:
@@ -125,20 +210,16 @@ def fit_windows(
     weight = _weight(model, settings, states.reshape(-1, states.shape[-1]), edges)
     windows = [slice(k * count, (k + 1) * count) for k in range(len(edges) - 1)]
     snapshots = [states[:, window].reshape(-1, states.shape[-1]) for window in windows]
-    bases = [_basis(part[:, : len(weight)], weight, settings) for part in snapshots]
+    root, bases = np.linalg.cholesky(weight), []
+    for part in (part[:, : len(weight)] for part in snapshots):
+        scaled = pod_basis((part @ root).T, settings.rank, settings.rank_tolerance)
+        vectors = np.linalg.solve(root.T, scaled.vectors)
+        bases.append(Basis(part.mean(axis=0), vectors, scaled.singular_values))
     means = np.array([part.mean(axis=0) for part in snapshots])
     spaces = _spaces(model, edges, means, bases, (weight, settings.formulation))
-    return projected_equations(
-        model, spaces, bases, offline_cost(began, model, histories), settings
-    )
-
-
-def _basis(snapshots: np.ndarray, weight: np.ndarray, settings: DynamicPodSettings) -> Basis:
-    """POD basis of snapshots (samples, m), orthonormal by the weight (m, m), and their mean."""
-    root = np.linalg.cholesky(weight)
-    scaled = pod_basis((snapshots @ root).T, settings.rank, settings.rank_tolerance)
-    vectors = np.linalg.solve(root.T, scaled.vectors)
-    return Basis(snapshots.mean(axis=0), vectors, scaled.singular_values)
+    rank, offline = max(basis.rank for basis in bases), offline_cost(began, model, histories)
+    how = settings.solver, settings.tolerance
+    return DynamicProjection(model, model.system, spaces, rank, offline, *how, bases=tuple(bases))
 
 
 def _spaces(
@@ -171,27 +252,30 @@ def _spaces(
     return ProjectionWindows(form, edges, means, trial, test, ranks)
 
 
-def projected_equations(
-    model: DynamicModel,
-    spaces: ProjectionWindows,
-    bases: Sequence[Basis],
-    offline: Offline,
-    settings: ProjectedSettings,
-) -> DynamicProjection:
-    """The equations of a model in subspaces, integrated as the settings say."""
-    rank = max(basis.rank for basis in bases)
-    how = settings.solver, settings.tolerance
-    return DynamicProjection(model, model.system, spaces, rank, offline, *how, bases=tuple(bases))
-
-
 def _weight(
     model: DynamicModel, settings: DynamicPodSettings, states: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """Weight of the inner product: of all states (2 n, 2 n) or of the coordinates (n, n)."""
-    if settings.formulation == "state":
-        return state_weight(model, settings.inner_product, states, float(edges[1] - edges[0]))
-    coordinates = states[:, : len(model.coordinates)]
-    return coordinate_weight(model, settings.inner_product, coordinates)
+    """Weight W of the inner product <a, b> = a^T W b: of all states or of the coordinates.
+
+    `energy` is the mass matrix M at the first start; of states blkdiag(M / tau^2, M), tau the
+    length of a window, where M of the speeds follows from the map of rates to speeds there.
+    `range` is one over the square of each state's range.
+    """
+    n, whole = len(model.coordinates), settings.formulation == "state"
+    states = states if whole else states[:, :n]
+    if settings.inner_product == "euclidean":
+        return np.eye(states.shape[1])
+    if settings.inner_product == "range":
+        ranges = np.ptp(states, axis=0)
+        return np.diag(1.0 / np.maximum(ranges, SMALLEST_RANGE * ranges.max()) ** 2)
+    mass = model.mass_matrix(model.start())
+    if not whole:
+        return mass
+    weight = np.zeros((2 * n, 2 * n))
+    weight[:n, :n] = mass / float(edges[1] - edges[0]) ** 2
+    inverse = np.linalg.inv(linearisation.speeds_per_rates(model, model.start()))
+    weight[n:, n:] = inverse.T @ mass @ inverse
+    return weight
 
 
 def check_subspace(model: DynamicModel, settings: DynamicPodSettings) -> None:

@@ -6,12 +6,18 @@ import numpy as np
 
 from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.reduction.projection import algebraic, dynamic
-from vehiclemor.reduction.projection.pod_settings import AlgebraicPodSettings, DynamicPodSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
-SubspaceSettings = AlgebraicPodSettings | DynamicPodSettings
+SubspaceSettings = algebraic.AlgebraicPodSettings | dynamic.DynamicPodSettings
 PROJECTIONS: dict[str, ModuleType] = {"ae": algebraic, "ode": dynamic, "dae": dynamic}
+DYNAMIC_LITERAL = {"formulation": "state", "inner_product": "euclidean", "rank_tolerance": 0.0}
+# `literal` takes the paper's words literally.
+PRESETS = {
+    "ae": {"literal": {"test_space": "galerkin", "rank_tolerance": 0.0}},
+    "ode": {"literal": DYNAMIC_LITERAL},
+    "dae": {"literal": DYNAMIC_LITERAL},
+}
 
 
 def check_subspaces(model: Model, settings: SubspaceSettings) -> None:

@@ -13,12 +13,11 @@ from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.reduced_system import full_state_slopes
-from vehiclemor.reduction.vehicle.feature_kernels import Layout, lifting_text
-from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, lifting_text
 from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.kernel_derivatives import INPUTS, STATE, partial
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.simulation.workspaces import Run
@@ -69,10 +68,7 @@ NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
 class LiftingSpace(NamedTuple):
     """Arrays of one lifting at a time, and the loops that write them.
 
-    Attributes
-    ----------
-    calls
-        Loops with these arrays, and the words in which the number of rows stands.
+    `calls` are the loops, and the words in which the number of rows stands.
     """
 
     excited: np.ndarray
@@ -86,22 +82,9 @@ class LiftingSpace(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Lifting(ShortRepr):
-    """How full states follow from reduced ones.
+    """How full states follow from reduced ones, see `ReducedVehicle`.
 
-    Attributes
-    ----------
-    features, parameters
-        Features of the shape, and the parameters in their text.
-    coefficients
-        Of the shape's deviation from straight running (terms, n).
-    reference
-        Shape (n,) of straight running.
-    layout
-        Where the shape stands in the states.
-    transient
-        What is added to the shapes.
-    reach
-        What the training runs have shown.
+    Coefficients (terms, n) are of the shape's deviation from its reference, straight running.
     """
 
     features: Features
@@ -140,18 +123,17 @@ class Lifting(ShortRepr):
     def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of full states by reduced ones and inputs, without a transient."""
         kernels, constants = self._kernels(0)
-        size = self.layout.size + len(self.features.watched)
-        found = full_state_slopes(kernels, (state, inputs, constants), size)
-        return found[0][: self.layout.size], found[1][: self.layout.size]
+        size, arrays = self.layout.size, (state, inputs, constants)
+        by_state, by_inputs = (
+            partial(kernels, "full_state", arrays, size + len(self.features.watched), place)[:size]
+            for place in (STATE, INPUTS)
+        )
+        return by_state, by_inputs
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
         """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
 
-        Parameters
-        ----------
-        deviation
-            Of the start's shape from straight running (n,); m is zero if it excites none, as
-            straight running at another speed.
+        The deviation (n,) of the start's shape may excite none, as straight running at any speed.
         """
         amplitudes = self.transient.amplitudes(deviation)
         found = np.array([self.transient.rates[: len(amplitudes)], amplitudes], dtype=complex)
@@ -162,12 +144,7 @@ class Lifting(ShortRepr):
     ) -> tuple[np.ndarray, Trust | None]:
         """Full states, and behind them what is watched (samples, 2 n + watched); what this tells.
 
-        Parameters
-        ----------
-        times, path, inputs
-            Of the samples: in s, reduced states (samples, states + 3), inputs (samples, inputs).
-        excited
-            By the start, as `excited` gives it.
+        The path has reduced states (samples, states + 3); `excited` is what `excited` gives.
         """
         recorded = times, path, inputs
         if len(times) > 1 or excited.shape[1]:
@@ -213,19 +190,16 @@ class Lifting(ShortRepr):
         modes, watched = excited.shape[1], self.features.watched
         if modes:
             given = np.empty((len(times), inputs.shape[1] + 2 * modes))
-            decay = _loops()["with_decay"]
-            calls.append(
-                (
-                    decay.prepared(times, inputs, *excited, np.empty((modes, 2)), given),
-                    ("times", "inputs", "result"),
-                )
-            )
+            scratch = np.empty((modes, 2))
+            decay = _loops()["with_decay"].prepared(times, inputs, *excited, scratch, given)
+            calls.append((decay, ("times", "inputs", "result")))
             inputs = given
         kernels, constants = self._kernels(modes)
         lanes = LANES if rows >= LANES else 1
         address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(times), self.layout.size + len(watched)))
-        largest, first = np.empty(self.told), np.empty(self.told, dtype=np.int64)
+        told = len(watched) + BESIDES if watched else 0
+        largest, first = np.empty(told), np.empty(told, dtype=np.int64)
         start = np.array([0.0, 0.0, 0.0, 0.0, np.inf])
         lasted = self.reach.lasted
         known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
@@ -237,12 +211,6 @@ class Lifting(ShortRepr):
             (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
         )
         return LiftingSpace(excited, times, states, largest, first, start, counted)
-
-    @property
-    def told(self) -> int:
-        """How much is told of a run: what is watched, and what is told besides."""
-        watched = len(self.features.watched)
-        return watched + BESIDES if watched else 0
 
     def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
         for call, places in space.calls:
@@ -258,13 +226,8 @@ class Lifting(ShortRepr):
     def trust(self, largest: list[float], first: list[int], until: float) -> Trust | None:
         """How far a run has gone; none if nothing tells.
 
-        Parameters
-        ----------
-        largest, first
-            Largest magnitude of each watched quantity and of what is told besides, and the first
-            row at which it is above 1.
-        until
-            Time (s) of the first of these rows; infinite if there is none.
+        Of each watched quantity and of what is told besides the largest magnitude, and the first
+        row at which it is above 1; `until` is the time (s) of the first of these rows.
         """
         if not largest:
             return None

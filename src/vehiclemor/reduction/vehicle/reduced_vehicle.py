@@ -10,8 +10,13 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Offline
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
-from vehiclemor.reduction.vehicle.feature_system import feature_columns, feature_system
-from vehiclemor.reduction.vehicle.features import PLANAR, Features, needed_parameters
+from vehiclemor.reduction.vehicle.features import (
+    PLANAR,
+    Features,
+    feature_columns,
+    feature_system,
+    needed_parameters,
+)
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
@@ -20,7 +25,6 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.projection_windows import whole_space
-from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require, shaped
@@ -28,18 +32,14 @@ from vehiclemor.sizes import require, shaped
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
 NOTHING_EXCITED = np.empty((2, 0, 2))
+NO_COST = Offline()
 
 
 class KnownStart(NamedTuple):
-    """A full state and what is known of it as a start.
+    """A full state as a start: what of the transient it excites, and until when (s).
 
-    Attributes
-    ----------
-    excited, until
-        What of the transient it excites, and when (s) this is nothing.
-    told
-        When (s) this is as in training runs; how much else it leaves, 1 at the edge of what they
-        leave; 1.
+    Of it is `told` when (s) this is as in training runs; how much else it leaves, 1 at the edge of
+    what they leave; 1.
     """
 
     state: np.ndarray
@@ -72,6 +72,8 @@ class ReducedVehicle(ShortRepr):
         Features of the lifting, with the same parameters, if not those of the equations.
     reach
         What the training runs have shown of durations and starts.
+
+    Integrator and tolerance are by default those of runs that are compared with training runs.
     """
 
     model: DynamicModel
@@ -83,9 +85,9 @@ class ReducedVehicle(ShortRepr):
     encoding: np.ndarray
     feedthrough: np.ndarray
     error_scale: np.ndarray
-    offline: Offline
-    solver: str
-    tolerance: float
+    offline: Offline = NO_COST
+    solver: str = "dopri5"
+    tolerance: float = 1e-6
     transient: Transient = NO_TRANSIENT
     lifted_features: Features | None = None
     reach: TrainingReach = NOTHING_KNOWN
@@ -122,28 +124,20 @@ class ReducedVehicle(ShortRepr):
         k = self.features.states
         steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
         no_input = np.zeros((2 * k, self.features.inputs))
-        rates = (
-            feature_columns(self.features, steps, no_input, self.parameters)
-            @ self.coefficients[:, :k]
-        )
+        columns = feature_columns(self.features, steps, no_input, self.parameters)
+        rates = columns @ self.coefficients[:, :k]
         jacobian = (rates[:k] - rates[k:]).T / (2.0 * DIFFERENCE)
         return float(np.linalg.eigvals(jacobian).real.max())
-
-    @cached_property
-    def system(self) -> System:
-        """Compiled equations."""
-        reference = np.zeros(self.features.states)
-        return feature_system(
-            self.features, self.parameters, self.coefficients, self.error_scale, reference
-        )
 
     @cached_property
     def equations(self) -> ReducedSystem:
         """The compiled equations with the ways there and back."""
         x, y, heading = self.model.definition.planar
+        arrays = self.parameters, self.coefficients, self.error_scale
+        system = feature_system(self.features, *arrays, np.zeros(self.features.states))
         return ReducedSystem(
             self.model,
-            self.system,
+            system,
             whole_space(self.effective_rank),
             self.effective_rank,
             self.offline,
@@ -185,16 +179,8 @@ class ReducedVehicle(ShortRepr):
     def lift(self) -> Lifting:
         """The compiled way back to full states."""
         shape, features = self.shape, self.lifted_features or self.features
-        coefficients, reference = self.lifting, shape.reference
-        return Lifting(
-            features,
-            self.parameters,
-            coefficients,
-            reference,
-            shape.layout,
-            self.transient,
-            self.reach,
-        )
+        of_shape = self.lifting, shape.reference, shape.layout
+        return Lifting(features, self.parameters, *of_shape, self.transient, self.reach)
 
     def path(
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None

@@ -16,26 +16,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.feature_kernels import Layout
+from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.reduction.interface import Offline, offline_cost
+from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 STEP = 6e-6
 INPUT_STEP = 1e-5
+# Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
+CORNERING = 4.0
+# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
+MARGIN = 3.0
+SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
+# Outputs in which the slow manifold has its nonlinear terms.
+SLIP_OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in WHEELS))
+
+
+def no_steered_vehicle(model: Model) -> str:
+    """Why a model is no vehicle whose inputs are the steering and its derivatives."""
+    if len(getattr(model, "planar", ())) != 3:
+        return f"{model.name} is no vehicle with a place and a heading on the road"
+    missing = [name for name in SLIP_OUTPUTS if name not in model.outputs]
+    if missing:
+        return f"{model.name} has no output {', '.join(missing)}"
+    first, *others = model.inputs
+    if others != [f"{first}_dot", f"{first}_ddot"][: len(others)]:
+        return f"the inputs of {model.name} are not a steering and its derivatives"
+    return ""
 
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Derivatives of shape, motion (psi', U, V) and outputs at straight running.
+    """Derivatives of the shape's rate, of motion (psi', U, V) and of outputs at straight running.
 
-    Attributes
-    ----------
-    a, b
-        Of the rate of the shape (n, n) and (n, inputs).
-    motion_a, motion_b
-        Of (psi', U, V): (3, n), (3, inputs).
-    output_a, output_b
-        Of the outputs.
+    By the shape (rows, n) and by the inputs (rows, inputs).
     """
 
     a: np.ndarray
@@ -48,13 +64,7 @@ class Linearisation:
 
 @dataclass(frozen=True, eq=False)
 class VehicleShape:
-    """Shape coordinates of one vehicle model.
-
-    Attributes
-    ----------
-    model
-        With positions on the road and a heading.
-    """
+    """Shape coordinates of one vehicle model."""
 
     model: DynamicModel
 
@@ -158,15 +168,7 @@ def turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray)
 
 
 class ShapeSamples(NamedTuple):
-    """Samples of all runs, one after the other.
-
-    Attributes
-    ----------
-    inputs, deviations
-        Inputs (samples, inputs), deviations of the shape from straight running (samples, n).
-    rates, motion
-        Rates of the shape (samples, n), and psi', U, V (samples, 3), by the full equations.
-    """
+    """Samples of all runs: deviations of the shape from straight running, its rates; psi', U, V."""
 
     inputs: np.ndarray
     deviations: np.ndarray
@@ -179,3 +181,8 @@ def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSampl
     inputs = np.concatenate([run.inputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])
     return ShapeSamples(inputs, shapes - shape.reference, *shape.motion(shapes, inputs))
+
+
+def linearisation_cost(shape: VehicleShape, began: float) -> Offline:
+    """Seconds since `began`; two evaluations for every state and input."""
+    return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.features import Features, monomials
+from vehiclemor.reduction.vehicle.features import Features, held, monomials
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
-from vehiclemor.reduction.vehicle.regression import largest
+from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 
@@ -24,20 +24,13 @@ MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of 
 AFTER_LANDING = 0.3
 # And how much of it, in parts of what samples show, a car may have that is steered.
 STEERED = 1.2
+# Nonlinear terms that the lifting keeps: those that explain most of all states and outputs, each in
+# parts of its range.  With all it follows the training runs more closely, and others less.
+LIFTED = 8
 
 
 class Ranges(NamedTuple):
-    """Largest magnitudes in training runs.
-
-    Attributes
-    ----------
-    arguments
-        Of the arguments of the nonlinear terms (5,).
-    states, inputs
-        Of the slow coordinates (k,) and the inputs.
-    speed
-        Of the change of speed in m/s.
-    """
+    """Largest magnitudes in training runs: of the nonlinear terms' arguments (5,) and the rest."""
 
     arguments: np.ndarray
     states: np.ndarray
@@ -50,8 +43,7 @@ class FeatureTable:
     """Features with the numbers of those that are odd and even in the lateral quantities.
 
     The first odd ones, `linear_count` of them, are lateral coordinates and the inputs, the first
-    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.  Of `hull`
-    and `trusted` see the settings of the slow manifold.
+    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.
     """
 
     features: Features
@@ -61,8 +53,6 @@ class FeatureTable:
     linear_count: int
     straight_count: int
     ranges: Ranges
-    hull: float
-    trusted: float
 
     def set_linear(self, c: np.ndarray, shape: VehicleShape, modes: SlowModes) -> None:
         """Write what is exact at straight running into coefficients (terms, states + 3)."""
@@ -112,33 +102,14 @@ class FeatureTable:
 def ranges_of(
     shape: VehicleShape, modes: SlowModes, deviations: np.ndarray, u: np.ndarray
 ) -> Ranges:
-    """Ranges of deviations of the shape (samples, n) of one car, at inputs (samples, inputs)."""
-    z, speed = modes.coordinates(deviations, u)
-    values = arguments_of(shape, modes, deviations, u)
-    return Ranges(largest(values), largest(z), largest(u), float(largest(speed[:, None])[0]))
-
-
-def arguments_of(
-    shape: VehicleShape, modes: SlowModes, deviations: np.ndarray, u: np.ndarray
-) -> np.ndarray:
-    """Arguments (samples, 5) of the nonlinear terms, of deviations and inputs alike."""
+    """Ranges of deviations of the shape (samples, n) at inputs (samples, inputs)."""
     z, speed = modes.coordinates(deviations, u)
     k, rows = modes.lateral, _variables(shape, modes)
     # The axles' slips go as one over the speed where they come from motion, not from steering.
     at_speed = shape.speed / (shape.speed + speed)
     values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
     values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    return values
-
-
-def feature_parameters(
-    shape: VehicleShape, modes: SlowModes, ranges: Ranges, hull: float, trusted: float
-) -> np.ndarray:
-    """Parameters in the text of the features; the last one tells how far lateral ones may go."""
-    rows = _variables(shape, modes) * (1.0 / (hull * ranges.arguments))[:, None]
-    own = [1.0 / ranges.states, 1.0 / ranges.inputs]
-    last = [shape.speed, 1.0 / (hull * ranges.speed), hull / trusted]
-    return np.concatenate([rows.ravel(), *own, last])
+    return Ranges(largest(values), largest(z), largest(u), float(largest(speed[:, None])[0]))
 
 
 def feature_table(
@@ -150,12 +121,11 @@ def feature_table(
 ) -> FeatureTable:
     """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
     k, n, inputs = modes.lateral, len(ranges.states), len(ranges.inputs)
-    parameters = feature_parameters(shape, modes, ranges, hull, trusted)
+    rows = _variables(shape, modes) * (1.0 / (hull * ranges.arguments))[:, None]
+    # The last one tells how far lateral arguments may go.
+    ends = [shape.speed, 1.0 / (hull * ranges.speed), hull / trusted]
+    parameters = np.concatenate([rows.ravel(), 1.0 / ranges.states, 1.0 / ranges.inputs, ends])
     width = k + 2
-
-    def held(text: str) -> str:
-        # In [-1, 1]: nothing is known of what lies beyond the training runs.
-        return f"0.5 * (abs({text} + 1.0) - abs({text} - 1.0))"
 
     last = len(VARIABLES) * width + n + inputs
     lines = [("part", f"p[{last}] / (p[{last}] + z{n})"), ("raw", f"p[{last + 1}] * z{n}")]
@@ -198,8 +168,33 @@ def feature_table(
     terms = (*odd, *even)
     features = Features(n + 1, inputs, tuple(lines), terms, groups, tuple(watched), len(MEANINGS))
     counts = k + inputs, 2 + n - k
-    known = *counts, ranges, hull, trusted
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), *known)
+    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
+
+
+def fitted_lifting(
+    shape: VehicleShape,
+    table: FeatureTable,
+    columns: np.ndarray,
+    deviations: np.ndarray,
+    ridge: float,
+) -> tuple[np.ndarray, Features]:
+    """Coefficients (terms, n) of the shape's deviations from straight running, and their features.
+
+    Parameters
+    ----------
+    columns, deviations
+        Features of the table (samples, terms), and deviations (samples, n) that they fit.
+    """
+    features, count = table.features, len(table.features.terms)
+    given = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
+    order = [*given, *np.setdiff1d(np.arange(count), given).tolist()]
+    outputs = deviations @ shape.linearised.output_a.T
+    values = np.hstack([part / largest(part) for part in (deviations, outputs)])
+    chosen = forward_selection(columns[:, order], values, len(given), LIFTED)
+    kept = sorted(order[i] for i in chosen)
+    terms = tuple(features.terms[i] for i in kept)
+    lifted = replace(features, terms=terms, groups=())
+    return ridge_fit(columns[:, kept], deviations, ridge), lifted
 
 
 def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:

@@ -28,12 +28,10 @@ class SlowModes:
     ----------
     lateral
         How many coordinates steering moves.
-    rates
-        Matrix (k, k), blocks of two for conjugate pairs.
+    rates, drive
+        Of z' the matrix (k, k), blocks of two for conjugate pairs, and the steering's column (k,).
     left, right
         z = left d (k, n), and d = right z for slow motion (n, k).
-    drive
-        Coefficient (k,) of the steering in z'.
     feedthrough
         What of the inputs (k, inputs) is subtracted, so that z' has no derivative of the steering.
     follow
@@ -65,17 +63,10 @@ class SlowModes:
         )
 
 
-def slow_modes(
-    shape: VehicleShape, fastest: float, symmetric: int = 0, lateral: int | None = None
-) -> SlowModes:
+def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
     """Slow modes with |lambda| up to `fastest` (1/s), and so many symmetric ones (or pairs).
 
     The inputs are the steering and its derivatives, as many as the model has.
-
-    Parameters
-    ----------
-    lateral
-        How many modes that steering moves are kept at most, a pair counting twice; all by default.
     """
     linear = shape.linearised
     values, vectors = np.linalg.eig(linear.a.T)
@@ -88,8 +79,6 @@ def slow_modes(
     moving = np.abs(values) >= STILL
     moving[still] = False
     wanted = steers & moving & (np.abs(values) <= fastest)
-    order = np.flatnonzero(wanted)[np.argsort(np.abs(values[wanted]))]
-    wanted[order[len(order) if lateral is None else lateral :]] = False
     w, v = real_modes(values, left, right, wanted)
     count = len(w)
     quiet = np.flatnonzero(
@@ -124,19 +113,10 @@ def slow_modes(
 def real_modes(
     values: np.ndarray, left: np.ndarray, right: np.ndarray, chosen: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Modes in real form, slow ones first; blocks of two for conjugate pairs.
+    """Coordinates per state (k, n) and back (n, k) of modes in real form, slow ones first.
 
-    Parameters
-    ----------
-    values, left, right
-        Eigenvalues (n,) in 1/s, left eigenvectors by rows, and the inverse of that matrix.
-    chosen
-        Which modes (n,) are wanted, of a conjugate pair both or the upper one.
-
-    Returns
-    -------
-    tuple of numpy.ndarray
-        Coordinates per state (k, n) and back (n, k).
+    Left eigenvectors stand by rows, `right` is the inverse of that matrix.  Of a conjugate pair
+    both modes or the upper one are chosen; it has a block of two.
     """
     rows, columns = [], []
     upper = np.flatnonzero(chosen & (np.imag(values) >= 0.0))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.vehicle.features import Features, monomials
+from vehiclemor.reduction.vehicle.features import Features, held, monomials
 
 # Reduced coordinates: lateral speed, yaw rate, roll angle, roll rate, deviation of the speed.
 STATES = 5
@@ -83,15 +83,8 @@ def argument_values(speed: float, z: np.ndarray, u: np.ndarray) -> np.ndarray:
 def arguments(speed: float, reach: np.ndarray, reversal: float) -> Text:
     """Lines of the arguments in [-1, 1], `raw` where they are not held.
 
-    Parameters
-    ----------
-    speed
-        Of straight running in m/s.
-    reach
-        Of each of `argument_values`: how far it may go.
-    reversal
-        How far the product of the steering and its rate may go: where much steering is taken back
-        fast, loads lag behind.
+    Each of `argument_values` may go as far as `reach`, the product of the steering and its rate as
+    far as `reversal`: where much steering is taken back fast, loads lag behind.
     """
     text = Text()
     text.let("part", f"1.0 / ({text.parameter(speed)} + z{SPEED})")
@@ -107,11 +100,6 @@ def arguments(speed: float, reach: np.ndarray, reversal: float) -> Text:
     return text
 
 
-def held(name: str) -> str:
-    """A value held in [-1, 1]."""
-    return f"0.5 * (abs({name} + 1.0) - abs({name} - 1.0))"
-
-
 @dataclass(frozen=True)
 class Tire:
     """A wheel's tire: parameters, static load in N, and how far it may saturate."""
@@ -124,12 +112,8 @@ class Tire:
 def fiala(text: Text, wheel: str, slip: str, load: str, tire: Tire) -> None:
     """Lines of a wheel: `F` lateral force, `M` aligning moment, `G` its part that still sticks.
 
-    Forces as parts of the static load, moments as parts of it times the width.
-
-    Parameters
-    ----------
-    slip, load
-        Names of the tangent of the slip angle and of the load in N.
+    Forces as parts of the static load, moments as parts of it times the width, from the lines of
+    the tangent of the slip angle and of the load in N.
     """
     p, parameter, let = tire.parameters, text.parameter, text.let
     fall = parameter(p["largest_friction"] - p["smallest_friction"])

@@ -123,15 +123,9 @@ def known_starts(remainders: np.ndarray, left: np.ndarray) -> dict[str, np.ndarr
     return {"starts": directions, "begun": np.abs(scaled @ directions.T).max(axis=0)}
 
 
+NONE = np.zeros(0)
 NOTHING_KNOWN = TrainingReach(
-    np.zeros((0, LEVELS)),
-    MOVING,
-    np.zeros(0),
-    0.0,
-    np.zeros(0),
-    np.zeros(0),
-    np.zeros((0, 0)),
-    np.zeros(0),
+    np.zeros((0, LEVELS)), MOVING, NONE, 0.0, NONE, NONE, np.zeros((0, 0)), NONE
 )
 
 

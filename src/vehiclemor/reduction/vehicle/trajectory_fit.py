@@ -14,13 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.codegen.loops import loops
 from vehiclemor.reduction.training import Training, TrainingRun
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.features import PLANAR
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.regression import unit_diagonal
+from vehiclemor.reduction.vehicle.regression import surviving, unit_diagonal
 from vehiclemor.reduction.vehicle.sensitivity_loops import AlongRun
+from vehiclemor.reduction.vehicle.slow_features import FeatureTable
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
@@ -34,7 +34,6 @@ DIFFERENCE = 1e-6
 LOOPS = ("simulation.integrators.dense_solves", "reduction.vehicle.sensitivity_loops")
 # Least sum of squares that a weight is made of.
 NOTHING = 1e-12
-GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
 # (numbers of features, column) of the coefficients that may change.
@@ -43,16 +42,9 @@ Free = Sequence[tuple[Sequence[int], int]]
 
 @dataclass(frozen=True)
 class Target:
-    """One training run as a reduced run should be.
+    """One training run in reduced states (samples, states + 3), as a reduced run should be.
 
-    Attributes
-    ----------
-    times, inputs
-        Output times (samples,) in s, and inputs (samples, inputs) then.
-    states
-        Reduced states (samples, states + 3): coordinates, heading, place.
-    steps
-        Numbers of the output times that the variational equations step on.
+    `steps` are numbers of the output times that the variational equations step on.
     """
 
     run: TrainingRun
@@ -124,20 +116,37 @@ def improved(
     return moved
 
 
-def spread(goals: Sequence[Target], share: float) -> list[Target]:
-    """A share of the goals, spread without a period: multiples of the golden ratio."""
-    return [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
-
-
 def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
     """Whether all reduced training runs come to their end."""
     return bool(np.isfinite(_compared(reduced, goals)[1]))
 
 
-def normal_matrix(reduced: ReducedVehicle, goals: Sequence[Target], free: Free) -> np.ndarray:
-    """Normal matrix of the free coefficients, column by column; all runs must finish."""
+def pruned(
+    reduced: ReducedVehicle, table: FeatureTable, goals: Sequence[Target], kept: int
+) -> tuple[ReducedVehicle, FeatureTable]:
+    """A reduced vehicle of `kept` nonlinear terms; the lifting keeps its own.
+
+    Its coefficients are best near the goals, all of which it must finish.
+    """
     paths, _ = _compared(reduced, goals)
-    return normal_equations(reduced, goals, paths, free)[0]
+    normal, _ = normal_equations(reduced, goals, paths, table.free)
+    c = reduced.coefficients.copy()
+    rows, columns = np.array([(i, column) for terms, column in table.free for i in terms]).T
+    nonlinear = sorted([*table.odd_nonlinear, *table.even_nonlinear])
+    groups = [np.flatnonzero(rows == i).tolist() for i in nonlinear]
+    left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
+    linear = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
+    stay = sorted([*linear, *(nonlinear[i] for i in left)])
+    fewer = table.with_only(stay)
+    return (
+        replace(
+            reduced,
+            features=fewer.features,
+            coefficients=c[stay],
+            lifted_features=reduced.lifted_features or reduced.features,
+        ),
+        fewer,
+    )
 
 
 def changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
@@ -228,11 +237,7 @@ def _sensitivities(
     scratch = np.empty((2 * dim + PLANAR) * m + 3 * k * k)
     run = AlongRun(times, columns[:samples], slopes, motion)
     pivots = np.empty(k, dtype=np.int64)
-    if not _loop()(run, terms, targets, COMPARED, weights, result, scratch, pivots):
+    loop = loops(LOOPS, ("sensitivities",))["sensitivities"]
+    if not loop(run, terms, targets, COMPARED, weights, result, scratch, pivots):
         raise np.linalg.LinAlgError("a step of the variational equations is singular")
     return result
-
-
-def _loop() -> Loop:
-    name = "sensitivities"
-    return loops(LOOPS, (name,))[name]

@@ -15,7 +15,7 @@ from vehiclemor.reduction.methods.guarded import METHOD, GuardedModel
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.trajectory import Trajectory, Trust
+from vehiclemor.simulation.trajectory import Trust
 
 TOLERANCE = 1e-8
 STEER = component("maneuver", "step_steer")
@@ -31,7 +31,7 @@ class LeavesAt:
     offline: Offline = field(default_factory=Offline)
     effective_rank: int = 0
 
-    def simulate(self, *_: object) -> Trajectory:
+    def simulate(self, *_):
         full = whole()
         late = full.time >= self.until
         wrong = {
@@ -43,7 +43,7 @@ class LeavesAt:
 
 
 @cache
-def whole() -> Trajectory:
+def whole():
     return model().simulate(STEER, "dropped", tolerance=TOLERANCE)
 
 
@@ -51,7 +51,7 @@ def model():
     return build("independent_suspension_vehicle")
 
 
-def guarded(fast) -> GuardedModel:
+def guarded(fast):
     safe = FullOrderModel(model(), "dopri5", TOLERANCE)
     return GuardedModel(fast, safe, Offline(), "", 0.0)
 

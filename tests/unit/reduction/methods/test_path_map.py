@@ -7,31 +7,28 @@ import pytest
 
 from tests.reducing import fitted
 from vehiclemor.errors import InputError
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.registry import component
-from vehiclemor.simulation.algebraic import AlgebraicModel
 
 START = "equilibrium"
 
 
-def mapped(model: AlgebraicModel, maneuver: Maneuver, **settings: object) -> PathMapModel:
+def mapped(model, maneuver, **settings):
     return fitted(model, maneuver, "path_map", **settings)
 
 
-def travelling(signal, maneuver: Maneuver) -> Maneuver:
+def travelling(signal, maneuver):
     """The maneuver with another travel: times (s) -> travel (m) and rack (m)."""
     return replace(maneuver, signal=lambda t, *_: np.column_stack(signal(t)))
 
 
 @pytest.fixture(scope="module")
-def both() -> Maneuver:
+def both():
     """Travel and rack over a rectangle of 0.12 m and 0.036 m to both sides."""
     return component("maneuver", "travel_and_rack").perturbed(1.0, 1.2)
 
 
 @pytest.fixture(scope="module")
-def unseen() -> list[Maneuver]:
+def unseen():
     factors = {"": (1.7, -1.15), "_sweep": (1.3, 1.1), "_multisine": (0.8, -1.0)}
     return [
         component("maneuver", f"travel_and_rack{name}").perturbed(*pair)
@@ -39,7 +36,7 @@ def unseen() -> list[Maneuver]:
     ]
 
 
-def largest_error(model: AlgebraicModel, reduced: PathMapModel, maneuver: Maneuver) -> float:
+def largest_error(model, reduced, maneuver):
     run, full = reduced.simulate(maneuver, START), model.simulate(maneuver)
     assert run.status == "ok"
     pairs = ((run.coordinates, full.coordinates), (run.outputs, full.outputs))
@@ -48,8 +45,8 @@ def largest_error(model: AlgebraicModel, reduced: PathMapModel, maneuver: Maneuv
 
 @pytest.mark.parametrize("moving", ["both", "travel"])
 def test_error_on_unseen_inputs_falls_geometrically_with_the_degree(
-    model: AlgebraicModel, nominal: Maneuver, both: Maneuver, unseen: list[Maneuver], moving: str
-) -> None:
+    model, nominal, both, unseen, moving
+):
     if moving == "travel":
         both, unseen = nominal.perturbed(1.0, 1.2), [nominal.perturbed(0.7, -1.1)]
     maps = [mapped(model, both, cells=2, degree=degree) for degree in (3, 5, 7, 9)]
@@ -60,9 +57,7 @@ def test_error_on_unseen_inputs_falls_geometrically_with_the_degree(
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
-def test_error_falls_with_the_cells_at_the_order_of_the_polynomials(
-    model: AlgebraicModel, both: Maneuver, unseen: list[Maneuver], degree: int
-) -> None:
+def test_error_falls_with_the_cells_at_the_order_of_the_polynomials(model, both, unseen, degree):
     coarse, fine = (
         max(largest_error(model, mapped(model, both, cells=n, degree=degree), m) for m in unseen)
         for n in (8, 16)
@@ -70,23 +65,7 @@ def test_error_falls_with_the_cells_at_the_order_of_the_polynomials(
     assert np.log2(coarse / fine) == pytest.approx(degree + 1, abs=0.8)
 
 
-def test_interpolates_the_equations_at_the_nodes_to_rounding(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
-    reduced = mapped(model, nominal, cells=1, degree=14)
-    # Half a per cent of the range is added at either end.
-    nodes = 0.101 * np.cos(np.pi * (np.arange(15) + 0.5) / 15)
-    at_nodes = replace(travelling(lambda t: (nodes, 0.0 * t), nominal), samples=15)
-    run = reduced.simulate(at_nodes, START)
-    expected = np.array([model.solve([height, 0.0]) for height in nodes])
-    np.testing.assert_allclose(run.coordinates, expected, rtol=0, atol=1e-13)
-    exact = model.outputs_at(expected, run.inputs)
-    np.testing.assert_allclose(run.outputs, exact, rtol=0, atol=1e-13)
-
-
-def test_edges_and_corners_of_all_cells_are_as_exact_as_their_insides(
-    model: AlgebraicModel, both: Maneuver
-) -> None:
+def test_edges_and_corners_of_all_cells_are_as_exact_as_their_insides(model, both):
     reduced = mapped(model, both, cells=3, degree=8)
     lines = [np.linspace(low, high, 7) for low, high in reduced.ranges]
     grid = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, 2)
@@ -94,7 +73,7 @@ def test_edges_and_corners_of_all_cells_are_as_exact_as_their_insides(
     assert largest_error(model, reduced, edges) < 1e-8
 
 
-def test_coordinates_depend_on_the_inputs_alone(model: AlgebraicModel, both: Maneuver) -> None:
+def test_coordinates_depend_on_the_inputs_alone(model, both):
     reduced = mapped(model, both)
     rng = np.random.default_rng(5)
     values = rng.uniform(-1.0, 1.0, (both.samples, 2)) * [0.12, 0.036]
@@ -110,16 +89,12 @@ def test_coordinates_depend_on_the_inputs_alone(model: AlgebraicModel, both: Man
 
 
 @pytest.mark.parametrize("samples", [1, 2, 63, 1000])
-def test_every_number_of_samples_is_computed(
-    model: AlgebraicModel, both: Maneuver, samples: int
-) -> None:
+def test_every_number_of_samples_is_computed(model, both, samples):
     short = replace(both, duration=2.0, samples=samples)
     assert largest_error(model, mapped(model, both), short) < 1e-6
 
 
-def test_an_input_that_rests_costs_nothing(
-    model: AlgebraicModel, nominal: Maneuver, both: Maneuver
-) -> None:
+def test_an_input_that_rests_costs_nothing(model, nominal, both):
     aside = travelling(lambda t: (0.08 * np.sin(t) + 0.02, np.full(len(t), 0.03)), nominal)
     steered = travelling(lambda t: (np.full(len(t), -0.05), 0.04 * np.sin(t)), nominal)
     for maneuver in (nominal, aside, steered):
@@ -132,10 +107,8 @@ def test_an_input_that_rests_costs_nothing(
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("column", [0, 1])
-def test_leaving_the_training_is_said_with_time_and_place(
-    model: AlgebraicModel, both: Maneuver, sign: float, column: int
-) -> None:
-    def leaving(times: np.ndarray, *_: float) -> np.ndarray:
+def test_leaving_the_training_is_said_with_time_and_place(model, both, sign, column):
+    def leaving(times, *_):
         inputs = np.zeros((len(times), 2))
         inputs[:, column] = sign * [0.15, 0.045][column] * np.sin(0.1 * np.pi * times)
         return inputs
@@ -163,9 +136,7 @@ def test_leaving_the_training_is_said_with_time_and_place(
     assert np.isnan(stopped.outputs[first:]).all()
 
 
-def test_the_edge_of_training_is_known_and_beyond_it_nothing(
-    model: AlgebraicModel, nominal: Maneuver
-) -> None:
+def test_the_edge_of_training_is_known_and_beyond_it_nothing(model, nominal):
     reduced = mapped(model, nominal)
     run = reduced.simulate(nominal, START)
     assert run.trust.indicator == pytest.approx(1.0 / 1.01, abs=1e-5)
@@ -181,7 +152,7 @@ def test_the_edge_of_training_is_known_and_beyond_it_nothing(
     assert moved.trust.until == 5.0
 
 
-def test_wrong_training_and_inputs_are_refused(model: AlgebraicModel, nominal: Maneuver) -> None:
+def test_wrong_training_and_inputs_are_refused(model, nominal):
     # Either is within reach; both together are not.
     corner = travelling(lambda t: (-0.18 * (t < 5.0), 0.08 * (t >= 5.0)), nominal)
     for maneuver, given, words in (

@@ -5,12 +5,15 @@ from functools import cache
 import numpy as np
 import pytest
 
+import vehiclemor as vm
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.methods import two_track
+from vehiclemor.reduction.methods.two_track import mirror
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle import tire_features as tf
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
+from vehiclemor.reduction.vehicle.features import feature_columns
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario, start_of, training_run
@@ -96,3 +99,18 @@ def test_it_tells_when_its_tires_slide():
 def test_a_vehicle_with_other_tires_is_refused():
     reason = two_track.refusal(build("independent_suspension_vehicle"))
     assert "cornering_stiffness" in reason
+
+
+VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
+
+
+@pytest.fixture(scope="module", params=VEHICLES)
+def shape(request):
+    return VehicleShape(vm.model(request.param))
+
+
+def test_the_mirror_image_of_a_vehicle_is_the_vehicle(shape):
+    image, linear = mirror(shape), shape.linearised
+    np.testing.assert_array_equal(image @ image, np.eye(len(image)))
+    np.testing.assert_allclose(image @ linear.a @ image, linear.a, atol=1e-9 * abs(linear.a).max())
+    np.testing.assert_allclose(image @ linear.b, -linear.b, atol=1e-9 * abs(linear.b).max())

@@ -1,14 +1,16 @@
-"""POD bases are orthonormal, best, and independent of how their columns are signed."""
+"""POD bases are orthonormal, best, of fixed signs; control periods cover a run exactly once."""
+
+import itertools
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.projection.bases import pod_basis, project
+from vehiclemor.reduction.projection.bases import first_samples, pod_basis, project, window_edges
 
 
-def snapshots_of(seed: int, n: int = 8, m: int = 12, decay: float = 0.3) -> np.ndarray:
+def snapshots_of(seed, n=8, m=12, decay=0.3):
     """Snapshots (n, m) with a mean and decreasing singular values."""
     rng = np.random.default_rng(seed)
     left, right = (np.linalg.qr(rng.standard_normal((k, min(n, m))))[0] for k in (n, m))
@@ -16,9 +18,7 @@ def snapshots_of(seed: int, n: int = 8, m: int = 12, decay: float = 0.3) -> np.n
 
 
 @given(seed=st.integers(0, 10**6), n=st.integers(2, 10), m=st.integers(2, 14), data=st.data())
-def test_basis_is_orthonormal_and_projection_idempotent(
-    seed: int, n: int, m: int, data: st.DataObject
-) -> None:
+def test_basis_is_orthonormal_and_projection_idempotent(seed, n, m, data):
     rank = data.draw(st.integers(1, min(n, m)))
     basis = pod_basis(snapshots_of(seed, n, m), rank)
     assert basis.rank == rank
@@ -32,25 +32,15 @@ def test_basis_is_orthonormal_and_projection_idempotent(
 
 
 @given(seed=st.integers(0, 10**6), rank=st.integers(1, 8))
-def test_error_of_the_snapshots_is_the_tail_of_the_singular_values(seed: int, rank: int) -> None:
+def test_error_of_the_snapshots_is_the_tail_of_the_singular_values(seed, rank):
     snapshots = snapshots_of(seed)
     basis = pod_basis(snapshots, rank)
     error = np.sum((project(snapshots.T, basis).T - snapshots) ** 2)
     assert error == pytest.approx(np.sum(basis.singular_values[rank:] ** 2), rel=1e-9, abs=1e-28)
 
 
-def test_mean_and_singular_values_are_those_of_the_snapshots() -> None:
-    snapshots = snapshots_of(3)
-    basis = pod_basis(snapshots, 4)
-    assert basis.mean == pytest.approx(snapshots.mean(axis=1), abs=1e-15)
-    centred = snapshots - snapshots.mean(axis=1, keepdims=True)
-    eigenvalues = np.linalg.eigvalsh(centred @ centred.T)[::-1]
-    assert basis.singular_values**2 == pytest.approx(np.maximum(eigenvalues, 0.0), abs=1e-14)
-    assert np.all(np.diff(basis.singular_values) <= 0.0)
-
-
 @given(seed=st.integers(0, 10**6))
-def test_signs_of_the_columns_are_fixed(seed: int) -> None:
+def test_signs_of_the_columns_are_fixed(seed):
     snapshots = snapshots_of(seed)
     vectors = pod_basis(snapshots, 5).vectors
     largest = np.abs(vectors).argmax(axis=0)
@@ -62,7 +52,7 @@ def test_signs_of_the_columns_are_fixed(seed: int) -> None:
 @pytest.mark.parametrize(
     ("tolerance", "kept"), [(0.0, 6), (1e-8, 6), (2e-3, 3), (0.05, 2), (0.5, 1)]
 )
-def test_rank_tolerance_drops_small_modes(tolerance: float, kept: int) -> None:
+def test_rank_tolerance_drops_small_modes(tolerance, kept):
     rng = np.random.default_rng(0)
     left, right = (np.linalg.qr(rng.standard_normal((k, 6)))[0] for k in (8, 12))
     right -= right.mean(axis=0)
@@ -75,8 +65,50 @@ def test_rank_tolerance_drops_small_modes(tolerance: float, kept: int) -> None:
     assert pod_basis(1e-3 * snapshots, 6, tolerance).rank == kept
 
 
-def test_snapshots_that_do_not_move_have_no_mode_above_a_tolerance() -> None:
+def test_snapshots_that_do_not_move_have_no_mode_above_a_tolerance():
     snapshots = np.outer(np.arange(1.0, 9.0), np.ones(10))
     basis = pod_basis(snapshots, 3, 1e-10)
     assert basis.rank == 0
     assert project(np.ones((2, 8)), basis) == pytest.approx(np.tile(basis.mean, (2, 1)))
+
+
+durations = st.floats(0.01, 1000.0)
+shares = st.floats(0.002, 3.0)
+
+
+@given(duration=durations, share=shares)
+def test_edges_cover_the_run(duration, share):
+    period = share * duration
+    edges = window_edges(duration, period)
+    assert (edges[0], edges[-1]) == (0.0, duration)
+    widths = np.diff(edges)
+    assert widths[:-1] == pytest.approx(np.full(len(edges) - 2, period), rel=1e-9)
+    # It is shorter where the period does not divide the run.
+    assert 0.0 < widths[-1] <= period * (1 + 1e-6)
+
+
+@given(duration=durations, share=shares, samples=st.integers(2, 400))
+def test_every_sample_is_in_exactly_one_window(duration, share, samples):
+    times, edges = np.linspace(0.0, duration, samples), window_edges(duration, share * duration)
+    first = first_samples(times, edges)
+    assert len(first) == len(edges)
+    covered = [i for a, b in itertools.pairwise(first) for i in range(a, b)]
+    assert covered == list(range(samples))
+    slack = 1e-8 * duration
+    for k, (a, b) in enumerate(itertools.pairwise(first)):
+        inside = times[a:b]
+        assert np.all(inside >= edges[k] - slack)
+        if k < len(edges) - 2:
+            assert np.all(inside < edges[k + 1])
+
+
+@given(windows=st.integers(1, 60), per_window=st.integers(1, 40))
+def test_period_that_divides_the_run_gives_equal_windows(windows, per_window):
+    # Not representable in binary, so that edges and times are rounded each in its own way.
+    period = 0.1
+    edges = window_edges(period * windows, period)
+    assert len(edges) == windows + 1
+    first = first_samples(np.linspace(0.0, period * windows, windows * per_window + 1), edges)
+    counts = np.diff(first)
+    assert list(counts[:-1]) == [per_window] * (windows - 1)
+    assert counts[-1] == per_window + 1

@@ -7,7 +7,7 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.projection.restarted import RestartedProjection
+from vehiclemor.reduction.projection.dynamic import RestartedProjection
 from vehiclemor.registry import component
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
@@ -27,7 +27,7 @@ def maneuver():
     )
 
 
-def errors(car, maneuver, restart: str, **settings: object) -> np.ndarray:
+def errors(car, maneuver, restart, **settings):
     """Distances (samples,) of the place and heading from the full model's, in their scales."""
     rom = vm.reduce(car, "pod", restart=restart, **settings)
     run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)

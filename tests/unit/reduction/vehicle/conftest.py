@@ -6,12 +6,11 @@ from tests.reducing import CARS
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
-from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.build import build
 
 
 @pytest.fixture(scope="package", params=CARS)
-def reduced(request: pytest.FixtureRequest) -> ReducedVehicle:
+def reduced(request):
     """Slow manifold of lane changes from both starts, without sweeps."""
     model, maneuver = build(request.param), CARS[request.param]
     factors = (1.0, 1.0), (1.3, -0.7), (0.8, 1.2)

@@ -7,13 +7,12 @@ import pytest
 
 from tests.reducing import CARS
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.vehicle.feature_system import feature_columns
-from vehiclemor.reduction.vehicle.reduced_vehicle import KnownStart, ReducedVehicle
+from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN
 from vehiclemor.simulation.build import build
 
 
-def lifted(reduced: ReducedVehicle, maneuver, start: str) -> np.ndarray:
+def lifted(reduced, maneuver, start):
     """States (samples, 2 n) by the formulas, in NumPy."""
     path = reduced.path(maneuver, start)
     k, shape, decay = reduced.features.states, reduced.shape, reduced.transient
@@ -84,12 +83,12 @@ def test_a_run_tells_how_far_it_has_gone(reduced):
     assert run.message.startswith(f"from t = {run.trust.until:.4g} s on ")
 
 
-def known(reduced: ReducedVehicle, start) -> KnownStart:
+def known(reduced, start):
     """What is known of a start without steering."""
     return reduced.known(start, np.zeros(len(reduced.model.inputs)))
 
 
-def at_speed(reduced: ReducedVehicle, start: str, speed: float) -> np.ndarray:
+def at_speed(reduced, start, speed):
     """State (2 n,) of a start at another speed."""
     return build(reduced.model.name, overrides={"initial_speed": speed}).start(start)
 
@@ -126,17 +125,3 @@ def test_what_was_run_before_leaves_no_trace(reduced):
     np.testing.assert_array_equal(reduced.simulate(maneuver, state).states, apart[2])
     with pytest.raises(InputError, match="shape"):
         reduced.simulate(maneuver, state[None])
-
-
-def test_what_a_start_does_not_excite_is_not_missed(reduced):
-    """All modes with amplitudes of rounding, as if they were there, give the same states."""
-    maneuver, state = CARS[reduced.model.name], at_speed(reduced, "equilibrium", 19.3)
-    path, inputs = reduced.path(maneuver, state), maneuver.at(maneuver.times)
-    decay, shape = reduced.transient, reduced.shape
-    deviation = shape.of(state[None])[0] - shape.reference
-    found = np.array([decay.rates, decay.left @ deviation], dtype=complex)
-    every = np.stack([found.real, found.imag], axis=2)
-    assert every.shape[1] > 0
-    with_all, _ = reduced.lift.states(maneuver.times, path, inputs, every)
-    without, _ = reduced.lift.states(maneuver.times, path, inputs, known(reduced, state).excited)
-    np.testing.assert_allclose(without, with_all, rtol=1e-9, atol=1e-8)

@@ -9,8 +9,7 @@ from tests.unit.python_system import python_system
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.codegen.loops import Prepared, address_of_array
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.vehicle.feature_system import feature_system
-from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.features import Features, feature_system
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import System

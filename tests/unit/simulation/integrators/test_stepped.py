@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.inputs.steering import lane_change
-from vehiclemor.reduction.vehicle.feature_system import feature_system
-from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.features import Features, feature_system
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators import catalogue

@@ -12,7 +12,7 @@ from tests.texts.markdown import ROOT
 CARS = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
-def example(name: str) -> SimpleNamespace:
+def example(name):
     return SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / f"{name}.py")))
 
 
@@ -39,22 +39,6 @@ def test_one_driver_drives_the_full_and_the_reduced_car(cars):
     assert known < 1.0
 
 
-def test_the_other_lane_is_the_mirror_image(cars):
-    # Of all that the driver sees and the steering does, whatever the model.
-    change, speed = example("double_lane_change"), 20.0
-    start = cars[0].model.start()
-    left, _ = change.drive(cars[0], start, speed)
-    change.drive.__globals__["OFFSET"] *= -1.0
-    right, _ = change.drive(cars[0], start, speed)
-    _, y, yaw = (cars[0].output_names.index(name) for name in change.SEEN)
-    np.testing.assert_allclose(right[:, [y, yaw]], -left[:, [y, yaw]], atol=1e-6)
-
-
-def test_the_example_prints_what_it_has_found(capsys):
-    example("double_lane_change").main()
-    assert capsys.readouterr().out.count("apart by") == 10
-
-
 def test_a_coupling_has_order_two():
     coupled = example("steering_cosimulation")
     reduced = vm.rom(CARS[0])
@@ -67,3 +51,45 @@ def test_a_coupling_has_order_two():
     off = np.abs(coupled.drive(reduced, 0.01, 2.0) - fine).max(axis=0)
     assert off[y] < 5e-3
     assert off[-1] < 5e-4
+
+
+@pytest.fixture(scope="module")
+def control():
+    return SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "predictive_control.py")))
+
+
+@pytest.fixture(scope="module")
+def reduced(control):
+    return vm.rom(control.MODEL)
+
+
+def test_costs_fall_as_their_derivatives_say(control, reduced):
+    controller, rng = control.Controller(reduced), np.random.default_rng(5)
+    # Half a second before the obstacle, so that the way leads into it.
+    state = reduced.state()
+    state[reduced.states.index("X")] = control.OBSTACLE[0] - 15.0
+    steering, along = 0.02 * rng.normal(size=(2, control.HORIZON))
+    values, slopes = controller.costs(state, 0.01, steering)
+    assert (values[2 * control.HORIZON : 3 * control.HORIZON] > 0.0).any()
+    sides = [controller.costs(state, 0.01, steering + h * along)[0] for h in (1e-4, -1e-4)]
+    difference = (sides[0] - sides[1]) / 2e-4
+    np.testing.assert_allclose(slopes @ along, difference, rtol=1e-6, atol=1e-6)
+
+
+def test_the_car_goes_around_the_obstacle_and_comes_back(control, reduced):
+    full = vm.reduce(reduced.model, "full_order")
+    runs = [control.drive(control.Controller(reduced), car, 3.6) for car in (full, reduced)]
+    for run in runs:
+        assert control.clearance(run["place"]) > 0.98
+        assert np.abs(run["steering"]).max() < control.LIMIT
+        # Begun with the plan before, a few predictions do.
+        assert run["evaluations"].mean() < 6.0
+        x, y, yaw = run["place"].T
+        assert x[-1] > control.OBSTACLE[0] + 2.0 * control.CLEARANCE[0]
+        assert abs(y[-1]) < 1.0
+        assert abs(yaw[-1]) < 0.1
+    # Straight on, the car would hit it.
+    assert control.clearance(runs[0]["place"] * [1.0, 0.0, 0.0]) < 0.2
+    # The loop is closed over the full car, whose state the reduced one begins with.
+    apart = np.abs(runs[0]["place"] - runs[1]["place"]).max(axis=0)
+    assert (apart < [0.02, 0.02, 2e-3]).all()
