@@ -17,9 +17,7 @@ from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
 DRAWINGS: dict[str, Callable[..., Figure]] = {
-    "suspension schematic": schematics.figure_suspension,
-    "vehicle schematic": schematics.figure_vehicle,
-    "high-fidelity schematic": schematics.figure_high_fidelity,
+    "schematic": schematics.figure_schematic,
     "histories": runs.figure_histories,
     "paths": runs.figure_paths,
     "errors": errors.figure_errors,

@@ -9,14 +9,16 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from vehiclemor.report.figures.scales import places_of, tick_decades
+from vehiclemor.report.figures.scales import Places, places_of, tick_decades
 from vehiclemor.report.figures.theme import CROSS, Style, letter, panels
 from vehiclemor.report.labels import error_label, readable_unit, unit_of
 from vehiclemor.report.published import rms_numbers
-from vehiclemor.study.plans.study_file import FACTORS
 
 # Columns of maps, cells of a map with their number, and cells that a contour must enclose.
 COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
+# In % of the cells, those whose small errors the colours leave out; luminance of a colour on which
+# white has more contrast than black.
+LEAST, DARK = 2.0, 0.179
 
 
 def figure_map(
@@ -28,9 +30,10 @@ def figure_map(
 ) -> Figure:
     """Errors over two dimensions (across and upwards), a column for each method.
 
-    Of few cells each has its number, and colours leave the nominal input out, whose error is far
-    below all others; of many a white line is where the error is the published one.
+    Of few cells each has its number; of many a white line is where the error is the published one.
+    Colours leave out the least errors, as that of replay's training run, far below all others.
     """
+    errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
     errors = errors.transpose("output", "label", *reversed(axes))
     each = -(-len(methods) // COLUMNS)
     columns = -(-len(methods) // each)
@@ -38,70 +41,59 @@ def figure_map(
     figure, grid = panels(each * len(outputs), columns, size, sharex=True, sharey=True)
     across, up = (places_of(dataset, name).even() for name in axes)
     written = across.at.size * up.at.size <= WRITTEN
-    # Factors, though not their places, are 1 there.
-    one, other = (np.isclose(dataset[name], 1.0) for name in axes)
-    nominal = other[:, None] & one & (written and tuple(axes) == FACTORS)
-    spare: list[Axes] = []
     for row, output in enumerate(outputs):
         block = grid[row * each : (row + 1) * each]
         found = errors.sel(output=output, label=list(methods)).values
-        colored = found[:, ~nominal]
-        colored = colored[np.isfinite(colored) & (colored > 0.0)]
         # A map on which nothing differs from zero, or nothing has come to its end, is still one.
+        colored = found[np.isfinite(found) & (found > 0.0)]
         colored = colored if colored.size else np.array([1.0, 10.0])
         factor, unit = 1.0, unit_of(dataset, output)
         if written:
             factor, unit = readable_unit(float(np.median(colored)), unit)
-        limits = factor * float(colored.min()), factor * float(colored.max())
+        low, high = factor * np.percentile(colored, (LEAST, 100.0), method="nearest")
+        norm = LogNorm(low, high, clip=True)
         published = rms_numbers(str(dataset.attrs["model"])).get(output)
         for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
-            values = factor * found[number]
-            _draw_cells(axis, (across.at, up.at), values, LogNorm(*limits), written=written)
-            if published and not written and np.sum(values < published.value) >= ENCLOSED:
-                logarithms = np.log(np.maximum(values, limits[0]))
-                level: Style = {"levels": [np.log(published.value)], "linestyles": "solid"}
-                axis.contour(across.at, up.at, logarithms, colors="white", linewidths=1.2, **level)
+            _draw_cells(axis, across, up, factor * found[number], norm, written=written)
+            if published and not written and np.sum(found[number] < published.value) >= ENCLOSED:
+                lines: Style = {"levels": [np.log(published.value)], "linestyles": "solid"}
+                logarithms = np.log(np.maximum(found[number], low))
+                axis.contour(across.at, up.at, logarithms, colors="white", linewidths=1.2, **lines)
             axis.set_title(letter(row * len(methods) + number, text))
         bar = figure.colorbar(
             block[0, 0].collections[0],
             ax=block,
             label=error_label(dataset, "RMS error", output, unit),
-            extend="min" if nominal.any() else None,
+            extend="min" if factor * colored.min() < low else None,
         )
-        tick_decades(bar.ax.yaxis, *limits)
+        tick_decades(bar.ax.yaxis, low, high)
         for axis in block[:, 0]:
             up.tick(axis.yaxis)
-        spare += block.flat[len(methods) :].tolist()
     for axis in grid.flat if each > 1 else grid[-1]:
         across.tick(axis.xaxis)
         axis.tick_params(labelbottom=True)
     # They share the ticks of the others until these are set.
-    for axis in spare:
-        axis.remove()
+    for axis in grid.flat:
+        if not axis.collections:
+            axis.remove()
     return figure
 
 
 def _draw_cells(
-    axis: Axes,
-    places: tuple[np.ndarray, np.ndarray],
-    values: np.ndarray,
-    norm: LogNorm,
-    *,
-    written: bool,
+    axis: Axes, across: Places, up: Places, values: np.ndarray, norm: LogNorm, *, written: bool
 ) -> None:
     """Cells in colours, with their numbers if `written`; a run that has failed has a cross."""
-    cells = np.where(np.isfinite(values), np.maximum(values, norm.vmin or 0.0), np.nan)
+    failed = ~np.isfinite(values)
     style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
-    mesh = axis.pcolormesh(*places, cells, norm=norm, **style)
-    j, i = np.nonzero(~np.isfinite(values))
-    axis.plot(places[0][i], places[1][j], color="#D55E00", **CROSS)
+    cells = np.where(failed, np.nan, np.maximum(values, norm.vmin or 0.0))
+    mesh = axis.pcolormesh(across.at, up.at, cells, norm=norm, **style)
+    j, i = np.nonzero(failed)
+    axis.plot(across.at[i], up.at[j], color="#D55E00", **CROSS)
     axis.grid(visible=False)
-    for j, i in np.argwhere(np.isfinite(values)) if written else ():
-        # Black or white, whichever has more contrast.
-        lightness = luminance(mesh.get_cmap()(norm(cells[j, i]))[:3])
-        color = "white" if 1.05 / (lightness + 0.05) > (lightness + 0.05) / 0.05 else "black"
+    for j, i in np.argwhere(~failed) if written else ():
+        color = "white" if luminance(mesh.get_cmap()(norm(cells[j, i]))[:3]) < DARK else "black"
         text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
-        axis.text(float(places[0][i]), float(places[1][j]), two_digits(float(values[j, i])), **text)
+        axis.text(across.at[i], up.at[j], two_digits(float(values[j, i])), **text)
 
 
 def luminance(color: ArrayLike) -> float:

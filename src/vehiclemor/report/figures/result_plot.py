@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # At most so many outputs have panels.
-PANELS = 4
+PANELS = 3
 DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
     "histories": lambda dataset: figure_histories(
         {"": dataset}, outputs=shown_outputs(dataset), beside=True

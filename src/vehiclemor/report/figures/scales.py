@@ -12,10 +12,10 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, 
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 UNITS = {"control_period": "s"}
-# Ratio of the largest to the smallest number from which on an axis is logarithmic; names that there
-# is room for, or half of them where they are long; decades up to which an axis has 1, 2 and 5; what
-# is below is written with a power of ten.
-WIDE, MOST_NAMES, LONG, FEW_DECADES, SMALL = 30.0, 12, 6, 2.5, 1e-4
+# Ratio of the largest to the smallest number from which on an axis is logarithmic; letters of the
+# names that there is room for on an axis; decades up to which one has 1, 2 and 5; what is below is
+# written with a power of ten.
+WIDE, LETTERS, FEW_DECADES, SMALL = 30.0, 60, 2.5, 1e-4
 
 
 class Places(NamedTuple):
@@ -35,27 +35,22 @@ class Places(NamedTuple):
     label: str
     names: Sequence[str] = ()
 
-    @property
-    def wide(self) -> bool:
-        """Whether the numbers ask for a logarithmic axis."""
-        return bool(not self.names and 0.0 < WIDE * self.at.min() <= self.at.max())
-
     def tick(self, axis: Axis) -> None:
         """Label an axis."""
         axis.set_label_text(self.label)
         if self.names:
-            room = MOST_NAMES if max(map(len, self.names)) <= LONG else MOST_NAMES // 2
-            step = -(-len(self.names) // room)
+            room = max(1, LETTERS // max(map(len, self.names)))
+            step = -(-len(self.names) // min(12, room))
             axis.set_ticks(self.at[::step], list(self.names)[::step])
         elif self.at.dtype.kind == "i":
             axis.set_major_locator(MaxNLocator(nbins=8, integer=True))
 
     def scale(self, panel: Axes) -> None:
         """Label the lower axis of a panel, logarithmic where the numbers ask for it."""
-        if self.wide:
-            panel.set_xscale("log")
-        elif self.names:
+        if self.names:
             panel.set_xlim(-0.5, len(self.names) - 0.5)
+        elif 0.0 < WIDE * self.at.min() <= self.at.max():
+            panel.set_xscale("log")
         self.tick(panel.xaxis)
 
     def even(self) -> "Places":
@@ -74,16 +69,14 @@ def places_of(dataset: xr.Dataset, name: str) -> Places:
         return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
     if not np.issubdtype(values.dtype, np.number):
         return Places(np.arange(len(values)), words, [str(value) for value in values])
-    unit = str(dataset[name].attrs.get("units", UNITS.get(name, "")))
-    return Places(values, f"{words} ({unit})" if unit not in ("", "1") else words)
+    unit = str(dataset[name].attrs.get("units", UNITS.get(name, "1")))
+    return Places(values, words if unit == "1" else f"{words} ({unit})")
 
 
-def tick_decades(
-    axis: Axis, low: float, high: float, subs: Sequence[float] = (1.0, 2.0, 5.0)
-) -> None:
+def tick_decades(axis: Axis, low: float, high: float) -> None:
     """Ticks of a logarithmic axis: some of each decade where there are few decades."""
     if np.log10(high / low) < FEW_DECADES:
-        axis.set_major_locator(LogLocator(subs=subs))
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
         axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
         axis.set_minor_formatter(NullFormatter())
@@ -92,5 +85,4 @@ def tick_decades(
 def hide_rounding(axis: Axes) -> None:
     """A logarithmic axis ends six decades below its largest value."""
     low, high = axis.get_ylim()
-    if axis.get_yscale() == "log":
-        axis.set_ylim(max(low, 1e-6 * high), high)
+    axis.set_ylim(max(low, 1e-6 * high), high)

@@ -82,7 +82,7 @@ def letter(number: int, title: str = "") -> str:
 
 
 def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
-    """The one legend, below all panels, of the lines in some of them, in all columns with room."""
+    """The one legend, below all panels, of the lines in some of them."""
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
     for legend in list(figure.legends):
         legend.remove()
@@ -92,13 +92,13 @@ def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
 
     def width(columns: int) -> float:
         parts = np.array_split(lengths, columns)
-        return sum(HANDLE + LETTER * max(part, default=0) for part in parts)
+        return sum(HANDLE + LETTER * max(part) for part in parts)
 
     fitting = (n for n in range(len(shown), 1, -1) if width(n) <= figure.get_figwidth())
-    title = f"{MARK} {TRAINED}" if any(MARK in text for text in shown) else None
-    where, columns = "outside lower center", next(fitting, 1)
     # As few columns as the rows need, so that none stands almost empty.
-    columns = -(-len(shown) // -(-len(shown) // columns))
+    columns = -(-len(shown) // -(-len(shown) // next(fitting, 1)))
+    title = f"{MARK} {TRAINED}" if any(MARK in text for text in shown) else None
+    where = "outside lower center"
     figure.legend(shown.values(), shown, loc=where, ncols=columns, title=title)
 
 
