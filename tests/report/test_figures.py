@@ -13,7 +13,7 @@ from tests.report.figure_texts import check_texts
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.figures.catalogue import FIGURES
-from vehiclemor.report.figures.error_map import luminance
+from vehiclemor.report.figures.errors import luminance
 from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.theme import panels, save_figure, styled

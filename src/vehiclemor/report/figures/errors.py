@@ -6,45 +6,39 @@ has: curves over one, bands where more varies, a map over two, clouds over sampl
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from vehiclemor.errors import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.error_map import figure_map
 from vehiclemor.report.figures.runs import legend_of
-from vehiclemor.report.figures.scales import Places, places_of, tick_decades
-from vehiclemor.report.figures.theme import CROSS, MARKERS, THIN, ZERO, Results, Style
+from vehiclemor.report.figures.theme import Places, Results, Style, places_of, tick_decades
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 # Lines of a panel, and sampled quantities with panels.
 LINES, SAMPLED = 8, 3
-# Of samples that have no quantity.
-SORTED = "sorted by error"
 # Between marks of two lines above the axes, as a share of their height.
 SHIFT = 0.025
+# Of samples that have no quantity.
+SORTED = "sorted by error"
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5, "label": "best approximation"}
+# Columns of maps, cells of a map with their number, and cells that a contour must enclose.
+COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
+# In % of the cells, those whose small errors the colours leave out; luminance of a colour on which
+# white has more contrast than black.
+LEAST, DARK = 2.0, 0.179
 # Label -> text, errors on the dimensions output, the axis, and what bands are over.
 Lines = Mapping[str, tuple[str, xr.DataArray]]
-
-
-class Panel(NamedTuple):
-    """Errors of one output over a dimension `axis`, whose values stand at `places`."""
-
-    dataset: xr.Dataset
-    output: str
-    axis: str
-    places: Places
-    lines: Lines
 
 
 def figure_errors(
@@ -65,7 +59,7 @@ def figure_errors(
     methods = {m: text for m, text in (methods or reduced or known).items() if m in known}
     if not _varied(first):
         return _of_a_point(first, reduced and methods)
-    panels: list[Panel] = []
+    panels: list[tuple[xr.Dataset, str, str, Places, Lines]] = []
     notes: list[str] = []
     for dataset in results.values():
         axis, *others = _varied(dataset)
@@ -81,7 +75,7 @@ def figure_errors(
             notes += [f"the largest error over {_words(rest)}"] if rest else []
         if mapped:
             notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
-            figure = figure_map(dataset, errors, methods, outputs, across)
+            figure = _map(dataset, errors, methods, outputs, across)
             return _finish(figure, results, methods, notes)
         if sampled or many:
             lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
@@ -89,9 +83,35 @@ def figure_errors(
             medians = f"medians over {_words(rest)}, bands from the smallest to the largest error"
             notes.append(medians)
         places = _sampled(dataset, axis) if sampled else [places_of(dataset, axis)]
-        panels += [Panel(dataset, o, axis, at, lines) for o in outputs for at in places]
+        panels += [(dataset, output, axis, at, lines) for output in outputs for at in places]
     each = len(panels) // len(results) // len(outputs)
-    return _finish(_figure(panels, each if each > 1 else len(outputs)), results, methods, notes)
+    columns = each if each > 1 else len(outputs)
+    rows = len(panels) // columns
+    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
+    figure, grid = theme.panels(rows, columns, size)
+    for number, (panel, (dataset, output, axis, at, lines)) in enumerate(
+        zip(grid.flat, panels, strict=True)
+    ):
+        panel.set_title(theme.letter(number))
+        _draw_panel(panel, dataset, output, axis, at, lines)
+        at.scale(panel)
+        # Of panels above each other with the same axis the lowest has its label.
+        if any(below[3].label == at.label for below in panels[number + columns :][:1]):
+            panel.set_xlabel("")
+    return _finish(figure, results, methods, notes)
+
+
+def _finish(
+    figure: Figure, results: Results, methods: Mapping[str, str], notes: Sequence[str]
+) -> Figure:
+    """A line above the panels, how many runs were trained on, and the legend."""
+    held = [labels.trained_runs(dataset).sel(label=list(methods)) for dataset in results.values()]
+    count, size = sum(int(runs.sum()) for runs in held), sum(runs.size for runs in held)
+    trained = f"{count} of {size} runs were in their own training" if count else ""
+    if words := "\n".join(filter(None, (", ".join(notes), trained))):
+        figure.suptitle(words, fontsize="medium")
+    theme.legend_below(figure, figure.axes)
+    return figure
 
 
 def _is_sample(dimension: str) -> bool:
@@ -109,7 +129,7 @@ def _varied(dataset: xr.Dataset) -> list[str]:
     names = [name for name, size in sizes.items() if size > 1]
     numbers = _numbers(dataset, names)
 
-    def order(name: str) -> tuple[bool, ...]:
+    def order(name: str) -> tuple[bool, bool, bool, int]:
         return _is_sample(name), name in numbers, name in FACTORS, sizes[name]
 
     return sorted(names, key=order, reverse=True)
@@ -148,48 +168,19 @@ def _sampled(dataset: xr.Dataset, sample: str) -> list[Places]:
     def follows(name: str) -> float:
         return abs(ranks.corr(pd.Series(dataset[name].values).rank()))
 
-    words = f"{_words([sample])}, {SORTED}"
-    found = [
-        places_of(dataset, name) for name in sorted(names, key=follows, reverse=True)[:SAMPLED]
-    ]
-    return found or [Places(np.arange(dataset.sizes[sample]), words)]
+    names = sorted(names, key=follows, reverse=True)[:SAMPLED]
+    found = [places_of(dataset, name) for name in names]
+    return found or [Places(np.arange(len(ranks)), f"{_words([sample])}, {SORTED}")]
 
 
-def _figure(panels: Sequence[Panel], columns: int) -> Figure:
-    """Panels in columns; of one axis below another each has its label once."""
-    rows = len(panels) // columns
-    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
-    figure, grid = theme.panels(rows, columns, size)
-    for number, (axis, panel) in enumerate(zip(grid.flat, panels, strict=True)):
-        axis.set_title(theme.letter(number))
-        _draw_panel(axis, panel)
-        panel.places.scale(axis)
-        below = panels[number + columns :][:1]
-        if below and below[0].places.label == panel.places.label:
-            axis.set_xlabel("")
-    return figure
-
-
-def _finish(
-    figure: Figure, results: Results, methods: Mapping[str, str], notes: Sequence[str]
-) -> Figure:
-    """A line above the panels, how many runs were trained on, and the legend."""
-    held = [labels.trained_runs(dataset).sel(label=list(methods)) for dataset in results.values()]
-    count, size = sum(int(runs.sum()) for runs in held), sum(runs.size for runs in held)
-    trained = f"{count} of {size} runs were in their own training" if count else ""
-    if words := "\n".join(filter(None, (", ".join(notes), trained))):
-        figure.suptitle(words, fontsize="medium")
-    theme.legend_below(figure, figure.axes)
-    return figure
-
-
-def _draw_panel(axis: Axes, panel: Panel) -> None:
+def _draw_panel(
+    axis: Axes, dataset: xr.Dataset, output: str, dimension: str, places: Places, lines: Lines
+) -> None:
     """Lines of one output; over perturbations the best approximation and the published error."""
-    dataset, output, places = panel.dataset, panel.output, panel.places
-    cloud = _is_sample(panel.axis)
-    looks = theme.styles(panel.lines)
-    for marker, (name, (text, errors)) in zip(itertools.cycle(MARKERS), panel.lines.items()):
-        values = errors.sel(output=output).transpose(panel.axis, ...).values
+    cloud = _is_sample(dimension)
+    looks = theme.styles(lines)
+    for marker, (name, (text, errors)) in zip(itertools.cycle(theme.MARKERS), lines.items()):
+        values = errors.sel(output=output).transpose(dimension, ...).values
         values = values.reshape(len(places.at), -1)
         look: Style = {**looks[name], "marker": marker, "markersize": 3.5}
         # Names and samples have no order that a line could follow.
@@ -198,18 +189,22 @@ def _draw_panel(axis: Axes, panel: Panel) -> None:
             look |= {"alpha": 0.6, "markeredgewidth": 0.0, "rasterized": len(places.at) > 1000}
         if places.label.endswith(SORTED):
             values = np.sort(values, axis=0)
-        draw_errors(axis, places.at, values, look, text)
-    if panel.axis in FACTORS:
-        if "pod" in panel.lines and "floor_rms_error" in dataset:
+        draw_band(axis, places.at, values, look, text)
+        _mark_off_axis(axis, places.at, values, look["color"])
+    if dimension in FACTORS:
+        if "pod" in lines and "floor_rms_error" in dataset:
             floor = dataset["floor_rms_error"].sel(label="pod", output=output).squeeze(drop=True)
-            if floor.dims == (panel.axis,) and bool(np.isfinite(floor).any()):
+            if floor.dims == (dimension,) and bool(np.isfinite(floor).any()):
                 axis.plot(places.at, floor, **FLOOR)
         if published := rms_numbers(str(dataset.attrs["model"])).get(output):
-            axis.axhline(published.value, label="published, nominal", **THIN)
+            axis.axhline(published.value, label="published, nominal", **theme.THIN)
     axis.set_yscale("log")
     tick_decades(axis.yaxis, *axis.get_ylim())
     # Last in the legend what the axis can't show.
-    for mark, text in ((CROSS, "a run has failed"), (ZERO, "error 0, off the log axis")):
+    for mark, text in (
+        (theme.CROSS, "a run has failed"),
+        (theme.ZERO, "error 0, off the log axis"),
+    ):
         if any(line.get_marker() == mark["marker"] for line in axis.lines):
             axis.plot([], [], color="black", label=text, **mark)
     axis.set_ylabel(labels.error_label(dataset, "RMS error", output))
@@ -228,17 +223,107 @@ def draw_band(axis: Axes, at: np.ndarray, values: np.ndarray, look: Style, text:
         axis.fill_between(at[some], low, high, color=look["color"], alpha=0.15, linewidth=0.0)
 
 
-def draw_errors(axis: Axes, at: np.ndarray, values: np.ndarray, look: Style, text: str) -> None:
-    """A line or cloud of errors; crosses above it and triangles below for what a log can't show."""
-    draw_band(axis, at, values, look, text)
-    edge: Style = {"color": look["color"], "transform": axis.get_xaxis_transform()}
-    for mark, height, found in ((CROSS, 1.0, ~np.isfinite(values)), (ZERO, 0.0, values == 0.0)):
+def _mark_off_axis(axis: Axes, at: np.ndarray, values: np.ndarray, color: str) -> None:
+    """Crosses above the axes where a run has failed, triangles below where the error is 0."""
+    for mark, height, found in (
+        (theme.CROSS, 1.0, ~np.isfinite(values)),
+        (theme.ZERO, 0.0, values == 0.0),
+    ):
         places = at[found.any(axis=1)]
         if places.size:
             # Above those of other lines.
             others = sum(line.get_marker() == mark["marker"] for line in axis.lines)
             heights = np.full(places.size, height + SHIFT * others)
-            axis.plot(places, heights, clip_on=False, **(mark | edge))
+            edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False}
+            axis.plot(places, heights, color=color, **mark, **edge)
+
+
+def _map(
+    dataset: xr.Dataset,
+    errors: xr.DataArray,
+    methods: Mapping[str, str],
+    outputs: Sequence[str],
+    axes: Sequence[str],
+) -> Figure:
+    """Errors over two dimensions (across and upwards), a column for each method.
+
+    Of few cells each has its number; of many a white line is where the error is the published one.
+    Colours leave out the least errors, as that of the training run, far below all others.
+    """
+    errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
+    errors = errors.transpose("output", "label", *reversed(axes))
+    each = -(-len(methods) // COLUMNS)
+    columns = -(-len(methods) // each)
+    size = 3.35 * columns, 2.8 * each * len(outputs) + 0.3
+    figure, grid = theme.panels(each * len(outputs), columns, size, sharex=True, sharey=True)
+    across, up = (places_of(dataset, name).even() for name in axes)
+    written = across.at.size * up.at.size <= WRITTEN
+    for row, output in enumerate(outputs):
+        block = grid[row * each : (row + 1) * each]
+        found = errors.sel(output=output, label=list(methods)).values
+        # A map on which nothing differs from zero, or nothing has come to its end, is still one.
+        colored = found[np.isfinite(found) & (found > 0.0)]
+        colored = colored if colored.size else np.array([1.0, 10.0])
+        factor, unit = 1.0, labels.unit_of(dataset, output)
+        if written:
+            factor, unit = labels.readable_unit(float(np.median(colored)), unit)
+        low, high = factor * np.percentile(colored, (LEAST, 100.0), method="nearest")
+        norm = LogNorm(low, high, clip=True)
+        published = rms_numbers(str(dataset.attrs["model"])).get(output)
+        for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
+            _draw_cells(axis, across.at, up.at, factor * found[number], norm, written=written)
+            if published and not written and np.sum(found[number] < published.value) >= ENCLOSED:
+                lines: Style = {"levels": [np.log(published.value)], "linestyles": "solid"}
+                logarithms = np.log(np.maximum(found[number], low))
+                axis.contour(across.at, up.at, logarithms, colors="white", linewidths=1.2, **lines)
+            axis.set_title(theme.letter(row * len(methods) + number, text))
+        label = labels.error_label(dataset, "RMS error", output, unit)
+        extend = "min" if factor * colored.min() < low else None
+        bar = figure.colorbar(block[0, 0].collections[0], ax=block, label=label, extend=extend)
+        tick_decades(bar.ax.yaxis, low, high)
+        for axis in block[:, 0]:
+            up.tick(axis.yaxis)
+    for axis in grid.flat if each > 1 else grid[-1]:
+        across.tick(axis.xaxis)
+        axis.tick_params(labelbottom=True)
+    # They share the ticks of the others until these are set.
+    for axis in grid.flat:
+        if not axis.collections:
+            axis.remove()
+    return figure
+
+
+def _draw_cells(
+    axis: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, norm: LogNorm, *, written: bool
+) -> None:
+    """Cells in colours, with their numbers if `written`; a run that has failed has a cross."""
+    failed = ~np.isfinite(values)
+    style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
+    cells = np.where(failed, np.nan, np.maximum(values, norm.vmin or 0.0))
+    mesh = axis.pcolormesh(x, y, cells, norm=norm, **style)
+    j, i = np.nonzero(failed)
+    axis.plot(x[i], y[j], color="#D55E00", **theme.CROSS)
+    axis.grid(visible=False)
+    for j, i in np.argwhere(~failed) if written else ():
+        color = "white" if luminance(mesh.get_cmap()(norm(cells[j, i]))[:3]) < DARK else "black"
+        text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
+        axis.text(x[i], y[j], two_digits(float(values[j, i])), **text)
+
+
+def luminance(color: ArrayLike) -> float:
+    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
+    parts = np.asarray(color, dtype=float)
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def two_digits(value: float) -> str:
+    """A number with two significant digits, below a hundredth with one, without an exponent."""
+    if value == 0.0:
+        return "0"
+    rounded = float(f"{value:.1e}")
+    decimals = (1 if rounded >= 0.01 else 0) - int(np.floor(np.log10(abs(rounded))))
+    return f"{value:.{max(0, decimals)}f}"
 
 
 def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:
@@ -249,7 +334,7 @@ def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:
     figure, grid = theme.panels(1, 1, (6.7, 1.6 + 0.19 * len(names)))
     axis, places = grid[0, 0], np.arange(len(names))
     texts, looks = legend_of(dataset, methods), theme.styles(methods)
-    for marker, (label, text) in zip(itertools.cycle(MARKERS), texts.items()):
+    for marker, (label, text) in zip(itertools.cycle(theme.MARKERS), texts.items()):
         run = at_point(dataset, label)
         share = 100.0 * (run["rms_error"] / run["signal_range"])
         share = share.where(np.isfinite(share) & (share > 0.0))

@@ -7,18 +7,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vehiclemor.report.figures.error_map import two_digits
-from vehiclemor.report.figures.errors import draw_band, figure_errors
-from vehiclemor.report.figures.runs import END, Curve, Runs, draw_history, draw_paths, runs_of
-from vehiclemor.report.figures.theme import (
-    THIN,
-    Results,
-    Style,
-    legend_below,
-    letter,
-    panels,
-    styles,
+from vehiclemor.report.figures import theme
+from vehiclemor.report.figures.errors import draw_band, figure_errors, two_digits
+from vehiclemor.report.figures.runs import (
+    END,
+    Curve,
+    Runs,
+    draw_history,
+    draw_paths,
+    legend_of,
+    runs_of,
 )
+from vehiclemor.report.figures.theme import THIN, Results, Style, letter, panels, styles
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.spectrum import spectrum
@@ -58,10 +58,8 @@ def figure_unseen(
     figure, axes = panels(2, len(inputs), (8.0, 4.4), sharey="row", gridspec_kw=heights)
     looks = styles(methods)
     for (upper, lower), (title, amplitude) in zip(axes.T, inputs.items(), strict=True):
-        found: list[Runs] = []
-        for dataset in results.values():
-            held = {m: t for m, t in methods.items() if m in dataset["label"].values}
-            found.append(runs_of(dataset.sel(amplitude_factor=amplitude), held))
+        points = [dataset.sel(amplitude_factor=amplitude) for dataset in results.values()]
+        found = [runs_of(point, legend_of(point, methods)) for point in points]
         curves = {curve.label: curve for runs in found for curve in runs.curves}
         ordered = [curves[label]._replace(style=looks[label]) for label in methods]
         draw_paths(upper, Runs(found[0].full, ordered))
@@ -71,25 +69,27 @@ def figure_unseen(
         upper.set_xlabel("X (m)")
         lower.set_xlabel("largest error of Y (m)")
     axes[0, 0].set_ylabel("Y (m), not to scale")
-    legend_below(figure, [axes[0, 0]])
+    theme.legend_below(figure, [axes[0, 0]])
     return figure
 
 
 def _draw_bars(axis: Axes, curves: Sequence[Curve]) -> None:
     """Largest lateral error of each reduced model, in numbers too, on a logarithmic axis."""
     errors = [c.run["max_error"].sel(output="lateral_position").item() for c in curves]
-    units = [readable_unit(error, "m") for error in errors]
-    words = [f"{two_digits(f * e)} {unit}" for e, (f, unit) in zip(errors, units, strict=True)]
-    words = [w if e >= MEASURABLE else "< 0.1 mm" for e, w in zip(errors, words, strict=True)]
     colors = [curve.style["color"] for curve in curves]
     bars = axis.barh([c.text for c in curves], np.maximum(errors, SHORTEST), 0.6, color=colors)
-    axis.bar_label(bars, words, padding=4)
+    axis.bar_label(bars, map(_length, errors), padding=4)
     axis.set_ylim(len(curves) - 0.5, -0.5)
     axis.set_xscale("log")
     axis.set_xlim(SHORTEST, LONGEST)
     axis.set_xticks([1e-3, 1e-1, 1e1], ["0.001", "0.1", "10"])
     axis.minorticks_off()
     axis.grid(visible=False, axis="y")
+
+
+def _length(error: float) -> str:
+    factor, unit = readable_unit(error, "m")
+    return f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
 
 
 def figure_spread(results: Results) -> Figure:
@@ -117,7 +117,7 @@ def figure_spread(results: Results) -> Figure:
     lower.set_ylim(*(1.6 * limit for limit in lower.get_ylim()))
     lower.set_xlabel("time (s)")
     lower.set_xlim(0.0, float(dataset["time"][-1]))
-    legend_below(figure, axes.flat)
+    theme.legend_below(figure, axes.flat)
     return figure
 
 
@@ -135,7 +135,7 @@ def figure_equation_order(results: Results) -> Figure:
         least = nominal["rms_error"].sel(label="pod", rank=3, output=output).item()
         axis.axhline(least, color="#009E73", linestyle="--", label="least squares")
         axis.axhline(numbers[output].value, label="published", **THIN)
-    legend_below(figure, figure.axes)
+    theme.legend_below(figure, figure.axes)
     return figure
 
 
@@ -161,5 +161,5 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
         axis.set_title(letter(number, title))
         axis.set_ylabel("" if column else label)
         axis.set_xlabel("number of modes" if row else "")
-    legend_below(figure, [axes[0, 0]])
+    theme.legend_below(figure, [axes[0, 0]])
     return figure

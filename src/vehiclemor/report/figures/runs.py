@@ -13,8 +13,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.scales import hide_rounding, tick_decades
-from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style
+from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style, hide_rounding, tick_decades
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 
@@ -175,9 +174,9 @@ def draw_history(axis: Axes, runs: Runs, output: str) -> None:
     if np.isfinite(span):
         axis.plot(full["time"], factor * full, label="full order", **FULL)
     if moves:
-        every = [v for h in histories for v in (float(h.min()), float(h.max())) if np.isfinite(v)]
-        lowest = max(min([low, *every]), low - REACH * span) - 0.05 * span
-        highest = min(max([high, *every]), high + REACH * span) + 0.05 * span
+        every = np.array([full, *histories])
+        lowest = max(np.nanmin(every), low - REACH * span) - 0.05 * span
+        highest = min(np.nanmax(every), high + REACH * span) + 0.05 * span
         limits = factor * lowest, factor * highest
         axis.set_ylim(*limits)
     for curve, history in zip(runs.curves, histories, strict=True):
@@ -253,7 +252,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
             edge: Style = {"transform": axis.get_yaxis_transform(), "clip_on": False}
             axis.plot(at, rms, color=curve.style["color"], **edge, **RMS_MARK)
             marked.append(rms)
-    axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
+    axis.plot([], [], color="black", label="RMS error over the run (right edge)", **RMS_MARK)
     if published:
         line: Style = {"color": "black", "linestyle": ":", "label": "published RMS error"}
         axis.axhline(published.value, **line)

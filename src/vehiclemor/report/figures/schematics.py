@@ -7,8 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from pydantic import Field
 
 from vehiclemor.multibody.high_fidelity.equilibrium import wheel_places
 from vehiclemor.multibody.independent_suspension.equilibrium import derived
@@ -28,44 +26,14 @@ HALO: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
 WHEEL_RADIUS, SPRING_TOP = 0.30, 0.92
 LEFT, UP = np.eye(3)[1:]
 Points = dict[str, np.ndarray]
-
-
-class Size(FileSchema):
-    """Distance of two points, as a line and its text."""
-
-    text: str
-    ends: list[str]
-    away: list[float]
-    beside: list[float]
-
-
-class Schematic(FileSchema):
-    """One drawing; the keys are explained in `data/figures/schematics.toml`."""
-
-    height: float
-    space: list[float]
-    graph: list[float]
-    low: list[float]
-    high: list[float]
-    view: list[float]
-    zoom: float
-    frame: dict[str, float]
-    box: list[float] = Field(default_factory=list)
-    lines: list[list[str]] = Field(default_factory=list)
-    springs: list[list[str]] = Field(default_factory=list)
-    wheels: list[list[str]]
-    marks: dict[str, list[str]]
-    sizes: list[Size] = Field(default_factory=list)
-    nodes: dict[str, list[float]]
-    edges: list[list[str]]
-    corners: dict[str, list[float]] = Field(default_factory=dict)
+Drawing = dict[str, Any]
 
 
 class SchematicsFile(FileSchema):
-    """Schema of `data/figures/schematics.toml`."""
+    """Schema of `data/figures/schematics.toml`, where the keys of a drawing are explained."""
 
     colors: dict[str, str]
-    drawings: dict[str, Schematic]
+    drawings: dict[str, Drawing]
 
 
 def _vehicle() -> list[tuple[Points, float]]:
@@ -154,110 +122,112 @@ def figure_schematic(*, name: str) -> Figure:
     """A mechanism in space, to scale (a), and its graph (b)."""
     file = read_toml(data_folder() / "figures" / "schematics.toml", SchematicsFile)
     drawing, states = file.drawings[name], STATES[name]()
-    # Placed by hand: the style's automatic layout can't deal with axes in space.
-    figure = Figure(figsize=(6.7, drawing.height))
-    figure.set_layout_engine("none")
-    space = figure.add_axes(drawing.space, projection="3d")
-    _frame(space, drawing)
+    below, ratio = drawing["graph"]
+    figure = Figure(figsize=(6.7, drawing["height"]))
+    ratios = {"height_ratios" if below else "width_ratios": [1.0, ratio]}
+    shape = (2, 1) if below else (1, 2)
+    space, graph = figure.subplots(*shape, gridspec_kw=ratios)
+    for axis, title in ((space, "(a)"), (graph, "(b)")):
+        axis.set_axis_off()
+        axis.set_title(title)
+    space.set_aspect("equal")
+    plane = _plane(*drawing["view"])
     for points, alpha in states:
-        _draw_bodies(space, drawing, points, file.colors, alpha)
-    _draw_outline(space, drawing, states[0][0])
-    graph = figure.add_axes(drawing.graph)
+        _draw_bodies(space, drawing, points, plane, file.colors, alpha)
+    _draw_outline(space, drawing, states[0][0], plane)
     _draw_graph(graph, drawing, file.colors)
     legend = dict(zip(*reversed(space.get_legend_handles_labels()), strict=True))
-    figure.legend(legend.values(), legend, loc="lower left", ncols=4, fontsize=7.5)
-    left, bottom, _, height = drawing.graph
-    figure.text(0.02, 0.98, "(a)", va="top")
-    figure.text(left + 0.02, min(0.98, bottom + height), "(b)", va="top")
+    figure.legend(legend.values(), legend, loc="outside lower center", ncols=4)
     return figure
 
 
-def _frame(axis: Any, drawing: Schematic) -> None:
-    axis.set_axis_off()
-    axis.patch.set_visible(False)
-    axis.set_proj_type("ortho")
-    for name, start, end in zip("xyz", drawing.low, drawing.high, strict=True):
-        getattr(axis, f"set_{name}lim")(start, end)
-    axis.set_box_aspect(tuple(np.subtract(drawing.high, drawing.low)), zoom=drawing.zoom)
-    axis.view_init(*drawing.view)
+def _plane(elevation: float, azimuth: float) -> np.ndarray:
+    """Matrix (3, 2) of the parallel projection onto what is seen from there, angles in degrees."""
+    up, turn = np.deg2rad([elevation, azimuth])
+    right = [-np.sin(turn), np.cos(turn), 0.0]
+    top = [-np.sin(up) * np.cos(turn), -np.sin(up) * np.sin(turn), np.cos(up)]
+    return np.array([right, top]).T
 
 
 def _draw_bodies(
-    axis: Any, drawing: Schematic, points: Points, colors: Mapping[str, str], alpha: float
+    axis: Axes,
+    drawing: Drawing,
+    points: Points,
+    plane: np.ndarray,
+    colors: Mapping[str, str],
+    alpha: float,
 ) -> None:
     """One side, or one position, of the mechanism."""
-    for body, *names in drawing.lines:
-        corners = [points[name] for name in names]
-        color = colors[body]
-        axis.plot(*np.transpose(corners), linewidth=1.0 + alpha, alpha=alpha, color=color)
-        if len(corners) > 2:
-            face: Style = {"color": color, "alpha": 0.25 * alpha, "linewidth": 0.0}
-            axis.add_collection3d(Poly3DCollection([corners], **face))
-    for low, high in drawing.springs:
-        line = _zigzag(points[low], points[high])
-        axis.plot(*line, color=SPRING, linewidth=1.2, label="spring and damper")
-    for body, name in drawing.wheels:
+    for body, *names in drawing.get("lines", ()):
+        corners = np.array([points[name] for name in names]) @ plane
+        axis.plot(*corners.T, linewidth=1.0 + alpha, alpha=alpha, color=colors[body])
+        axis.fill(*corners.T, alpha=0.25 * alpha, color=colors[body], linewidth=0.0)
+    for low, high in drawing.get("springs", ()):
+        line = _zigzag(points[low] @ plane, points[high] @ plane)
+        axis.plot(*line.T, color=SPRING, linewidth=1.2, label="spring and damper")
+    for body, name in drawing["wheels"]:
         spin = points.get("axle_direction", LEFT)
         up = np.cross([1.0, 0.0, 0.0], spin)
         up /= np.linalg.norm(up)
         angle = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
         around = np.cos(angle) * np.cross(spin, up) + np.sin(angle) * up
-        circle = points[name] + points["radius"] * around
+        circle = (points[name] + points["radius"] * around) @ plane
         axis.plot(*circle.T, color=colors[body], linewidth=1.6 * alpha**0.5, alpha=alpha)
-    for text, (marker, *names) in drawing.marks.items() if alpha == 1.0 else ():
+    for text, (marker, *names) in drawing["marks"].items() if alpha == 1.0 else ():
         style = {"color": colors[text], "marker": marker, "linestyle": "none", "label": text}
-        places = np.transpose([points[name] for name in names])
-        axis.plot(*places, markersize=4.0, markeredgecolor="black", **style)
+        places = np.array([points[name] for name in names]) @ plane
+        axis.plot(*places.T, markersize=4.0, markeredgecolor="black", **style)
 
 
 def _zigzag(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Line (3, n) of a spring between two points (3,) in m."""
+    """Line (n, 2) of a spring between two points (2,) of the plane."""
     along = high - low
-    aside = np.array([1.0, 0.0, 0.0]) - along[0] / (along @ along) * along
+    aside = np.array([-along[1], along[0]]) / np.linalg.norm(along)
     parts = [0.0, 0.2, *np.linspace(0.23, 0.77, 10), 0.8, 1.0]
-    turns = [0.0, 0.0, *(0.05 * (-1.0) ** np.arange(10)), 0.0, 0.0]
-    return (low + np.outer(parts, along) + np.outer(turns, aside)).T
+    turns = [0.0, 0.0, *(0.04 * (-1.0) ** np.arange(10)), 0.0, 0.0]
+    return low + np.outer(parts, along) + np.outer(turns, aside)
 
 
-def _draw_outline(axis: Any, drawing: Schematic, points: Points) -> None:
+def _draw_outline(axis: Axes, drawing: Drawing, points: Points, plane: np.ndarray) -> None:
     """Chassis, axes and sizes."""
-    if drawing.box:
-        half, bottom, top, beyond = drawing.box
+    if "box" in drawing:
+        half, bottom, top, beyond = drawing["box"]
         ends = points["front left"][0] + beyond, points["rear left"][0] - beyond
         around = [(ends[i], half * s) for i, s in ((0, 1.0), (0, -1.0), (1, -1.0), (1, 1.0))]
         low, high = ([(*corner, z) for corner in around] for z in (bottom, top))
         walls = [[low[i - 1], low[i], high[i], high[i - 1]] for i in range(4)]
         style: Style = {"facecolor": ("#999999", 0.1), "edgecolor": "black", "linewidth": 0.5}
-        axis.add_collection3d(Poly3DCollection([low, high, *walls], **style))
-    style = {"color": "black", "linewidth": 1.2, "arrow_length_ratio": 0.2}
-    for name, length in drawing.frame.items():
-        for arrow, text in zip(length * np.eye(3), "xyz", strict=True):
-            axis.quiver(*points[name], *arrow, **style)
-            axis.text(*(points[name] + 1.2 * arrow), text, **TEXT)
-    for size in drawing.sizes:
-        ends = np.array([points[end] for end in size.ends])
-        line = ends + size.away
-        for pair in zip(ends, line, strict=True):
+        for wall in np.array([low, high, *walls]) @ plane:
+            axis.fill(*wall.T, **style)
+    arrow = {"arrowstyle": "->", "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    for name, length in drawing["frame"].items():
+        for direction, text in zip(length * np.eye(3), "xyz", strict=True):
+            origin, tip = points[name] @ plane, (points[name] + direction) @ plane
+            axis.plot(*np.transpose([origin, tip]), color="black", linewidth=1.2)
+            axis.annotate("", tip, origin, arrowprops=arrow)
+            axis.text(*(tip + 0.2 * (tip - origin)), text, **TEXT)
+    for size in drawing.get("sizes", ()):
+        ends = np.array([points[end] for end in size["ends"]])
+        line = ends + size["away"]
+        for pair in zip(ends @ plane, line @ plane, strict=True):
             axis.plot(*np.transpose(pair), color=GREY, linewidth=0.5)
-        axis.plot(*line.T, color=GREY, linewidth=0.9, marker="|", markersize=5)
-        text = size.text.format(np.linalg.norm(ends[1] - ends[0]))
-        axis.text(*(line.mean(axis=0) + size.beside), text, color=GREY, **TEXT)
-    for artist in axis.get_children():
-        artist.set_clip_on(False)
+        axis.plot(*(line @ plane).T, color=GREY, linewidth=0.9, marker="|", markersize=5)
+        text = size["text"].format(np.linalg.norm(ends[1] - ends[0]))
+        axis.text(*((line.mean(axis=0) + size["beside"]) @ plane), text, color=GREY, **TEXT)
 
 
-def _draw_graph(axis: Axes, drawing: Schematic, colors: Mapping[str, str]) -> None:
+def _draw_graph(axis: Axes, drawing: Drawing, colors: Mapping[str, str]) -> None:
     """Bodies in boxes, joints on the lines between them, closures dashed."""
     axis.set_axis_off()
-    for start, end, text in drawing.edges:
-        ends = np.array([drawing.nodes[start], drawing.nodes[end]])
+    for start, end, text in drawing["edges"]:
+        ends = np.array([drawing["nodes"][start], drawing["nodes"][end]])
         line = "--" if "closure" in text else "-"
         axis.plot(*ends.T, line, color=GREY, linewidth=1.2, zorder=1)
         axis.text(*ends.mean(axis=0), text, bbox=HALO, zorder=2, **TEXT)
-    for body, place in drawing.nodes.items():
+    for body, place in drawing["nodes"].items():
         box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": colors[body]}
         axis.text(*place, body.replace(" ", "\n"), bbox=box, zorder=3, **TEXT)
-    for text, (x, y, width, height) in drawing.corners.items():
+    for text, (x, y, width, height) in drawing.get("corners", {}).items():
         axis.add_patch(Rectangle((x, y), width, height, edgecolor=GREY, fill=False, linestyle=":"))
         axis.text(x + width - 0.08, y + 0.08, text, **(TEXT | {"ha": "right", "va": "bottom"}))
     axis.margins(0.05, 0.12)
