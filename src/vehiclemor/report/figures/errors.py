@@ -1,7 +1,7 @@
 """Errors of any study over what it varies or samples, or of one point.
 
 Which picture it is follows from the dimensions of the study's grid, whatever model and methods it
-has: curves over one, bands where more varies, a map over two, clouds over samples.
+has: curves over one, a map over two where more varies, clouds over samples.
 """
 
 import itertools
@@ -29,6 +29,11 @@ from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 LINES, SAMPLED = 8, 3
 # Between marks of two lines above the axes, as a share of their height.
 SHIFT = 0.025
+# What a logarithmic axis can't show: its mark, its height as a share of the axes, its text.
+OFF: tuple[tuple[Style, float, str], ...] = (
+    (theme.CROSS, 1.0, "a run has failed"),
+    (theme.ZERO, 0.0, "error 0, off the log axis"),
+)
 # Of samples that have no quantity.
 SORTED = "sorted by error"
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5, "label": "best approximation"}
@@ -37,7 +42,7 @@ COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
 # In % of the cells, those whose small errors the colours leave out; luminance of a colour on which
 # white has more contrast than black.
 LEAST, DARK = 2.0, 0.179
-# Label -> text, errors on the dimensions output, the axis, and what bands are over.
+# Label -> text, errors on the dimensions output and the axis.
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
 
@@ -64,24 +69,20 @@ def figure_errors(
     for dataset in results.values():
         axis, *others = _varied(dataset)
         errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-        sampled, lines = _is_sample(axis), _lines(errors, methods, others)
-        many = len(lines) > max(LINES, len(methods))
-        across = FACTORS if set(FACTORS) <= {axis, *others} else (axis, *_numbers(dataset, others))
-        mapped = not sampled and (across == FACTORS or (many and len(across) == 2))
-        rest = [name for name in others if name not in (across if mapped else (axis,))]
+        lines = _lines(errors, methods, others)
+        sampled, factors = _is_sample(axis), set(FACTORS) <= {axis, *others}
+        mapped = not sampled and (factors or len(lines) > max(LINES, len(methods)))
+        shown = [axis] if not mapped else list(FACTORS) if factors else [axis, others[0]]
+        rest = [name for name in others if name not in shown]
         if sampled or mapped:
             errors = errors.max(rest)
+            lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
             notes += [f"{dataset.sizes[axis]} samples"] if sampled else []
             notes += [f"the largest error over {_words(rest)}"] if rest else []
         if mapped:
             notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
-            figure = _map(dataset, errors, methods, outputs, across)
+            figure = _map(dataset, errors, methods, outputs, shown)
             return _finish(figure, results, methods, notes)
-        if sampled or many:
-            lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
-        if many and not sampled:
-            medians = f"medians over {_words(rest)}, bands from the smallest to the largest error"
-            notes.append(medians)
         places = _sampled(dataset, axis) if sampled else [places_of(dataset, axis)]
         panels += [(dataset, output, axis, at, lines) for output in outputs for at in places]
     each = len(panels) // len(results) // len(outputs)
@@ -180,17 +181,25 @@ def _draw_panel(
     cloud = _is_sample(dimension)
     looks = theme.styles(lines)
     for marker, (name, (text, errors)) in zip(itertools.cycle(theme.MARKERS), lines.items()):
-        values = errors.sel(output=output).transpose(dimension, ...).values
-        values = values.reshape(len(places.at), -1)
+        values = errors.sel(output=output).values.ravel()
         look: Style = {**looks[name], "marker": marker, "markersize": 3.5}
         # Names and samples have no order that a line could follow.
         look |= {"linestyle": "none"} if places.names or cloud else {}
         if cloud:
             look |= {"alpha": 0.6, "markeredgewidth": 0.0, "rasterized": len(places.at) > 1000}
         if places.label.endswith(SORTED):
-            values = np.sort(values, axis=0)
-        draw_band(axis, places.at, values, look, text)
-        _mark_off_axis(axis, places.at, values, look["color"])
+            values = np.sort(values)
+        known = np.isfinite(values) & (values > 0.0)
+        axis.plot(places.at, np.where(known, values, np.nan), label=text, **look)
+        for (mark, height, _), found in zip(
+            OFF, (~np.isfinite(values), values == 0.0), strict=True
+        ):
+            # Above those of other lines.
+            others = sum(line.get_marker() == mark["marker"] for line in axis.lines)
+            heights = np.full(np.sum(found), height + SHIFT * others)
+            edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
+            if found.any():
+                axis.plot(np.compress(found, places.at), heights, color=look["color"], **edge)
     if dimension in FACTORS:
         if "pod" in lines and "floor_rms_error" in dataset:
             floor = dataset["floor_rms_error"].sel(label="pod", output=output).squeeze(drop=True)
@@ -201,41 +210,10 @@ def _draw_panel(
     axis.set_yscale("log")
     tick_decades(axis.yaxis, *axis.get_ylim())
     # Last in the legend what the axis can't show.
-    for mark, text in (
-        (theme.CROSS, "a run has failed"),
-        (theme.ZERO, "error 0, off the log axis"),
-    ):
+    for mark, _, text in OFF:
         if any(line.get_marker() == mark["marker"] for line in axis.lines):
             axis.plot([], [], color="black", label=text, **mark)
     axis.set_ylabel(labels.error_label(dataset, "RMS error", output))
-
-
-def draw_band(axis: Axes, at: np.ndarray, values: np.ndarray, look: Style, text: str) -> None:
-    """Medians of values (places, others), and a band from the smallest to the largest."""
-    known = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-    some = np.isfinite(known).any(axis=1)
-    known = known[some]
-    middle = np.full(len(at), np.nan)
-    middle[some] = np.nanmedian(known, axis=1)
-    axis.plot(at, middle, label=text, **look)
-    if values.shape[1] > 1:
-        low, high = np.nanmin(known, axis=1), np.nanmax(known, axis=1)
-        axis.fill_between(at[some], low, high, color=look["color"], alpha=0.15, linewidth=0.0)
-
-
-def _mark_off_axis(axis: Axes, at: np.ndarray, values: np.ndarray, color: str) -> None:
-    """Crosses above the axes where a run has failed, triangles below where the error is 0."""
-    for mark, height, found in (
-        (theme.CROSS, 1.0, ~np.isfinite(values)),
-        (theme.ZERO, 0.0, values == 0.0),
-    ):
-        places = at[found.any(axis=1)]
-        if places.size:
-            # Above those of other lines.
-            others = sum(line.get_marker() == mark["marker"] for line in axis.lines)
-            heights = np.full(places.size, height + SHIFT * others)
-            edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False}
-            axis.plot(places, heights, color=color, **mark, **edge)
 
 
 def _map(
@@ -267,7 +245,7 @@ def _map(
         factor, unit = 1.0, labels.unit_of(dataset, output)
         if written:
             factor, unit = labels.readable_unit(float(np.median(colored)), unit)
-        low, high = factor * np.percentile(colored, (LEAST, 100.0), method="nearest")
+        low, high = factor * np.percentile(colored, (LEAST, 100.0), method="higher")
         norm = LogNorm(low, high, clip=True)
         published = rms_numbers(str(dataset.attrs["model"])).get(output)
         for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.errors import draw_band, figure_errors, two_digits
+from vehiclemor.report.figures.errors import figure_errors, two_digits
 from vehiclemor.report.figures.runs import (
     END,
     Curve,
@@ -152,8 +152,10 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
             values = found[variable].sel(preset=preset).transpose("mode", "window")
             values = values.where(values > 0.1 * rounding).dropna("mode", how="all")
             look: Style = {"marker": "o", "markersize": 3, **styles([method])[method]}
-            words = f"{text}: median, all periods"
-            draw_band(axis, values["mode"].values, values.values, look, words)
+            modes, words = values["mode"], f"{text}: median, all periods"
+            axis.plot(modes, values.median("window"), label=words, **look)
+            band: Style = {"color": look["color"], "alpha": 0.15, "linewidth": 0.0}
+            axis.fill_between(modes, values.min("window"), values.max("window"), **band)
         axis.set_yscale("log")
         axis.set_ylim(bottom=rounding)
         axis.axvline(int(found["rank"]), label="states that the paper keeps", **THIN)

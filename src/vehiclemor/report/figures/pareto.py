@@ -60,7 +60,7 @@ def figure_pareto(results: Results) -> Figure:
     axis.text(0.99, 1.08, "bounds", fontsize=7, ha="right", transform=axis.get_yaxis_transform())
     axis.set_yscale("log")
     axis.set_xscale("log")
-    axis.set_ylim(top=top)
+    axis.set_ylim(0.5 * min([1.0, *known["score"]]), top)
     axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
     axis.set_ylabel("worst error / bound, judged runs")
     theme.tick_decades(axis.xaxis, *axis.get_xlim())
