@@ -36,7 +36,7 @@ def study(*ends, grid="", above=0.0, **entries):
 
 # Each end alone, beside another over a curve, or on a map of few and of all methods.
 STUDIES = {f"alone-{end}": study(end) for end in ("diverged", "unreachable")}
-STUDIES |= {f"beside-{end}": study(end, "ok", grid=CURVE) for end in ("rejected", "exact")}
+STUDIES |= {f"beside-{end}": study(end, "ok", grid=CURVE) for end in ("untrusted", "rejected")}
 STUDIES |= {f"map-{n}": study(*ENDS[:n], grid=MAP, above=PARTLY) for n in (1, 4, 7)}
 NUMBERS = "amplitude_factor = [1.0, 1.2]"
 STUDIES |= {
@@ -94,7 +94,7 @@ def test_every_study_is_drawn(folder, name):
         checked(vm.plot(folder / f"{name}.toml", "errors", results=folder))
 
 
-@pytest.mark.parametrize("name", ["all", "late", "at-once", "beside-exact", "beside-rejected"])
+@pytest.mark.parametrize("name", ["all", "late", "at-once", "beside-untrusted", "beside-rejected"])
 def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(folder, name):
     data = stored(folder, name)
     figure = vm.plot(str(folder / f"{name}.toml"), results=folder)

@@ -285,7 +285,7 @@ def _draw_cells(
     for j, i in np.argwhere(~failed) if written else ():
         color = "white" if luminance(mesh.get_cmap()(norm(cells[j, i]))[:3]) < DARK else "black"
         text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
-        axis.text(x[i], y[j], two_digits(float(values[j, i])), **text)
+        axis.text(float(x[i]), float(y[j]), two_digits(float(values[j, i])), **text)
 
 
 def luminance(color: ArrayLike) -> float:

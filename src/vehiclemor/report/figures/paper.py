@@ -78,7 +78,7 @@ def _draw_bars(axis: Axes, curves: Sequence[Curve]) -> None:
     errors = [c.run["max_error"].sel(output="lateral_position").item() for c in curves]
     colors = [curve.style["color"] for curve in curves]
     bars = axis.barh([c.text for c in curves], np.maximum(errors, SHORTEST), 0.6, color=colors)
-    axis.bar_label(bars, map(_length, errors), padding=4)
+    axis.bar_label(bars, [*map(_length, errors)], padding=4)
     axis.set_ylim(len(curves) - 0.5, -0.5)
     axis.set_xscale("log")
     axis.set_xlim(SHORTEST, LONGEST)

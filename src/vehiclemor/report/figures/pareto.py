@@ -3,6 +3,7 @@
 import json
 import textwrap
 from itertools import cycle
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,7 +31,7 @@ def figure_pareto(results: Results) -> Figure:
     reduced model of which a run has failed.  Bars: between the quartiles of the rounds.
     """
     (dataset,) = results.values()
-    rows = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
+    rows: Any = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
     rows["time"] = 1e6 * rows["seconds"]
     rows["bar"] = 0.5 * rows["spread"] * rows["time"]
     rows["tolerance"] = [json.loads(text).get("tolerance", 0.0) for text in rows["settings"]]

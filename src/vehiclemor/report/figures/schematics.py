@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -25,7 +24,8 @@ HALO: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
 # springs.
 WHEEL_RADIUS, SPRING_TOP = 0.30, 0.92
 LEFT, UP = np.eye(3)[1:]
-Points = dict[str, np.ndarray]
+# Places (3,) in m by name, and the radius of the wheels.
+Points = dict[str, Any]
 Drawing = dict[str, Any]
 
 
@@ -150,7 +150,7 @@ def _plane(elevation: float, azimuth: float) -> np.ndarray:
 
 
 def _draw_bodies(
-    axis: Axes,
+    axis: Any,
     drawing: Drawing,
     points: Points,
     plane: np.ndarray,
@@ -188,7 +188,7 @@ def _zigzag(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return low + np.outer(parts, along) + np.outer(turns, aside)
 
 
-def _draw_outline(axis: Axes, drawing: Drawing, points: Points, plane: np.ndarray) -> None:
+def _draw_outline(axis: Any, drawing: Drawing, points: Points, plane: np.ndarray) -> None:
     """Chassis, axes and sizes."""
     if "box" in drawing:
         half, bottom, top, beyond = drawing["box"]
@@ -216,7 +216,7 @@ def _draw_outline(axis: Axes, drawing: Drawing, points: Points, plane: np.ndarra
         axis.text(*((line.mean(axis=0) + size["beside"]) @ plane), text, color=GREY, **TEXT)
 
 
-def _draw_graph(axis: Axes, drawing: Drawing, colors: Mapping[str, str]) -> None:
+def _draw_graph(axis: Any, drawing: Drawing, colors: Mapping[str, str]) -> None:
     """Bodies in boxes, joints on the lines between them, closures dashed."""
     axis.set_axis_off()
     for start, end, text in drawing["edges"]:
