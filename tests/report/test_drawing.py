@@ -331,7 +331,7 @@ def test_curves_and_maps_show_the_errors():
     assert "formulation" in figure.get_suptitle()
     errors = dataset["rms_error"].max("formulation").sel(label="pod", output="second_euler_angle")
     shown = figure.axes[0].collections[0].get_array().ravel()
-    assert 1e-6 * shown.max() == pytest.approx(float(errors.max()))
+    assert 1e-3 * shown.max() == pytest.approx(float(errors.max()))
     assert shown.size == errors.size
 
 
